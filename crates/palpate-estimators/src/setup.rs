@@ -15,13 +15,16 @@ use palpate_mechanics::surface::{Extent, InsensitiveSensor, SurfaceSpec};
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 
-/// A surface with its sensors, all on it, and the contact force where it is known. A rig describes it, and a locator keeps it.
+/// A surface with its sensors, all on it, and the contact force where it is known, or its bound where that is. A rig describes it, and a
+/// locator keeps it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked")]
 pub struct Setup {
     surface: SurfaceSpec,
     layout: Layout,
     force_n: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    greatest_force_n: Option<f64>,
     columns: Option<Columns>,
 }
 
@@ -32,15 +35,18 @@ struct Unchecked {
     surface: SurfaceSpec,
     layout: Layout,
     force_n: Option<f64>,
+    #[serde(default)]
+    greatest_force_n: Option<f64>,
     columns: Option<Columns>,
 }
 
 impl TryFrom<Unchecked> for Setup {
     type Error = SetupError;
 
-    fn try_from(Unchecked { surface, layout, force_n, columns }: Unchecked) -> Result<Self, SetupError> {
+    fn try_from(unchecked: Unchecked) -> Result<Self, SetupError> {
+        let Unchecked { surface, layout, force_n, greatest_force_n, columns } = unchecked;
         let setup = Self { columns, ..Self::new(surface) };
-        Ok(setup.with_layout(layout)?.with_force(force_n)?)
+        Ok(setup.with_layout(layout)?.with_force(force_n)?.with_greatest_force(greatest_force_n)?)
     }
 }
 
@@ -151,7 +157,13 @@ impl Setup {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn new(surface: impl Into<SurfaceSpec>) -> Self {
-        Self { surface: surface.into(), layout: Layout::default(), force_n: None, columns: None }
+        Self {
+            surface: surface.into(),
+            layout: Layout::default(),
+            force_n: None,
+            greatest_force_n: None,
+            columns: None,
+        }
     }
 
     /// A surface without a model, `length_m` metres long, with these raw channels, known by recordings only.
@@ -205,6 +217,11 @@ impl Setup {
     /// The contact force in newtons, greater than 0, where it is known.
     pub fn force_n(&self) -> Option<f64> {
         self.force_n
+    }
+
+    /// The greatest force of contacts of unknown force in newtons, greater than 0, where it was said.
+    pub fn greatest_force_n(&self) -> Option<f64> {
+        self.greatest_force_n
     }
 
     /// Roles of a recording's columns; `None` for the columns that palpate itself writes.
@@ -283,6 +300,16 @@ impl Setup {
     pub fn with_force(self, force_n: Option<f64>) -> Result<Self, OutOfRange> {
         OutOfRange::check_positive(force_n.map(|force_n| ("the force in newtons", force_n)))?;
         Ok(Self { force_n, ..self })
+    }
+
+    /// The same, whose contacts of unknown force are no harder than this, in newtons; `None` for what the calibration tells.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a force that is not greater than 0 and finite.
+    pub fn with_greatest_force(self, greatest_force_n: Option<f64>) -> Result<Self, OutOfRange> {
+        let named = greatest_force_n.map(|force_n| ("the greatest force in newtons", force_n));
+        OutOfRange::check_positive(named)?;
+        Ok(Self { greatest_force_n, ..self })
     }
 
     /// Knowledge of the contact force.
@@ -375,7 +402,14 @@ mod tests {
             let refused = good.clone().with_force(Some(force_n)).unwrap_err().to_string();
             let message = format!("the force in newtons is {force_n}; it must be greater than 0 and finite");
             assert_eq!(refused, message);
+            let refused = good.clone().with_greatest_force(Some(force_n)).unwrap_err().to_string();
+            assert_eq!(refused, message.replace("the force", "the greatest force"));
         }
+        let bounded = good.clone().unknown_force().with_greatest_force(Some(20.0)).unwrap();
+        let text_of_bounded = serde_json::to_string(&bounded).unwrap();
+        assert_eq!(serde_json::from_str::<Setup>(&text_of_bounded).unwrap(), bounded);
+        let damaged = text_of_bounded.replace(r#""greatest_force_n":20.0"#, r#""greatest_force_n":0.0"#);
+        assert!(read(&damaged).starts_with("the greatest force in newtons is 0;"), "{}", read(&damaged));
         let damaged = text.replace(r#""force_n":3.0"#, r#""force_n":-3.0"#);
         assert!(
             read(&damaged).starts_with("the force in newtons is -3; it must be greater than 0 and finite")

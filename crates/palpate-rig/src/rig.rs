@@ -198,6 +198,10 @@ impl RigFile {
         let surface = surface_keys.build()?;
         let layout = sensors::build(sensors, self.recording.as_deref(), &surface)?;
         check_force(contact_force, &surface)?;
+        let greatest_force_n = match &self.contact {
+            Some(contact) => contact.greatest_force_n(&surface)?,
+            None => None,
+        };
         let training = self.training(&surface, &layout, force_n)?;
         let estimator = match &self.estimator {
             Some(keys) => keys.build(&layout, force_n)?,
@@ -209,7 +213,8 @@ impl RigFile {
         let moving = |keys| motion::build(keys, &surface, surface_keys.density(), force_n);
         let motion = self.motion.as_ref().map(moving).transpose()?;
         let setup = Setup::new(surface).with_layout(layout).map_err(SetupError::from);
-        let setup = setup.and_then(|setup| Ok(setup.with_force(force_n)?));
+        let setup =
+            setup.and_then(|setup| Ok(setup.with_force(force_n)?.with_greatest_force(greatest_force_n)?));
         let mut setup = setup.map_err(|error| RigProblem::Setup(error).without_place())?;
         if let Some(columns) = columns {
             setup = setup.recorded_as(columns);

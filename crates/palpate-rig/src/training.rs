@@ -18,6 +18,25 @@ const MOST: i64 = 100_000;
 pub(crate) struct ContactKeys {
     /// Their force, where it is known and one for all; unknown unless said otherwise.
     pub force: Option<At<Positive<Force>>>,
+    /// The greatest that an unknown force can be, on a surface with a model; ten times that of the presses unless said otherwise.
+    pub greatest_force: Option<At<Positive<Force>>>,
+}
+
+impl ContactKeys {
+    /// The greatest force in newtons, where it is said.
+    pub fn greatest_force_n(&self, surface: &SurfaceSpec) -> Result<Option<f64>, RigError> {
+        let Some(greatest) = &self.greatest_force else { return Ok(None) };
+        if self.force.is_some() {
+            return Err(greatest.place.unused("`force`, by which the force is known"));
+        }
+        match surface {
+            SurfaceSpec::Digit(_) => Err(greatest.place.unused("a digit, whose model bounds the force")),
+            surface if surface.model().is_none() => {
+                Err(greatest.place.unused("a `measured` surface, which knows forces by its presses only"))
+            }
+            _ => Ok(Some(greatest.si)),
+        }
+    }
 }
 
 /// The presses of a calibration.

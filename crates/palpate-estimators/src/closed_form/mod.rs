@@ -105,7 +105,11 @@ impl Fit for ClosedForm {
             beam: *beam,
             layout: setup.layout().clone(),
             force_n: setup.force_n(),
-            greatest_force_n: if setup.force_n().is_none() { greatest_force_n(recording) } else { None },
+            greatest_force_n: if setup.force_n().is_none() {
+                greatest_force_n(setup, recording)
+            } else {
+                None
+            },
             false_alarm_rate: self.false_alarm_rate,
         };
         let (needed, found) = (unknowns(1, setup.force_n()), locator.seeing().len());
@@ -214,9 +218,10 @@ impl ClosedFormLocator {
             Noise::Unknown => (0.1 * force_n).powi(2),
         };
         let sd_m = covariance[0].sqrt();
+        let is_too_hard = self.greatest_force_n.is_some_and(|most_n| force_n > most_n);
         let on_surface = self.beam.contains(Position::along(position_m));
         let near = |edge_m: f64| noise == Noise::Known && (position_m - edge_m).abs() <= 3.0 * sd_m;
-        let (status, held_m) = if force_n <= 0.0 || misfit_n.powi(2) > tolerated {
+        let (status, held_m) = if force_n <= 0.0 || is_too_hard || misfit_n.powi(2) > tolerated {
             (Status::OutsideModel, position_m)
         } else if on_surface || near(0.0) || near(length_m) {
             // Noise may carry a contact at the very edge a little beyond it.
@@ -306,10 +311,10 @@ impl Locate for ClosedFormLocator {
 /// Explanations whose χ² is so much above the least have a share of e⁻¹² of the probability.
 const NEGLIGIBLE: f64 = 24.0;
 
-/// So many times the hardest press of a recording, which is a bound for forces; `None` of a recording without forces.
-fn greatest_force_n(recording: &Recording) -> Option<f64> {
+/// The greatest force of contacts of unknown force: as it was said, or a multiple of a recording's hardest press; `None` where there is neither.
+fn greatest_force_n(setup: &Setup, recording: &Recording) -> Option<f64> {
     let hardest = recording.rows.iter().filter_map(|row| row.force_n).fold(0.0, f64::max);
-    (hardest > 0.0).then_some(PRIOR_FORCES * hardest)
+    setup.greatest_force_n().or((hardest > 0.0).then_some(PRIOR_FORCES * hardest))
 }
 
 /// Squared residuals that differ by less than this share of the reading are the same in double precision.

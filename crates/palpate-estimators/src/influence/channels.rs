@@ -3,6 +3,7 @@
 use super::config::ForceBelief;
 use crate::fit::LocatorFault;
 use crate::status::FalseAlarmRate;
+use crate::trade_off::PRIOR_FORCES;
 use serde::{Deserialize, Serialize};
 
 /// Offsets, noise and reference force of the channels, learnt besides their influence functions, and how rarely their noise is to be
@@ -18,6 +19,9 @@ pub(super) struct Channels {
     pub dead: Vec<bool>,
     /// Mean force of the calibration, in newtons.
     pub reference_force_n: f64,
+    /// Greatest force of contacts of unknown force, in newtons, where it was said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub greatest_force_n: Option<f64>,
     /// Share of untouched readings that may be taken for a contact.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
@@ -27,6 +31,11 @@ impl Channels {
     /// The channels in use, from 0.
     pub fn live(&self) -> Vec<usize> {
         (0..self.dead.len()).filter(|s| !self.dead[*s]).collect()
+    }
+
+    /// The greatest force of contacts of unknown force, in newtons: as it was said, or a multiple of the calibration's.
+    pub fn greatest_force_n(&self) -> f64 {
+        self.greatest_force_n.unwrap_or(PRIOR_FORCES * self.reference_force_n)
     }
 
     /// The same without channel `channel` (from 0); `None` when no channel would be left.
@@ -56,6 +65,13 @@ impl Channels {
         numbers("offset", &self.offsets, |_| true, "a finite number")?;
         numbers("noise", &self.noise_sd, |sd| sd > 0.0, "greater than 0")?;
         numbers("reference force", &[self.reference_force_n], |force| force > 0.0, "greater than 0")?;
+        let greatest = LocatorFault::check_numbers(
+            "greatest force",
+            self.greatest_force_n,
+            |force| force > 0.0,
+            "greater than 0",
+        );
+        greatest?;
         let force = if force.is_usable() { 1.0 } else { f64::NAN };
         numbers("belief about the force", &[force], |_| true, "greater than 0")
     }

@@ -65,6 +65,7 @@ pub(super) fn learn(
         noise_sd: vec![1.0; layout.len()],
         dead: layout.sensors().iter().map(|sensor| sensor.channel.dead).collect(),
         reference_force_n: presses.mean_force_n(),
+        greatest_force_n: task.setup.greatest_force_n(),
         false_alarm_rate,
     };
     let learning = Learning { from, surface, layout, presses: &presses, places };

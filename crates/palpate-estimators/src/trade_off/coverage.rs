@@ -118,12 +118,12 @@ fn print_and_check(
     assert!(wrong.is_empty(), "{title}: {wrong:#?}");
 }
 
-fn influence(bench: &Example) -> Vec<Box<dyn Locate<Check = NoCheck>>> {
+fn influence(bench: &Example, calibrations: u64) -> Vec<Box<dyn Locate<Check = NoCheck>>> {
     let fit = |seed: u64| -> Box<dyn Locate<Check = NoCheck>> {
         let recording = bench.simulate(seed);
         Box::new(Influence::default().fit_beam(FitTask::new(&bench.setup, &recording)).unwrap())
     };
-    (0..200).map(fit).collect()
+    (0..calibrations).map(fit).collect()
 }
 
 fn closed_form(bench: &Example) -> Vec<Box<dyn Locate<Check = NoCheck>>> {
@@ -132,9 +132,40 @@ fn closed_form(bench: &Example) -> Vec<Box<dyn Locate<Check = NoCheck>>> {
 }
 
 #[test]
+fn a_greatest_force_that_is_said_bounds_estimates_and_intervals() {
+    const GREATEST_N: f64 = 5.0;
+    let mut bench = bench(false);
+    bench.setup = bench.setup.with_greatest_force(Some(GREATEST_N)).unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    let surface = bench.setup.surface().model().unwrap();
+    for locator in influence(&bench, 1).iter().chain(&closed_form(&bench)) {
+        let mut hardest_n = 0.0f64;
+        for (place_mm, force_n) in
+            [3.0, 10.0, 30.0, 200.0, 395.0].into_iter().flat_map(|mm| [3.0, 4.95].map(|n| (mm, n)))
+        {
+            let contact = Contact { position: Position::along(1e-3 * place_mm), force_n };
+            let truth = clean_reading(surface, bench.setup.layout(), contact);
+            for _ in 0..50 {
+                let errors = ChannelErrors::none(bench.setup.layout());
+                let estimate = locator.locate(&measure(bench.setup.layout(), &truth, &errors, &mut rng));
+                let told = estimate.contact.uncertainty.unwrap().force_95_n.map_or(0.0, |(_, most)| most);
+                let found = [estimate.contact.force_n.unwrap(), told];
+                hardest_n = found.into_iter().fold(hardest_n, f64::max);
+                assert!(hardest_n <= GREATEST_N, "{place_mm} mm, {force_n} N: {estimate:?}");
+            }
+        }
+        assert!(hardest_n > 0.99 * GREATEST_N, "{hardest_n}");
+        let harder = Contact { position: Position::along(0.2), force_n: 7.0 };
+        let estimate = locator.locate(&clean_reading(surface, bench.setup.layout(), harder));
+        assert_eq!(estimate.status, Status::OutsideModel, "{estimate:?}");
+        assert!(estimate.contact.force_n.unwrap() <= GREATEST_N);
+    }
+}
+
+#[test]
 fn influence_covers_unknown_forces_at_every_distance_from_the_end() {
     let bench = bench(false);
-    print_and_check("influence, force unknown", &bench, &influence(&bench), &[1.0, 3.0, 6.0]);
+    print_and_check("influence, force unknown", &bench, &influence(&bench, 200), &[1.0, 3.0, 6.0]);
 }
 
 #[test]
@@ -146,7 +177,7 @@ fn the_closed_form_covers_unknown_forces_at_every_distance_from_the_end() {
 #[test]
 fn influence_covers_a_known_force_at_every_distance_from_the_end() {
     let bench = bench(true);
-    print_and_check("influence, force known", &bench, &influence(&bench), &[3.0]);
+    print_and_check("influence, force known", &bench, &influence(&bench, 200), &[3.0]);
 }
 
 #[test]

@@ -40,7 +40,9 @@ pub(super) fn conclude(
     }
     let sd_m = best.covariance[0].sqrt();
     let clear = match search.force {
-        ForceBelief::Unknown => !is_near_end(best.x_m, sd_m, search.table.length_m),
+        ForceBelief::Unknown => {
+            !is_near_end(best.x_m, sd_m, search.table.length_m) && !is_too_hard(search, best)
+        }
         _ => 4.0 * sd_m < best.x_m && 4.0 * sd_m < search.table.length_m - best.x_m,
     };
     let narrow = sd_m <= MOST_SPACINGS * search.gauss_newton.spacing.h_m && best.misfit.is_finite();
@@ -55,6 +57,13 @@ pub(super) fn conclude(
     }
 }
 
+/// Whether the greatest force of contacts of unknown force is within four standard deviations of a minimum's, or below.
+#[inline(always)]
+fn is_too_hard(search: &Search, minimum: &Minimum) -> bool {
+    let left_n = search.greatest_force_n - minimum.force_n;
+    search.force == ForceBelief::Unknown && !(left_n > 0.0 && left_n * left_n > 16.0 * minimum.covariance[2])
+}
+
 /// Writes the estimate of a reading that one normal distribution does not describe.
 #[cold]
 fn write_uncertain(
@@ -67,7 +76,8 @@ fn write_uncertain(
     let length_m = search.table.length_m;
     let is_near = |minimum: &Minimum| is_near_end(minimum.x_m, minimum.covariance[0].sqrt(), length_m);
     let is_roughly_known = matches!(search.force, ForceBelief::Normal { .. });
-    let trades_off = !is_roughly_known && minima.iter().any(is_near);
+    let is_bounded = |minimum: &Minimum| is_near(minimum) || is_too_hard(search, minimum);
+    let trades_off = !is_roughly_known && minima.iter().any(is_bounded);
     let misfit = match trades_off.then(|| not_excluded(search, read.whitened, minima)).flatten() {
         Some(found) => {
             found.write(estimate);

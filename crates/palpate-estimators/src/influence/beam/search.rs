@@ -16,7 +16,6 @@ use super::table::InfluenceTable;
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::status::{LINE_PLACES, StatusRule, unknowns};
-use crate::trade_off::PRIOR_FORCES;
 use palpate_numerics::simd::Eight;
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.
@@ -59,7 +58,7 @@ impl Search {
             coarse: Coarse::new(&table, &gauss_newton.weights, force),
             gauss_newton,
             rule: StatusRule::new(live.len(), unknowns(1, force.known_n()), LINE_PLACES, *false_alarm_rate),
-            greatest_force_n: PRIOR_FORCES * reference_force_n,
+            greatest_force_n: channels.greatest_force_n(),
             live,
             table,
             force,

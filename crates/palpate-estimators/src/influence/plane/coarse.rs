@@ -28,6 +28,8 @@ pub(super) struct Coarse {
     pub reaches: Vec<f64>,
     /// For each cell how far apart those of its ends are, along and across.
     pub lengths: Vec<[f64; 2]>,
+    /// The same with one force all over the cell, where it is not known.
+    pub whole_lengths: Vec<[f64; 2]>,
 }
 
 /// Memory of one scan.
@@ -74,10 +76,12 @@ impl Coarse {
             }
         }
         let cell_m = table.spacing_m().map(|spacing_m| 2.0 * spacing_m);
-        let (reaches, lengths) = (Vec::new(), Vec::new());
-        let mut coarse = Self { columns, rows, cell_m, influences, norms, reaches, lengths };
+        let (reaches, lengths, whole_lengths) = (Vec::new(), Vec::new(), Vec::new());
+        let mut coarse = Self { columns, rows, cell_m, influences, norms, reaches, lengths, whole_lengths };
         coarse.reaches = (0..columns * rows).map(|cell| coarse.reach(cell, force)).collect();
         coarse.lengths = (0..columns * rows).map(|cell| coarse.length(cell, force)).collect();
+        let known = ForceBelief::Known(1.0);
+        coarse.whole_lengths = (0..columns * rows).map(|cell| coarse.length(cell, known)).collect();
         coarse
     }
 

@@ -35,4 +35,6 @@ pub(super) fn fit(config: Influence, task: FitTask) -> Result<PlaneLocator, Infl
 }
 
 #[cfg(test)]
+mod coverage;
+#[cfg(test)]
 mod tests;

@@ -115,6 +115,8 @@ const CUT: f64 = 12.0;
 /// A block stands for its middle when its whitened length is no longer: the sum over a normal distribution at steps of h
 /// standard deviations is off by 2·e^(−2π²/h²), a hundredth.
 const FINE: f64 = 2.0;
+/// A part in whose middle the best force is more than so much of the greatest may have places where that holds it.
+const HELD: f64 = 0.5;
 /// No block is halved below this, however loud the readings are.
 const LEAST_M: f64 = 1e-9;
 /// More parts than any reading takes that the surface explains. One that is far too loud for it has as many as there are
@@ -153,9 +155,11 @@ impl Search {
                 && CLEAR * sd_m[k] < minimum.at[k]
                 && CLEAR * sd_m[k] < self.size_m[k] - minimum.at[k]
         });
+        // An infinite bound is above all.
+        let is_free = CLEAR * covariance[5].sqrt() < self.greatest_force_n - minimum.at[2];
         let volume = 2.0 * std::f64::consts::PI * (xx * yy - xy * xy).max(0.0).sqrt();
         let weight = (0.5 * (self.cost(best) - self.cost(minimum))).exp() * volume;
-        (narrow && weight.is_finite()).then_some(Mode { weight, mean: minimum.at, covariance })
+        (narrow && is_free && weight.is_finite()).then_some(Mode { weight, mean: minimum.at, covariance })
     }
 
     /// Minus twice the logarithm of the likelihood, but for a constant.
@@ -200,18 +204,22 @@ impl Search {
             if self.floor(profile, cell) + self.spread(middle_m) > most {
                 continue;
             }
-            let force_n = profile.force_n(cell, self.force);
+            let force_n = profile.force_n(cell, self.force).min(self.greatest_force_n);
             blocks.push(Block {
                 middle_m,
                 size_m: self.coarse.cell_m,
                 length: self.coarse.lengths[cell].map(|length| force_n * length),
+                held_length: self.coarse.whole_lengths[cell].map(|length| self.greatest_force_n * length),
             });
-            while let Some(block) = blocks.pop() {
+            while let Some(mut block) = blocks.pop() {
                 looked_at += 1;
                 if looked_at > MOST_BLOCKS {
                     return false;
                 }
                 let (force_n, misfit) = self.profiled(whitened, block.middle_m);
+                if force_n > HELD * self.greatest_force_n {
+                    block.length = block.held_length;
+                }
                 let spread = self.spread(block.middle_m);
                 if block.floor(misfit) + spread > most {
                     continue;
@@ -330,6 +338,8 @@ struct Block {
     size_m: [f64; 2],
     /// Distance of the whitened readings of its ends, along and across.
     length: [f64; 2],
+    /// The same of contacts with the greatest force, which does not make up for what the place changes.
+    held_length: [f64; 2],
 }
 
 impl Block {
@@ -350,6 +360,7 @@ impl Block {
             let mut block = *self;
             block.size_m[k] *= 0.5;
             block.length[k] *= 0.5;
+            block.held_length[k] *= 0.5;
             block.middle_m[k] += side * 0.5 * block.size_m[k];
             block
         };

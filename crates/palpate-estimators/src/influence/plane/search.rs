@@ -34,6 +34,8 @@ pub(super) struct Search {
     weights_force_n: f64,
     pub coarse: Coarse,
     pub force: ForceBelief,
+    /// Greatest force of a contact, in newtons; infinite where more is known of the force than that.
+    pub greatest_force_n: f64,
     /// Length and width, in metres.
     pub size_m: [f64; 2],
     pub rule: StatusRule,
@@ -72,6 +74,8 @@ impl Search {
         let weights_force_n = force.weights_force_n(*reference_force_n);
         let weight = |v: f64| 1.0 / (1.0 + weights_force_n * weights_force_n * v);
         let weights: Vec<Lanes> = variances.iter().map(|lanes| lanes.map(weight)).collect();
+        let greatest_force_n =
+            if force == ForceBelief::Unknown { channels.greatest_force_n() } else { f64::INFINITY };
         let coarse = Coarse::new(table, &patches, live.len(), force);
         // Channels that only fill a group up have v = 0, and a weight of 1.
         let node = |node: usize| weights[node * patches.groups..][..patches.groups].as_flattened().iter();
@@ -100,6 +104,7 @@ impl Search {
             weights_force_n,
             coarse,
             force,
+            greatest_force_n,
         }
     }
 
@@ -192,7 +197,7 @@ impl Search {
         }
         let (mean, precision) = self.force.mean_and_precision();
         let (score, norm) = (product + mean * precision, norm + precision);
-        let force_n = if norm > 0.0 { (score / norm).max(0.0) } else { 0.0 };
+        let force_n = if norm > 0.0 { (score / norm).clamp(0.0, self.greatest_force_n) } else { 0.0 };
         (force_n, square + mean * mean * precision + force_n * (force_n * norm - 2.0 * score))
     }
 
@@ -278,7 +283,7 @@ impl Search {
     /// The minimum near a place.
     pub fn refine(&self, whitened: &[f64], start_m: [f64; 2]) -> Minimum {
         let start = [start_m[0], start_m[1], self.best_force(whitened, start_m)];
-        let force = self.force.known_n().map_or((0.0, f64::INFINITY), |force_n| (force_n, force_n));
+        let force = self.force.known_n().map_or((0.0, self.greatest_force_n), |force_n| (force_n, force_n));
         let ends = [(0.0, self.size_m[0]), (0.0, self.size_m[1]), force];
         // Within one refinement the calibration's variances stay, so that misfits can be compared.
         let (at, _) = descend(start, ends, SMALL, |at| self.equations(whitened, at, Some(start_m)));

@@ -244,6 +244,42 @@ fn absurd_readings_are_outside_the_model() {
 }
 
 #[test]
+fn absurd_readings_of_random_signs_are_outside_the_model_at_unknown_force() {
+    let rig = rig();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(23);
+    for seed in 0..5 {
+        let locator = without_force(&fit(Influence::default(), &rig.setup, &rig.simulate(seed)));
+        for size in [1e-2, 1.0, 1e9, 1e300] {
+            for _ in 0..25 {
+                let reading = [(); 9].map(|()| size * rng.random_range(-1.0..1.0));
+                let estimate = locator.locate(&reading);
+                assert_eq!(estimate.status, Status::OutsideModel, "{reading:?}: {estimate:?}");
+                assert!(estimate.contact.force_n.unwrap() <= 50.0, "{estimate:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_greatest_force_that_is_said_bounds_estimates_on_a_plane() {
+    let rig = rig();
+    let setup = rig.setup.clone().unknown_force().with_greatest_force(Some(6.0)).unwrap();
+    let locator = fit(Influence::default(), &setup, &rig.simulate(2));
+    let clean = sensors(&rig.setup);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(29);
+    for (x_mm, y_mm, force_n) in [(8.0, 120.0, 5.0), (20.0, 25.0, 5.9), (150.0, 150.0, 5.99)] {
+        for _ in 0..30 {
+            let estimate = locator.locate(&noisy(&rig.setup, &clean, &[(x_mm, y_mm, force_n)], &mut rng));
+            let told = estimate.contact.uncertainty.and_then(|uncertainty| uncertainty.force_95_n);
+            let forces = [estimate.contact.force_n, told.map(|(_, most_n)| most_n)];
+            assert!(forces.into_iter().flatten().all(|force_n| force_n <= 6.0), "{estimate:?}");
+        }
+    }
+    let harder = locator.locate(&noisy(&rig.setup, &clean, &[(150.0, 150.0, 9.0)], &mut rng));
+    assert_eq!(harder.status, Status::OutsideModel, "{harder:?}");
+}
+
+#[test]
 fn a_dead_channel_is_left_out_and_the_last_is_kept() {
     let rig = rig();
     let mut locator = fit(Influence::default(), &rig.setup, &rig.simulate(1));
