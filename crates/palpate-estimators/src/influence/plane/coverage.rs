@@ -42,6 +42,13 @@ enum Place {
 }
 
 impl Place {
+    fn name(self) -> String {
+        match self {
+            Self::Edge(mm) => format!("{mm} mm"),
+            Self::Corner(mm) => format!("{mm} mm from both at a corner"),
+        }
+    }
+
     fn draw(self, rng: &mut Xoshiro256PlusPlus) -> Position {
         match self {
             Self::Edge(mm) => Position { x_m: 1e-3 * mm, y_m: rng.random_range(0.06..SIDE_M - 0.06) },
@@ -113,7 +120,8 @@ fn intervals_hold_contacts_of_unknown_force_near_edges_and_in_corners() {
         let percent = |count: usize| 100.0 * count as f64 / row.found as f64;
         let mean = |sum: f64| sum / row.found as f64;
         eprintln!(
-            "| {place:?} | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.2} mm | {:.2} mm | {:.2} N | {:.2} % |",
+            "| {} | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.2} mm | {:.2} mm | {:.2} N | {:.2} % |",
+            place.name(),
             100.0 * row.found as f64 / (CALIBRATIONS as usize * READINGS) as f64,
             percent(row.across),
             percent(row.along),

@@ -71,7 +71,8 @@ fn contact(search: &Search, mode: &Mode, covariance: [f64; 6]) -> ContactEstimat
     };
     ContactEstimate {
         position: position(mode.mean),
-        force_n: Some(mode.mean[2]),
+        // A mean of forces at the bound is beyond it by rounding.
+        force_n: Some(mode.mean[2].min(search.greatest_force_n)),
         uncertainty: Some(uncertainty),
     }
 }
