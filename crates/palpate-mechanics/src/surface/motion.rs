@@ -108,7 +108,7 @@ impl Motion {
     }
 
     /// Instants after `from_s` and before `to_s`, ascending, at which a path of straight pieces must break to follow the motion:
-    /// each turn, and each falling or growing of the force, in [`PIECES`] of them. What is between is even already.
+    /// each turn, and each falling or growing of the force, in 200 of them. What is between is even already.
     pub fn breaks_s(&self, from_s: f64, to_s: f64) -> Vec<f64> {
         let cycle_s = self.pass_s() + self.rest_s();
         let pass_at = |time_s: f64| ((time_s / cycle_s).max(0.0) as usize).min(self.passes - 1);
