@@ -165,24 +165,24 @@ impl<P: LineParser> Parsing<P> {
         match line.map(|line| self.parser.parse_line(line)) {
             Ok(Ok(parsed)) => {
                 if parsed.is_some() {
-                    self.note.say(self.parser.dialect());
+                    self.note.say(self.parser.progress().dialect());
                 }
                 return Ok(Some(parsed));
             }
             Ok(Err(error)) => {
                 // A stream without a header may have been joined in the middle of its first line.
                 let may_be_torn = self.header == Header::Absent && lines.is_whole();
-                if self.parser.awaits_columns() && !may_be_torn {
+                if self.parser.progress().awaits_columns() && !may_be_torn {
                     return Err(input::csv_complaint(&error).into());
                 }
                 lines.lose(&error)?;
             }
             Err(error) => {
-                if self.parser.awaits_columns() && self.header != Header::Absent {
+                if self.parser.progress().awaits_columns() && self.header != Header::Absent {
                     let place = format!("{}:{}", lines.name(), lines.count);
                     return Err(Complaint::new(format!("{place}: {error}")).into());
                 }
-                self.parser.skip_line();
+                self.parser.progress().skip_line();
                 lines.lose(&error)?;
             }
         }
@@ -221,7 +221,7 @@ impl Readings {
     }
 
     /// True until the columns are known, by a header or by `--no-header`.
-    pub fn awaits_columns(&self) -> bool {
-        self.parsing.parser.awaits_columns()
+    pub fn awaits_columns(&mut self) -> bool {
+        self.parsing.parser.progress().awaits_columns()
     }
 }

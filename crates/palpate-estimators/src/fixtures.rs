@@ -2,12 +2,14 @@
 
 use std::fs::File;
 
+use palpate_core::ContactEstimate;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind::{Deflection, Strain};
 use palpate_mechanics::sensing::{ChannelModel, Layout, SensorKind};
 use palpate_mechanics::surface::modal::ModalBeam;
 use palpate_mechanics::surface::{Beam, Digit, Extent, ForceDirection, Motion, Plate};
 use palpate_mechanics::units::{Unit, gpa, microstrain, mm, newtons, um};
+use palpate_numerics::normal_interval_95;
 use palpate_testing::data;
 
 use crate::arrangement::Training;
@@ -160,4 +162,11 @@ pub(crate) fn pad_recording() -> Option<(Setup, Recording)> {
     let recording = setup.read_recording_pair(readings?, contacts?).unwrap();
     assert_eq!((recording.rows.len(), recording.distinct_positions().len()), (4805, 961));
     Some((setup, recording))
+}
+
+/// The 95 % interval of an estimated contact's force: its own, or that of a normal distribution.
+pub(crate) fn force_95_n(contact: &ContactEstimate) -> (f64, f64) {
+    let uncertainty = contact.uncertainty.unwrap();
+    let normal = || normal_interval_95(contact.force_n.unwrap(), uncertainty.covariance[5].sqrt());
+    uncertainty.force_95_n.unwrap_or_else(normal)
 }

@@ -89,7 +89,7 @@ impl ReadingCheck {
         }
     }
 
-    /// What it goes by, in words.
+    /// Its means, in words.
     pub fn in_words(&self) -> &'static str {
         match self {
             Self::Influence(_) => "influence functions of the same recording",

@@ -36,7 +36,7 @@ pub enum SimulateError {
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
     /// The equations of the surface have no solution that is in balance.
-    #[error("the equations of the surface could not be solved: {0}")]
+    #[error("the equations of the surface could not be solved: {error}; {help}", error = .0, help = .0.help())]
     Surface(#[from] Unsolvable),
     /// A position does not lie on the surface.
     #[error(transparent)]

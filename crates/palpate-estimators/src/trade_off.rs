@@ -27,13 +27,13 @@ pub(crate) const PRIOR_FORCES: f64 = 10.0;
 /// A contact farther than so many standard deviations from both ends is described by a normal distribution.
 const CLEAR_OF_ENDS: f64 = 12.0;
 
-/// Whether a place with this standard deviation is so near to an end of a line that [`Contacts`] have to tell its interval.
+/// True for a place so near to an end of a line, in standard deviations, that [`Contacts`] have to tell its interval.
 #[inline(always)]
 pub(crate) fn is_near_end(x_m: f64, sd_m: f64, length_m: f64) -> bool {
     !(CLEAR_OF_ENDS * sd_m < x_m && CLEAR_OF_ENDS * sd_m < length_m - x_m)
 }
 
-/// What q is multiplied by where influences and noise come from finitely many presses: their errors are common to all channels of a
+/// Factor of q where influences and noise come from finitely many presses: their errors are common to all channels of a
 /// contact and to all forces, which variances channel by channel do not say.
 ///
 /// Without it 92.2 % of 4,000 readings over 200 calibrations were covered in the worst row of `trade_off/coverage.rs`.
@@ -45,7 +45,7 @@ pub(crate) const CALIBRATED: f64 = 1.1;
 /// when z does.)
 const BEYOND_A_BARRIER: f64 = 9.21;
 
-/// What is known of the force beforehand, in newtons.
+/// Knowledge of the force beforehand, in newtons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Force {
     /// It is this.
@@ -71,7 +71,7 @@ pub(crate) struct Contacts<'a> {
     /// Length of the line in metres.
     pub length_m: f64,
     pub force: Force,
-    /// What q is multiplied by: 1 where influences and noise are known, or [`CALIBRATED`].
+    /// Factor of q: 1 where influences and noise are known, or [`CALIBRATED`].
     pub widening: f64,
     /// The force at which channels are weighed first, in newtons.
     pub reference_force_n: f64,
@@ -145,12 +145,12 @@ struct Best {
     misfit: f64,
     /// q.
     bound: f64,
-    /// Whether a greater force than the greatest would explain the reading better.
+    /// True where a greater force than the greatest would explain the reading better.
     is_held: bool,
 }
 
 impl Best {
-    /// Whether χ² is at most `least` + q, q being at least `floor`.
+    /// True where χ² is at most `least` + q, q being at least `floor`.
     fn is_in(&self, least: f64, floor: f64) -> bool {
         self.misfit - least <= self.bound.max(floor)
     }
@@ -285,7 +285,7 @@ impl Contacts<'_> {
         (forces.0.max(0.0), forces.1.min(most))
     }
 
-    /// What contacts at both ends read: f there where the force is known, and just beside them, divided by |f|, where it is not.
+    /// Readings of contacts at both ends: f there where the force is known, and just beside them, divided by |f|, where it is not.
     fn end_readings(&self, buffer: &mut Vec<[f64; 2]>) -> [Vec<f64>; 2] {
         const BESIDE: f64 = 1e-5;
         let is_known = matches!(self.force, Force::Known(_));

@@ -49,7 +49,7 @@ impl OffSurface {
 /// # Ok::<(), palpate_numerics::OutOfRange>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "NoCheck", into = "NoCheck")]
+#[serde(try_from = "Unchecked", into = "Unchecked")]
 pub enum Extent {
     /// A line along x, on which y is 0.
     Line {
@@ -71,20 +71,20 @@ pub struct Side(f64);
 
 /// An extent as files have it.
 #[derive(Serialize, Deserialize)]
-struct NoCheck {
+struct Unchecked {
     length_m: f64,
     width_m: Option<f64>,
 }
 
-impl TryFrom<NoCheck> for Extent {
+impl TryFrom<Unchecked> for Extent {
     type Error = OutOfRange;
 
-    fn try_from(NoCheck { length_m, width_m }: NoCheck) -> Result<Self, OutOfRange> {
+    fn try_from(Unchecked { length_m, width_m }: Unchecked) -> Result<Self, OutOfRange> {
         Self::new(length_m, width_m)
     }
 }
 
-impl From<Extent> for NoCheck {
+impl From<Extent> for Unchecked {
     fn from(extent: Extent) -> Self {
         Self { length_m: extent.length_m(), width_m: extent.width_m() }
     }

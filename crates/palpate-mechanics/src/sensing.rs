@@ -86,14 +86,14 @@ pub struct Sensor {
 
 /// Layout: all the sensors of one surface. A reading has one value for each, in this order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "NoCheck")]
+#[serde(try_from = "Unchecked")]
 pub struct Layout {
     sensors: Vec<Sensor>,
 }
 
 /// A layout as a file has it.
 #[derive(Deserialize)]
-struct NoCheck {
+struct Unchecked {
     sensors: Vec<Sensor>,
 }
 
@@ -107,10 +107,10 @@ pub struct LayoutError {
     pub fault: OutOfRange,
 }
 
-impl TryFrom<NoCheck> for Layout {
+impl TryFrom<Unchecked> for Layout {
     type Error = LayoutError;
 
-    fn try_from(unchecked: NoCheck) -> Result<Self, LayoutError> {
+    fn try_from(unchecked: Unchecked) -> Result<Self, LayoutError> {
         Self::new(unchecked.sensors)
     }
 }

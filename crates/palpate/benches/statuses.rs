@@ -29,7 +29,7 @@ struct Bench {
     name: &'static str,
     /// The surface with its model and sensors.
     physics: Setup,
-    /// What the locator is told of it.
+    /// The surface and sensors as the locator knows them.
     setup: Setup,
     presses: Recording,
 }

@@ -187,7 +187,7 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
         LimitError::NoForce => "--force \"3 N\" gives one, or `force = \"3 N\"` in [contact]",
         LimitError::Force { .. } => "--force takes a force such as \"3 N\"",
         LimitError::Positions { .. } => "--every takes a length between two positions, such as \"10 mm\"",
-        LimitError::Surface(_) => "take fewer `elements`, or lengths and stiffnesses that are less far apart",
+        LimitError::Surface(error) => error.help(),
         LimitError::Cancelled(_) => "start it again",
     };
     complaint.help(help).into()
@@ -435,7 +435,7 @@ fn told(value: Option<f64>) -> String {
     value.map_or_else(|| "not told".to_owned(), |value| figure(Some(value)))
 }
 
-/// What the limits over the surface leave out, because the readings do not tell it, in a line for each knowledge of the force.
+/// Positions left out of the limits over the surface, as the readings do not tell them, in a line for each knowledge of the force.
 fn not_told_in_words(limits: &Limits) -> String {
     let line = |(curve, name): (&LimitCurve, &str)| {
         let words = curve.not_told_in_words()?;

@@ -178,7 +178,7 @@ fn shape_point(point: &ShapePoint) -> impl Serialize {
     }
 }
 
-/// What is said of an estimate near an end whose force is not known.
+/// The word for an estimate near an end, of a force that is not known.
 const TRADE_OFF: &str = "force and position";
 
 fn contact_fields(contact: &ContactEstimate, extent: Extent) -> impl Fields + use<> {

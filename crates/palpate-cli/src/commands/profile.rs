@@ -63,7 +63,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn sensors_complaint(error: LoadSensorsError, path: &Path) -> Complaint {
     let help = match error {
         LoadSensorsError::NoModel => "give a surface with a model, such as `kind = \"beam\"`",
-        LoadSensorsError::Noise(error) => error.help(),
+        LoadSensorsError::Noise(ref error) => error.help(),
+        LoadSensorsError::Surface(ref error) => error.help(),
     };
     Complaint::about(path, error).help(help)
 }

@@ -164,15 +164,15 @@ impl Stream<'_> {
             if let Some(reading) = reading {
                 self.follow(reading, &mut out)?;
             }
-            let parser = &parsing.parser;
-            if !parser.awaits_columns() && !parser.has_time() && self.arguments.rate.is_none() {
+            let parser = &mut parsing.parser;
+            if !parser.progress().awaits_columns() && !parser.has_time() && self.arguments.rate.is_none() {
                 let column =
                     columns.time.as_ref().map_or("`time_s`".to_owned(), |time| time.column.to_string());
                 let complaint = Complaint::new(format!("{} has no column {column}", self.lines.name()));
                 return Err(complaint.help("--rate says how many readings there are a second").into());
             }
         }
-        if parsing.parser.awaits_columns() && self.lines.is_whole() {
+        if parsing.parser.progress().awaits_columns() && self.lines.is_whole() {
             let complaint = Complaint::new(format!("{} holds no reading", self.lines.name()));
             return Err(complaint.help("it must begin with a header").into());
         }

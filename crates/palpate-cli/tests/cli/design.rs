@@ -77,7 +77,12 @@ fn the_best_layout_becomes_a_rig_that_can_be_used() {
 
 #[test]
 fn a_report_verifies_what_it_claims() {
-    let folder = folder(SENSOR_DESIGN);
+    // Within 30 mm of the ends, where force and place trade off, the estimator errs less than the limit on any layout.
+    let folder = folder(replaced(
+        SENSOR_DESIGN,
+        "from = \"20 mm\", to = \"380 mm\"",
+        "from = \"30 mm\", to = \"370 mm\"",
+    ));
     let arguments = ["design", "sensors", "rig.toml", "--counts", "2..5", "--out", "deep/report", "--json"];
     let found: Value = serde_json::from_str(&said(&run(folder.path(), &arguments))).unwrap();
     for name in ["report.html", "figure-1.svg", "figure-2.svg", "figure-3.svg", "figure-4.svg"] {
@@ -95,8 +100,7 @@ fn a_report_verifies_what_it_claims() {
     assert!(told.len() >= 4, "{told:?}");
     let refined =
         found["designs"].as_array().unwrap().iter().find(|design| design["method"] == "refined").unwrap();
-    // Where force and place trade off the estimator errs less on any layout, so the gain is a tenth at most.
-    assert!(refined["simulated"]["mean_error_mm"].as_f64().unwrap() < 0.95 * told[0], "{told:?}");
+    assert!(refined["simulated"]["mean_error_mm"].as_f64().unwrap() < 0.9 * told[0], "{told:?}");
     assert_eq!(found["counts"].as_array().unwrap().len(), 4);
 }
 

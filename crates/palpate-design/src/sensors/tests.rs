@@ -321,14 +321,14 @@ fn plates_are_designed_too() {
 fn a_layout_does_what_its_score_promises() {
     let (setup, mut design) = sensor_design();
     // Nearer to the ends force and place trade off, and the estimate errs less than the limit of unbiased ones.
-    design.contacts = ContactPrior::along(0.06, 0.34, 0.02);
+    design.contacts = ContactPrior::along(0.03, 0.37, 0.02);
     let problem = problem(&setup, &design);
     let estimator = palpate_estimators::estimator::Estimator::Influence(Default::default());
     let verify =
         |layout: &Layout| problem.verify(layout, &estimator, 2, 1, Watch::NONE).unwrap().mean_error_m;
     let (even, designed) = (problem.even().unwrap(), exchanged(&problem));
     let (before, after) = (verify(&even.layout), verify(&designed.layout));
-    assert!(after < before, "{before} {after}");
+    assert!(after < 0.9 * before, "{before} {after}");
     for (told, designed) in [(before, even), (after, designed)] {
         let expected = designed.assessment.mean_error_m.unwrap();
         assert!((0.8..1.3).contains(&(told / expected)), "{told} {expected}");

@@ -22,12 +22,12 @@ pub enum FeatureKind {
 }
 
 impl FeatureKind {
-    /// The readings where the force is known; where it is not, what the load does not change.
+    /// The readings where the force is known; where it is not, features that the load does not change.
     pub fn for_presses(setup: &Setup, recording: &Recording) -> Self {
         if setup.force_n().is_some() { Self::Readings } else { Self::load_invariant(setup, recording) }
     }
 
-    /// What the load does not change: with the size of a reading, unless all presses have one force and contacts may have others.
+    /// Features that the load does not change: with the size of a reading, unless all presses have one force and contacts may have others.
     pub fn load_invariant(setup: &Setup, recording: &Recording) -> Self {
         let mut forces = recording.rows.iter().map(|row| row.force_n);
         let first = forces.next().flatten();

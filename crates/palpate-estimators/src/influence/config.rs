@@ -126,7 +126,7 @@ impl ForceBelief {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InfluenceFitError {
     /// The equations of the surface have no solution that is in balance.
-    #[error("the equations of the surface could not be solved: {0}")]
+    #[error("the equations of the surface could not be solved: {error}; {help}", error = .0, help = .0.help())]
     Surface(#[from] palpate_mechanics::surface::Unsolvable),
     /// An error of the surface without a model.
     #[error(transparent)]

@@ -150,7 +150,8 @@ impl LeastSquares<'_> {
     }
 
     /// The minimum over x ≥ 0 by active sets (Lawson and Hanson, *Solving Least Squares Problems*, 1974, chapter 23): of many columns that are nearly
-    /// alike only as many are ever used as there are rows, so that a wide A costs little.
+    /// alike only as many are ever used as there are rows, so that a wide A costs little. (`smoothness::minimise` uses nearly all of them, as smooth loads
+    /// do, and needs a positive definite matrix, which AᵀA is not.)
     fn non_negative(&self) -> Array1<f64> {
         let columns = self.right.len();
         let lengths: Vec<f64> = (0..columns).map(|j| self.gram(j, j).sqrt()).collect();

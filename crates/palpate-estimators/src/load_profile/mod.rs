@@ -32,7 +32,7 @@ use bounds::Bounds;
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
-use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface, UniformLoad};
+use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface, UniformLoad, Unsolvable};
 use palpate_numerics::{Cholesky, median, normal_interval_95, normal_quantile};
 use smoothness::{Mixture, Problem};
 
@@ -67,14 +67,18 @@ pub enum LoadSensorsError {
     /// A live sensor has no noise, or none is alive.
     #[error(transparent)]
     Noise(#[from] NoiseError),
+    /// The equations of the surface have no solution that is in balance.
+    #[error("the equations of the surface could not be solved: {error}; {help}", error = .0, help = .0.help())]
+    Surface(#[from] Unsolvable),
 }
 
 impl<'a> LoadSensors<'a> {
     /// The sensors of `layout` under a surface with a model; the noise of each is √(σ² + q²/12), q being its resolution.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] for a live sensor without noise, or when none is alive.
+    /// [`LoadSensorsError`] for a live sensor without noise, when none is alive, or for a surface that cannot be solved.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LoadSensorsError> {
+        surface.check_solution()?;
         let channel = |(sensor, sd): (&Sensor, Option<f64>)| {
             let noise_sd = sd?;
             let influence = surface.influence_function(sensor.kind, sensor.position);

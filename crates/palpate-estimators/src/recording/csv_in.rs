@@ -448,6 +448,12 @@ pub trait LineParser {
     /// contact that is no number, and a contact off the surface.
     fn parse_line(&mut self, line: &[u8]) -> Result<Option<Self::Parsed>, CsvError>;
 
+    /// Progress through the lines.
+    fn progress(&mut self) -> &mut dyn LineProgress;
+}
+
+/// Progress of a [`LineParser`].
+pub trait LineProgress {
     /// Counts a line that nobody reads, so that the lines after it have their numbers.
     fn skip_line(&mut self);
 
@@ -456,6 +462,20 @@ pub trait LineParser {
 
     /// Dialect of the lines, as far as they have told.
     fn dialect(&self) -> &Dialect;
+}
+
+impl<F> LineProgress for Lines<F> {
+    fn skip_line(&mut self) {
+        self.count += 1;
+    }
+
+    fn awaits_columns(&self) -> bool {
+        self.fields.is_none()
+    }
+
+    fn dialect(&self) -> &Dialect {
+        &self.dialect
+    }
 }
 
 /// Turns lines of CSV into readings; only the channel columns need to be there.
@@ -482,16 +502,8 @@ impl LineParser for ReadingParser {
         next.map(|(mut cells, channels)| channels.reading(&mut cells)).transpose()
     }
 
-    fn skip_line(&mut self) {
-        self.lines.count += 1;
-    }
-
-    fn awaits_columns(&self) -> bool {
-        self.lines.fields.is_none()
-    }
-
-    fn dialect(&self) -> &Dialect {
-        &self.lines.dialect
+    fn progress(&mut self) -> &mut dyn LineProgress {
+        &mut self.lines
     }
 }
 
@@ -607,16 +619,8 @@ impl LineParser for TimedParser<'_> {
         Ok(Some(TimedReading { time_s, truth, reading: fields.channels.reading(&mut cells)? }))
     }
 
-    fn skip_line(&mut self) {
-        self.lines.count += 1;
-    }
-
-    fn awaits_columns(&self) -> bool {
-        self.lines.fields.is_none()
-    }
-
-    fn dialect(&self) -> &Dialect {
-        &self.lines.dialect
+    fn progress(&mut self) -> &mut dyn LineProgress {
+        &mut self.lines
     }
 }
 

@@ -16,7 +16,8 @@ mod warnings;
 pub use columns::{Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn};
 pub use csv_error::{CsvError, CsvProblem, Place};
 pub use csv_in::{
-    LineParser, ReadingParser, Schema, TimedParser, TimedReading, TimedRecording, read, read_pair,
+    LineParser, LineProgress, ReadingParser, Schema, TimedParser, TimedReading, TimedRecording, read,
+    read_pair,
 };
 pub use csv_out::{csv_row, write, write_timed};
 pub use dialect::Dialect;

@@ -165,7 +165,7 @@ fn a_spreadsheets_export_is_read_to_the_last_bit() {
         EXPORT.split_inclusive('\n').map(|line| parser.parse_line(line.as_bytes()).unwrap()).collect();
     let row = |i: usize| Some(plain.rows[i].reading.clone());
     assert_eq!(readings, [None, row(0), row(1), None, None]);
-    assert_eq!(parser.dialect().to_string(), "semicolons, decimal commas, units in the header");
+    assert_eq!(parser.progress().dialect().to_string(), "semicolons, decimal commas, units in the header");
 }
 
 #[test]
@@ -295,9 +295,9 @@ fn a_file_without_a_header_is_refused_with_line_and_column() {
 #[test]
 fn a_stream_goes_on_after_a_bad_line() {
     let mut parser = ReadingParser::new("stdin", &foreign());
-    assert!(parser.awaits_columns());
+    assert!(parser.progress().awaits_columns());
     assert_eq!(parser.parse_line(b"Pr,time,Pl\r\n").unwrap(), None);
-    assert!(!parser.awaits_columns());
+    assert!(!parser.progress().awaits_columns());
     assert_eq!(parser.parse_line(b"2,0,1\r\n").unwrap(), Some(vec![1.0, 2.0]));
     assert_eq!(parser.parse_line(b"\n").unwrap(), None);
     let error = parser.parse_line(b"nan,0,1\n").unwrap_err();

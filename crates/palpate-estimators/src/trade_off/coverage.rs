@@ -1,9 +1,9 @@
-//! How often intervals hold the contact, by its distance from the end of the paper's beam.
+//! Coverage of contacts by their distance from the end of the paper's beam.
 
 use super::PRIOR_FORCES;
 use crate::closed_form::ClosedForm;
 use crate::fit::{Fit, FitTask, Locate, NoCheck};
-use crate::fixtures::{Example, paper};
+use crate::fixtures::{Example, force_95_n, paper};
 use crate::influence::Influence;
 use crate::simulate::clean_reading;
 use palpate_core::Status;
@@ -28,7 +28,7 @@ fn bench(force_is_known: bool) -> Example {
     bench
 }
 
-/// What estimates of contacts at one place hold, in percent of the readings in which a contact was found.
+/// Counts and sums over the readings of contacts at one place.
 #[derive(Debug, Default)]
 struct Row {
     found: usize,
@@ -62,11 +62,9 @@ impl Row {
                 continue;
             }
             let (found, place) = (estimate.contact, estimate.contact.position.x_m);
-            let uncertainty = found.uncertainty.unwrap();
-            let (low, high) = uncertainty.x_95_m;
+            let (low, high) = found.uncertainty.unwrap().x_95_m;
             let found_n = found.force_n.unwrap();
-            let half_n = 1.959964 * uncertainty.covariance[5].sqrt();
-            let (least_n, most_n) = uncertainty.force_95_n.unwrap_or((found_n - half_n, found_n + half_n));
+            let (least_n, most_n) = force_95_n(&found);
             row.found += 1;
             row.place += usize::from((low..=high).contains(&x_m));
             row.force += usize::from((least_n..=most_n).contains(&force_n));

@@ -231,9 +231,7 @@ pub fn help(error: &DesignError) -> &'static str {
             "the limit depends on the contact force: `force = \"3 N\"` in [contact], or --force \"3 N\""
         }
         DesignError::Limit(LimitError::Noise(error)) => error.help(),
-        DesignError::Limit(LimitError::Surface(_)) => {
-            "take fewer `elements`, or lengths and stiffnesses that are less far apart"
-        }
+        DesignError::Limit(LimitError::Surface(error)) => error.help(),
         DesignError::Cancelled(_) | DesignError::Limit(LimitError::Cancelled(_)) => "start it again",
         DesignError::Limit(LimitError::Positions { .. }) => "set the contacts' `every` wider apart",
         DesignError::OutOfRange(_) | DesignError::Layout(_) => "check it in [design]",

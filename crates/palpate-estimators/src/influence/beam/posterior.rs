@@ -57,7 +57,7 @@ pub(super) fn conclude(
     }
 }
 
-/// Whether the greatest force of contacts of unknown force is within four standard deviations of a minimum's, or below.
+/// True for a minimum whose force is not known, and more than the greatest less four standard deviations.
 #[inline(always)]
 fn is_too_hard(search: &Search, minimum: &Minimum) -> bool {
     let left_n = search.greatest_force_n - minimum.force_n;

@@ -1,7 +1,7 @@
-//! How often intervals of a contact of unknown force hold it, by its distance from the edge of the plate of `examples/plate.toml`.
+//! Coverage of contacts of unknown force by their distance from the edge of the plate of `examples/plate.toml`.
 
 use crate::fit::{FitTask, Locate};
-use crate::fixtures::{Example, plate};
+use crate::fixtures::{Example, force_95_n, plate};
 use crate::influence::Influence;
 use crate::simulate::CleanSensors;
 use palpate_core::Status;
@@ -32,7 +32,7 @@ fn fit(bench: &Example, seed: u64) -> PlaneLocator {
     Influence::default().fit_plane(FitTask::new(&bench.setup, &bench.simulate(seed))).unwrap()
 }
 
-/// Where contacts are.
+/// A place of contacts.
 #[derive(Clone, Copy, Debug)]
 enum Place {
     /// So far from the left edge, in millimetres, and 60 mm or more from the others.
@@ -57,7 +57,7 @@ impl Place {
     }
 }
 
-/// What estimates hold, in readings.
+/// Counts and sums over the readings of contacts at one place.
 #[derive(Clone, Copy, Debug, Default)]
 struct Row {
     found: usize,
@@ -81,13 +81,11 @@ impl Row {
         let found = estimate.contact;
         let (uncertainty, found_n) = (found.uncertainty.unwrap(), found.force_n.unwrap());
         let holds = |(low, high): (f64, f64), value: f64| low <= value && value <= high;
-        let half_n = 1.959964 * uncertainty.covariance[5].sqrt();
-        let force_95_n = uncertainty.force_95_n.unwrap_or((found_n - half_n, found_n + half_n));
         let (x_95_m, y_95_m) = (uncertainty.x_95_m, uncertainty.y_95_m);
         self.found += 1;
         self.across += usize::from(holds(x_95_m, truth.x_m));
         self.along += usize::from(holds(y_95_m, truth.y_m));
-        self.force += usize::from(holds(force_95_n, FORCE_N));
+        self.force += usize::from(holds(force_95_n(&found), FORCE_N));
         self.outside += usize::from(!holds(x_95_m, found.position.x_m) || !holds(y_95_m, found.position.y_m));
         self.doubted += usize::from(estimate.status == Status::OutsideModel);
         self.error_mm += 1e3 * found.position.distance_m(truth);
@@ -103,12 +101,15 @@ fn intervals_hold_contacts_of_unknown_force_near_edges_and_in_corners() {
     let clean = CleanSensors::new(bench.setup.surface().model().unwrap(), bench.setup.layout());
     let errors = ChannelErrors::none(bench.setup.layout());
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(15);
-    let places = [5.0, 10.0, 20.0, 40.0, 150.0].map(Place::Edge);
-    let corners = [10.0, 20.0, 40.0].map(Place::Corner);
+    // Beside an edge intervals hold too little, docs/at-the-limit.md says how little: no less than that, by four standard deviations.
+    let edges = [(5.0, 86.0), (10.0, 90.0), (20.0, 93.0), (40.0, 91.0), (150.0, 93.0)];
+    let corners = [(20.0, 93.0), (40.0, 93.0)];
+    let places = edges.map(|(mm, least)| (Place::Edge(mm), least));
+    let corners = [(10.0, 0.0)].into_iter().chain(corners).map(|(mm, least)| (Place::Corner(mm), least));
     eprintln!(
         "| from the edge | contact found | across covered | along covered | force covered | mean width across | mean error | greatest force | outside_model |\n|---|---|---|---|---|---|---|---|---|"
     );
-    for place in places.into_iter().chain(corners) {
+    for (place, least) in places.into_iter().chain(corners) {
         let mut row = Row::default();
         for locator in &locators {
             for _ in 0..READINGS {
@@ -132,5 +133,6 @@ fn intervals_hold_contacts_of_unknown_force_near_edges_and_in_corners() {
             percent(row.doubted)
         );
         assert!(row.outside == 0 && row.greatest_n <= 10.0 * FORCE_N, "{place:?}: {row:?}");
+        assert!(percent(row.across) >= least && percent(row.along) >= least.min(91.0), "{place:?}: {row:?}");
     }
 }

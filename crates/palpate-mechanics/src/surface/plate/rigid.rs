@@ -55,7 +55,7 @@ impl RigidMotions {
     }
 
     /// R'·f: value of a load for each motion, degree by degree; 0 where its terms cancel to rounding.
-    pub fn of(&self, load: &(impl Iterator<Item = (usize, f64)> + Clone)) -> Vec<f64> {
+    pub fn resultants(&self, load: &(impl Iterator<Item = (usize, f64)> + Clone)) -> Vec<f64> {
         const ROUNDING: f64 = 1e-14;
         let value = |motion: &Vec<f64>| {
             let terms = load.clone().map(|(degree, weight)| weight * motion[degree]);

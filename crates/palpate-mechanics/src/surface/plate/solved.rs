@@ -142,7 +142,7 @@ impl Solved {
         together.chunks_exact(self.unknowns.count().max(1)).map(<[f64]>::to_vec).collect()
     }
 
-    /// What a load leaves: f + B·r − K₀·u, by degree of freedom; 0 where an edge holds it.
+    /// The residual of a load: f + B·r − K₀·u, by degree of freedom; 0 where an edge holds it.
     ///
     /// In each element K₀ is applied to the departure from the rigid motion of its first node, lest rounding of a large motion bend it.
     fn residual(&self, shape: &Shape, load: &Functional) -> Vec<f64> {
@@ -233,7 +233,7 @@ impl Shape {
         Self { bent, forces: Vec::new(), moved: Vec::new(), imbalance: f64::NAN }
     }
 
-    /// Whether it is in balance; not where a number is none.
+    /// True in balance; not where a number is none.
     fn is_balanced(&self) -> bool {
         self.imbalance <= MOST_IMBALANCE
     }
@@ -273,7 +273,7 @@ impl Supports {
             if i == j { given + own(i) } else { given }
         });
         let moved: Vec<Vec<f64>> =
-            deflections.iter().map(|deflection| motions.of(&deflection.iter().copied())).collect();
+            deflections.iter().map(|deflection| motions.resultants(&deflection.iter().copied())).collect();
         let moved = Array2::from_shape_fn((count, motions.count()), |(i, k)| moved[i][k]);
         let forces = SupportForces::new(&compliance, &moved, compliance_m_per_n(spec))?;
         Ok(Self { deflections, solutions, forces, motions })
@@ -289,7 +289,7 @@ impl Supports {
         let SupportForces { by_deflection, by_load, motion_by_load } = &self.forces;
         let moved = self.deflections.iter().map(|deflection| reading(unknowns, deflection, &shape.bent));
         let moved: Array1<f64> = moved.collect();
-        let resultant = Array1::from(self.motions.of(load));
+        let resultant = Array1::from(self.motions.resultants(load));
         let forces = -(by_deflection.dot(&moved) + by_load.dot(&resultant));
         for (force, solution) in forces.iter().zip(&self.solutions) {
             add_multiple(&mut shape.bent, *force, solution);
@@ -411,7 +411,7 @@ impl Unknowns {
         self.places[degree].map(|place| place as usize)
     }
 
-    /// Whether an edge holds a degree of freedom at zero.
+    /// True for a degree of freedom that an edge holds at zero.
     pub fn is_on_held_edge(&self, degree: usize) -> bool {
         self.places[degree].is_none() && !self.nodes.contains(&degree)
     }

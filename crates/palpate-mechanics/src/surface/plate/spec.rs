@@ -254,7 +254,7 @@ pub enum Unsolvable {
     Supports(#[from] palpate_numerics::NotPositiveDefinite),
     /// Supports and edges do not balance a force.
     #[error(
-        "under a force at {} the supports are {share:e} of it out of balance; it must be at most {:e}: take fewer elements, or numbers less far apart",
+        "under a force at {} the supports are {share:e} of it out of balance; it must be at most {:e}",
         Point(*at), MOST_IMBALANCE
     )]
     OutOfBalance {
@@ -263,6 +263,13 @@ pub enum Unsolvable {
         /// Position of the force.
         at: Position,
     },
+}
+
+impl Unsolvable {
+    /// What to do about it.
+    pub fn help(&self) -> &'static str {
+        "take fewer `elements`, or lengths and stiffnesses that are less far apart"
+    }
 }
 
 /// A position for people.
