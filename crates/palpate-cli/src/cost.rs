@@ -23,9 +23,14 @@ const NOTICEABLE: FitCost = FitCost { memory_bytes: 500e6, seconds: 5.0 };
 const NOTICEABLE_WORK_S: f64 = 3.0;
 
 impl MemoryLimit {
-    /// Estimates a fit, announces one that takes long, and refuses one that takes more memory than it may.
-    pub fn check(&self, estimator: &Estimator, setup: &Setup, recording: &Recording) -> Result<(), Failure> {
-        let cost = estimator.fit_cost(setup, recording);
+    /// Announces a fit of estimated cost that takes long, and refuses one that takes more memory than it may.
+    pub fn check(
+        &self,
+        estimator: &Estimator,
+        cost: FitCost,
+        setup: &Setup,
+        recording: &Recording,
+    ) -> Result<(), Failure> {
         if let Some(why) = self.refusal(estimator, cost) {
             return Err(Complaint::new(why).help(self.remedy(estimator, setup, recording)).into());
         }

@@ -203,7 +203,8 @@ fn compare(
     });
     // Alone it is refused; among others it is left out.
     if let ([only], Some(trial)) = (&contenders[..], trials.first()) {
-        arguments.memory.check(only, &rig.setup, &trial.training)?;
+        let cost = only.fit_cost(&rig.setup, &trial.training);
+        arguments.memory.check(only, cost, &rig.setup, &trial.training)?;
     }
     let bar = progress::bar(contenders.len() as u64, "comparing");
     let start = Instant::now();

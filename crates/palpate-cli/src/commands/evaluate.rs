@@ -163,7 +163,8 @@ fn cross_validated(arguments: &Arguments, rig: Box<Rig>) -> Result<Answers, Fail
         None => rig.simulate(arguments.seed).map_err(simulation_complaint)?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
-    arguments.memory.check(&rig.estimator, &rig.setup, &recording)?;
+    let cost = rig.estimator.fit_cost(&rig.setup, &recording);
+    arguments.memory.check(&rig.estimator, cost, &rig.setup, &recording)?;
     let recording = recording.in_order();
     let mut splits = Split::by_folds(&recording, folds).map_err(Complaint::new)?;
     tare_splits(&arguments.tare, &rig.setup, &recording, &mut splits)?;

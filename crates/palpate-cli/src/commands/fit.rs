@@ -10,7 +10,7 @@ use crate::remark::remark;
 use crate::tare::say_drift;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
-use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, TimeLimit, Tried, choose};
+use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, FitCost, TimeLimit, Tried, choose};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
@@ -52,7 +52,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             Complaint::about(&arguments.rig, error).help("--data names a recording to fit")
         })?,
     };
-    arguments.memory.check(&rig.estimator, &rig.setup, &recording)?;
+    let cost = cost(&rig, &recording, arguments);
+    arguments.memory.check(&rig.estimator, cost, &rig.setup, &recording)?;
     let rig = decided(rig, &recording, arguments)?;
     let needed = rig.estimator.positions_needed();
     recording.check_distinct_positions(needed).map_err(Complaint::new)?;
@@ -90,6 +91,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     ))?;
     let lines = learnt.map(|(linear, names)| learnt::summary(linear, &names)).unwrap_or_default();
     lines.iter().try_for_each(|line| output::say(format!("  {line}")))
+}
+
+/// Estimated cost of the fit, of `auto` with a choice that takes no longer than it may.
+fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
+    let cost = rig.estimator.fit_cost(&rig.setup, recording);
+    if rig.estimator != Estimator::Auto {
+        return cost;
+    }
+    let choice = cost.seconds.min(f64::from(arguments.auto_seconds));
+    // The one that is chosen takes no longer than one fold of all.
+    FitCost { seconds: choice + cost.seconds / CHOICE_FOLDS as f64, ..cost }
 }
 
 /// The rig with its estimator chosen by cross-validation where it is `auto`, saying why.
