@@ -13,13 +13,13 @@
 //! and what the cells tell of the offset whatever the influence is a press without force that reads ô, of weight Σ w·(1 − φ̄²/φ_r²).
 
 use super::evidence::{ChannelFit, Evidence};
-use super::posterior::of_equal_ratio;
+use super::posterior::{END, of_equal_ratio};
 use super::presses::Presses;
 use super::prior::Prior;
 use crate::influence::measured::MeasuredError;
-use ndarray::{Array1, Array2};
+use ndarray::{Array1, Array2, Axis as Dimension};
 use palpate_numerics::NotPositiveDefinite;
-use palpate_numerics::watch::Watch;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 impl Presses {
     /// No more than about `most` presses that tell of a separable prior without drift what all of these tell; `fits` are the noise and
@@ -39,7 +39,7 @@ impl Presses {
         let untouched = (!untouched.is_empty()).then_some(untouched);
         let pairs = self.cells(&touched, most / 2, &prior.lengths_m);
         let mut few = self.select(&[]);
-        pairs.iter().chain(&untouched).for_each(|cell| few.add_pair(&all, cell));
+        pairs.iter().chain(&untouched).for_each(|cell| few.add_pair(&all, cell, None));
         if pairs.iter().all(|cell| all.is_one_place(cell)) {
             return Ok(few);
         }
@@ -53,29 +53,51 @@ impl Presses {
                 of_offset += few.add_cell(&all, cell, &estimate);
             }
             if of_offset > 0.0 {
-                few.push(vec![0.0; prior.lengths_m.len()], 0.0, of_offset, &estimate.offsets);
+                few.push((vec![0.0; prior.lengths_m.len()], END), 0.0, of_offset, &estimate.offsets);
             }
-            untouched.iter().for_each(|cell| few.add_pair(&all, cell));
+            untouched.iter().for_each(|cell| few.add_pair(&all, cell, None));
         }
         Ok(few)
     }
 
-    fn push(&mut self, position_m: Vec<f64>, force_n: f64, count: f64, reading: &Array1<f64>) {
+    /// No more than `most` presses that tell of the offset in the course of time what all of these tell: neighbours in time share a cell, in which what an
+    /// estimate says that the position changes is taken off.
+    pub fn condensed_in_time(
+        &self,
+        prior: &Prior,
+        estimate: &Estimate,
+        most: usize,
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
+        let all = All { presses: self, responses: prior.responses(self), prior };
+        let mut order: Vec<usize> = (0..self.len()).collect();
+        order.sort_by(|a, b| self.time[*a].total_cmp(&self.time[*b]));
+        let mut few = Self { repeated: self.repeated.clone(), ..self.select(&[]) };
+        for cell in order.chunks((2 * self.len()).div_ceil(most)) {
+            watch.round()?;
+            few.add_pair(&all, cell, Some(estimate));
+        }
+        Ok(few)
+    }
+
+    fn push(&mut self, (position_m, time): (Vec<f64>, f64), force_n: f64, count: f64, reading: &Array1<f64>) {
         self.positions_m.push(position_m);
         self.force_n.push(force_n);
         self.count.push(count);
-        self.time.push(1.0);
+        self.time.push(time);
         self.row.push(0);
         self.means.push_row(reading.view()).expect("as many channels as all presses have");
     }
 
-    /// Adds the two presses of a cell that lie on its line of least squares, or one where its forces are all the same.
-    fn add_pair(&mut self, all: &All, cell: &[usize]) {
+    /// Adds the two presses of a cell that lie on its line of least squares, or one where its forces are all the same; what an estimate says
+    /// that the position changes is taken off.
+    fn add_pair(&mut self, all: &All, cell: &[usize], estimate: Option<&Estimate>) {
         let sums = Sums::new(all, cell);
         let spread = sums.spread();
-        let mean_of = |c: usize| all.mean(cell, |i| all.presses.means[[i, c]]);
+        let readings = all.readings(cell, &sums, estimate);
+        let mean_of = |c: usize| all.mean(cell, |k, _| readings[[k, c]]);
         let slope_of = |c: usize| {
-            let product = |i: usize| (all.responses[i] - sums.response) * all.presses.means[[i, c]];
+            let product = |k: usize, i: usize| (all.responses[i] - sums.response) * readings[[k, c]];
             if spread > 0.0 { all.mean(cell, product) / (spread * spread) } else { 0.0 }
         };
         let channels = 0..self.means.ncols();
@@ -86,7 +108,7 @@ impl Presses {
             let force_n = all.prior.force_of_relative_response(sums.response + end * spread);
             let reading = &means + end * spread * &slopes;
             self.push(
-                sums.position_m.clone(),
+                (sums.position_m.clone(), sums.time),
                 force_n,
                 all.count_of(sums.weight / ends.len() as f64, force_n, &sums.position_m),
                 &reading,
@@ -95,10 +117,10 @@ impl Presses {
         if all.is_one_place(cell) {
             let squares: Array1<f64> = channels
                 .map(|c| {
-                    let left = |i: usize| {
-                        all.presses.means[[i, c]] - means[c] - slopes[c] * (all.responses[i] - sums.response)
+                    let left = |k: usize, i: usize| {
+                        readings[[k, c]] - means[c] - slopes[c] * (all.responses[i] - sums.response)
                     };
-                    sums.weight * all.mean(cell, |i| left(i).powi(2))
+                    sums.weight * all.mean(cell, |k, i| left(k, i).powi(2))
                 })
                 .collect();
             let force_n = all.prior.force_of_relative_response(sums.mean_square.sqrt());
@@ -132,7 +154,7 @@ impl Presses {
             .collect();
         let force_n = all.prior.force_of_relative_response(response);
         self.push(
-            sums.position_m.clone(),
+            (sums.position_m.clone(), sums.time),
             force_n,
             all.count_of(sums.weight, force_n, &sums.position_m),
             &reading,
@@ -149,16 +171,30 @@ struct All<'a> {
 }
 
 impl All<'_> {
-    /// Mean of a value over a cell.
-    fn mean(&self, cell: &[usize], value: impl Fn(usize) -> f64) -> f64 {
-        let (sum, weight) = cell.iter().fold((0.0, 0.0), |(sum, weight), i| {
+    /// Mean over a cell of the value of its k-th press, number i of all.
+    fn mean(&self, cell: &[usize], value: impl Fn(usize, usize) -> f64) -> f64 {
+        let (sum, weight) = cell.iter().enumerate().fold((0.0, 0.0), |(sum, weight), (k, i)| {
             let own = self.weight(*i);
-            (sum + own * value(*i), weight + own)
+            (sum + own * value(k, *i), weight + own)
         });
         sum / weight
     }
 
-    /// Rows of a press over the variance of one, relative to that of an untouched board.
+    /// Readings of a cell, as all of its presses would read at its middle by an estimate.
+    fn readings(&self, cell: &[usize], sums: &Sums, estimate: Option<&Estimate>) -> Array2<f64> {
+        let mut readings = self.presses.means.select(Dimension(0), cell);
+        if let Some(estimate) = estimate
+            && !self.is_one_place(cell)
+        {
+            let changes =
+                estimate.influences_at(self, cell) - estimate.influences(self.prior, &sums.position_m);
+            for ((mut reading, change), i) in readings.outer_iter_mut().zip(changes.outer_iter()).zip(cell) {
+                reading.scaled_add(-self.responses[*i], &change);
+            }
+        }
+        readings
+    }
+
     fn weight(&self, i: usize) -> f64 {
         self.presses.count[i] / self.prior.relative_noise_of(self.presses, i)
     }
@@ -177,6 +213,7 @@ impl All<'_> {
 struct Sums {
     position_m: Vec<f64>,
     weight: f64,
+    time: f64,
     /// Mean of φ/F̄, and of its square.
     response: f64,
     mean_square: f64,
@@ -184,12 +221,12 @@ struct Sums {
 
 impl Sums {
     fn new(all: &All, cell: &[usize]) -> Self {
-        let mean_square = all.mean(cell, |i| all.responses[i].powi(2));
+        let mean_square = all.mean(cell, |_, i| all.responses[i].powi(2));
         let first_m = &all.presses.positions_m[cell[0]];
         let coordinate = |k: usize| match mean_square {
             0.0 => first_m[k],
             _ => {
-                let product = |i: usize| all.responses[i].powi(2) * all.presses.positions_m[i][k];
+                let product = |_, i: usize| all.responses[i].powi(2) * all.presses.positions_m[i][k];
                 all.mean(cell, product) / mean_square
             }
         };
@@ -200,7 +237,8 @@ impl Sums {
                 (0..first_m.len()).map(coordinate).collect()
             },
             weight: cell.iter().map(|i| all.weight(*i)).sum(),
-            response: all.mean(cell, |i| all.responses[i]),
+            time: all.mean(cell, |_, i| all.presses.time[i]),
+            response: all.mean(cell, |_, i| all.responses[i]),
             mean_square,
         }
     }
@@ -214,7 +252,7 @@ impl Sums {
 }
 
 /// Means of offsets and influences of unit response, as some presses tell them.
-struct Estimate {
+pub(super) struct Estimate {
     presses: Presses,
     responses: Vec<f64>,
     offsets: Array1<f64>,
@@ -224,7 +262,7 @@ struct Estimate {
 }
 
 impl Estimate {
-    fn new(presses: Presses, prior: &Prior, fits: &[ChannelFit]) -> Result<Self, NotPositiveDefinite> {
+    pub fn new(presses: Presses, prior: &Prior, fits: &[ChannelFit]) -> Result<Self, NotPositiveDefinite> {
         let mut coefficients = Array2::zeros((1 + prior.polynomials(), fits.len()));
         let mut weights = Array2::zeros((presses.len(), fits.len()));
         let evidence = Evidence::new(&presses, prior, &[]);
@@ -236,7 +274,7 @@ impl Estimate {
                 weights.column_mut(c).assign(&restricted.cholesky.solve_upper(&white.column(c).to_owned()));
             }
         }
-        let (offsets, polynomials) = coefficients.view().split_at(ndarray::Axis(0), 1);
+        let (offsets, polynomials) = coefficients.view().split_at(Dimension(0), 1);
         Ok(Self {
             responses: prior.responses(&presses),
             offsets: offsets.row(0).to_owned(),
@@ -252,7 +290,7 @@ impl Estimate {
         covariance.dot(&self.weights) + Array1::from(prior.polynomials_at(place_m)).dot(&self.polynomials)
     }
 
-    /// The same where each press of a cell is.
+    /// f̂ where each press of a cell is.
     fn influences_at(&self, all: &All, cell: &[usize]) -> Array2<f64> {
         let mut influences = Array2::zeros((cell.len(), self.offsets.len()));
         for (k, i) in cell.iter().enumerate() {

@@ -21,15 +21,18 @@ pub enum DriftCourse {
 impl DriftCourse {
     pub(super) const ALL: [Self; 3] = [Self::Walk, Self::Linear, Self::Smooth];
 
-    /// Covariance of the drift at two times, but for a constant of the time, which is in the offset.
+    /// Covariance of what is left of the drift at two times until the end of the recording: the offset is that of the end.
     pub(super) fn covariance(self, a: f64, b: f64) -> f64 {
         /// Of the smooth course.
         const LENGTH: f64 = 0.5;
         let correlation = |way: f64| Kernel::SquaredExponential.correlation((way / LENGTH) * (way / LENGTH));
         match self {
-            Self::Walk => a.min(b),
-            Self::Linear => a * b,
-            Self::Smooth => 0.5 * correlation(a - b) / (1.0 - correlation(1.0)),
+            Self::Walk => 1.0 - a.max(b),
+            Self::Linear => (1.0 - a) * (1.0 - b),
+            Self::Smooth => {
+                let change = 1.0 + correlation(a - b) - correlation(1.0 - a) - correlation(1.0 - b);
+                0.5 * change / (1.0 - correlation(1.0))
+            }
         }
     }
 }
@@ -41,9 +44,8 @@ mod tests {
     #[test]
     fn every_course_moves_by_one_from_end_to_end() {
         for course in DriftCourse::ALL {
-            let of = |a, b| course.covariance(a, b);
-            let variance = of(1.0, 1.0) - 2.0 * of(0.0, 1.0) + of(0.0, 0.0);
-            assert!((variance - 1.0).abs() < 1e-12, "{course:?}: {variance}");
+            assert!((course.covariance(0.0, 0.0) - 1.0).abs() < 1e-12, "{course:?}");
+            assert_eq!([0.0, 0.5, 1.0].map(|a| course.covariance(a, 1.0).abs()), [0.0; 3], "{course:?}");
         }
     }
 }

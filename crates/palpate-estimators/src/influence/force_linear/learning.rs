@@ -6,11 +6,12 @@
 //! aside, and the rest learnt anew.
 
 use super::drift::DriftCourse;
+use super::drift_fit::DriftFit;
 use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
 use super::outliers::OutlierTest;
 use super::place_noise::PlaceNoise;
 use super::place_noise_search::PlaceNoiseSearch;
-use super::posterior::{Functions, functions, of_equal_ratio, offsets, readings};
+use super::posterior::{END, Functions, functions, of_equal_ratio, offsets, readings};
 use super::presses::{Presses, Repeats, compare};
 use super::prior::{Prior, Source};
 use crate::influence::config::Structure;
@@ -37,6 +38,8 @@ pub(super) struct Learnt {
     pub pressed: Presses,
     /// Those that stand for them.
     presses: Presses,
+    /// The drift that was taken off these.
+    drift: Option<DriftFit>,
     pub prior: Prior,
     /// The channels that change, from 0.
     pub live: Vec<usize>,
@@ -121,29 +124,38 @@ impl Learnt {
         let decades = (*ALL_DECADES.start(), *ALL_DECADES.end());
         let mut search = Search { presses: &searched, extent, structure, noise, watch, decades };
         let smooth = search.smooth()?;
-        let presses = if pressed.len() <= most_presses {
-            pressed.clone()
+        if structure == Structure::Auto && !smooth.prior.has_response() {
+            return Ok(None);
+        }
+        let (presses, drift) = if pressed.len() <= most_presses {
+            (pressed.clone(), None)
         } else if smooth.prior.drift > 0.0 {
-            // Presses at one position that were made at different times are not one press.
-            pressed.thinned(most_presses)
+            let (presses, drift) =
+                pressed.condensed_under_drift(&smooth.prior, &smooth.fits, most_presses, watch)?;
+            (presses, Some(drift))
         } else {
             // Repeats tell of the noise, which near positions do not.
             let merged = presses_of(Repeats::All).map(|merged| merged.of_channels(&live));
             let merged = merged.as_ref().unwrap_or(&pressed);
-            merged.condensed(&smooth.prior, &smooth.fits, most_presses, watch)?
+            (merged.condensed(&smooth.prior, &smooth.fits, most_presses, watch)?, None)
         };
         let mut judged = vec![Judged::new(smooth, &presses, watch)?];
         if presses.positions_m().len() >= LEAST_TO_JUDGE
             && let Some(sources) = search.sources(&judged[0].found.prior)?
         {
-            judged.push(Judged::new(sources, &presses, watch)?);
+            match Judged::new(sources, &presses, watch) {
+                Ok(sources) => judged.push(sources),
+                // Without some of the positions the presses do not tell its polynomials: they cannot judge it.
+                Err(MeasuredError::Noise(_)) => {}
+                Err(error) => return Err(error),
+            }
         }
         let best = judged.into_iter().max_by(|a, b| a.score.total_cmp(&b.score));
         let Some(Judged { found: Found { prior, fits, sensors_m }, widening, .. }) = best else {
             return Ok(None);
         };
         let set_aside = set_aside.to_vec();
-        Ok(Some(Self { pressed, presses, prior, live, fits, sensors_m, widening, set_aside }))
+        Ok(Some(Self { pressed, presses, drift, prior, live, fits, sensors_m, widening, set_aside }))
     }
 
     /// Standard deviation of each channel's noise.
@@ -157,6 +169,11 @@ impl Learnt {
             all_functions(&self.prior, &self.presses, &self.fits, &self.sensors_m, places_m, watch)?;
         let per_newton = 1.0 / self.prior.force_scale_n;
         let widening = self.widening * dependence(&self.prior, &self.presses);
+        if let Some(drift) = &self.drift {
+            for (functions, variance) in functions.iter_mut().zip(drift.variances_at_the_end()) {
+                functions.offset_variance += variance;
+            }
+        }
         for functions in &mut functions {
             functions.offset_variance *= widening;
             functions.values.iter_mut().for_each(|value| *value *= per_newton);
@@ -171,11 +188,16 @@ impl Learnt {
         if self.prior.drift == 0.0 {
             return Ok(None);
         }
-        let mut all = vec![Vec::new(); self.fits.len()];
-        for channels in of_equal_ratio(&self.fits) {
-            let asked: Vec<_> = channels.iter().map(|c| (*c, &self.fits[*c])).collect();
-            let found = offsets(&self.prior, &self.presses, &asked, &self.sensors_m, times)?;
-            channels.into_iter().zip(found).for_each(|(c, offsets)| all[c] = offsets);
+        // Presses whose drift was taken off tell the offset of the end.
+        let ends = vec![END; times.len()];
+        let asked = if self.drift.is_some() { &ends } else { times };
+        let found = offsets(&self.prior, &self.presses, &self.fits, &self.sensors_m, asked)?;
+        let mut all: Vec<Vec<f64>> =
+            found.into_iter().map(|offsets| offsets.into_iter().map(|(mean, _)| mean).collect()).collect();
+        if let Some(drift) = &self.drift {
+            for (offsets, drifts) in all.iter_mut().zip(drift.until_the_end(times)?) {
+                offsets.iter_mut().zip(drifts).for_each(|(offset, drift)| *offset -= drift);
+            }
         }
         Ok(Some(all))
     }
@@ -196,10 +218,6 @@ impl Learnt {
     fn noise_by_place(&self, watch: Watch) -> Result<Option<PlaceNoise>, MeasuredError> {
         /// The noise is told as well by one of so many places of sensors.
         const ONE_OF: usize = 5;
-        // Wrong positions and forces scatter more where influences are steep or large; readings in use have no such noise.
-        if self.prior.scatter > 0.0 {
-            return Ok(None);
-        }
         let searched = self.pressed.thinned(MOST_SEARCHED);
         let few: Vec<Vec<f64>> = self.sensors_m.iter().step_by(ONE_OF).cloned().collect();
         PlaceNoiseSearch { presses: &searched, prior: &self.prior, sensors_m: &few, watch }.found()
@@ -454,7 +472,7 @@ impl Search<'_> {
                 loop {
                     let candidate = Prior { response: prior.response * factor, ..prior.clone() };
                     let total = self.total(&candidate, &[])?;
-                    if total <= found {
+                    if total <= found || !prior.has_response() {
                         break;
                     }
                     (found, prior) = (total, candidate);

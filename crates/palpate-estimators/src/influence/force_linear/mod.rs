@@ -5,6 +5,7 @@
 
 mod condensed;
 mod drift;
+mod drift_fit;
 mod evidence;
 mod learning;
 mod locator;

@@ -65,8 +65,10 @@ impl OutlierTest<'_> {
     pub fn by_parts(&self, presses: &Presses, watch: Watch) -> Result<Vec<usize>, MeasuredError> {
         /// Presses of a part: the time grows with their square, and those further away tell nothing that these do not.
         const PART: usize = 100;
+        // Fewer would not tell offset and polynomials.
+        let places = 3 * (1 + self.prior.polynomials());
         let mut outliers = Vec::new();
-        for part in presses.parts(PART, &self.prior.lengths_m) {
+        for part in presses.parts(PART, places, &self.prior.lengths_m) {
             let mut part = presses.select(&part);
             loop {
                 watch.round()?;

@@ -55,7 +55,7 @@ impl Score {
 
 impl PlaceNoiseSearch<'_> {
     /// The noise that is the most probable, less [`LEAST_MORE`] for each parameter; `None` where that is no more than [`LEAST_GAIN`] above noise
-    /// that is the same everywhere.
+    /// that is the same everywhere, or grows with the force alone.
     pub fn found(&self) -> Result<Option<PlaceNoise>, MeasuredError> {
         /// Steps of the scoring, each with the noise of the channels learnt anew.
         const STEPS: usize = 4;
@@ -64,7 +64,10 @@ impl PlaceNoiseSearch<'_> {
         const BEST_STEPS: usize = 3;
         let places_m = self.presses.positions_m();
         let dimensions = self.prior.extent.dimensions();
-        let Some(before) = self.fitted(self.prior.clone(), None) else { return Ok(None) };
+        // Presses that scatter with their force look like noise of the places of hard ones, and that like scatter.
+        let scattered = self.fitted(self.prior.clone(), None).map_or(f64::NEG_INFINITY, |found| found.total);
+        let even = Prior { scatter: 0.0, ..self.prior.clone() };
+        let Some(before) = self.fitted(even, None) else { return Ok(None) };
         let residuals = Residuals::new(self.presses, &before.prior, &before.fits, self.sensors_m)?;
         let with_gain = |shape: Shape| {
             let score = self.score(&before, &residuals, &PlaceNoise::even(&places_m, shape));
@@ -89,7 +92,7 @@ impl PlaceNoiseSearch<'_> {
                 Shape::Smooth { .. } => even.with_coefficients(&places_m, &theta),
                 Shape::Step { .. } => even,
             };
-            let prior = Prior { noise_by_place: Some(start), ..self.prior.clone() };
+            let prior = Prior { noise_by_place: Some(start), ..before.prior.clone() };
             let Some(mut found) = self.fitted(prior, Some(&before.fits)) else { continue };
             for _ in 0..STEPS {
                 self.watch.round()?;
@@ -106,7 +109,9 @@ impl PlaceNoiseSearch<'_> {
             if let Shape::Smooth { .. } = shape {
                 theta = noise.coefficients().to_vec();
             }
-            let gain = found.total - before.total - LEAST_MORE * noise.shape().parameters(dimensions) as f64;
+            let gain = found.total
+                - before.total.max(scattered)
+                - LEAST_MORE * noise.shape().parameters(dimensions) as f64;
             if gain > best.as_ref().map_or(LEAST_GAIN, |(most, _)| *most) {
                 best = Some((gain, noise));
             }

@@ -41,8 +41,11 @@ struct Functional<'a> {
     place_m: &'a [f64],
 }
 
+/// Functionals that are asked at once.
+const BLOCK: usize = 256;
+
 /// Share of the recording at whose end the offset is asked: what is located comes after it.
-const END: f64 = 1.0;
+pub(super) const END: f64 = 1.0;
 
 impl<'a> Functional<'a> {
     /// The offset at a time.
@@ -131,8 +134,6 @@ pub(super) fn functions(
     places_m: &[Vec<f64>],
     watch: Watch,
 ) -> Result<Vec<Functions>, MeasuredError> {
-    /// Places that are asked at once.
-    const BLOCK: usize = 256;
     let told = Posterior::new(prior, presses, channels, sensors_m)?;
     let empty = |c: usize| Functions {
         offset: presses.centre[c],
@@ -176,20 +177,27 @@ pub(super) fn readings(
     Ok(channels.iter().zip(moments).map(of_channel).collect())
 }
 
-/// Offset of some channels, which share a ratio, at each of some times.
+/// Mean and variance of the offset of every channel at each of some times.
 pub(super) fn offsets(
     prior: &Prior,
     presses: &Presses,
-    channels: &[(usize, &ChannelFit)],
+    fits: &[ChannelFit],
     sensors_m: &[Vec<f64>],
     times: &[f64],
-) -> Result<Vec<Vec<f64>>, MeasuredError> {
-    let told = Posterior::new(prior, presses, channels, sensors_m)?;
+) -> Result<Vec<Vec<(f64, f64)>>, MeasuredError> {
     let asked: Vec<Functional> = times.iter().map(|time| Functional::offset_at(*time)).collect();
-    let of_channel = |((c, _), moments): (&(usize, &ChannelFit), Vec<Moments>)| {
-        moments.iter().map(|moments| presses.centre[*c] + moments.mean).collect()
-    };
-    Ok(channels.iter().zip(told.moments(&asked)).map(of_channel).collect())
+    let mut all = vec![Vec::new(); fits.len()];
+    for channels in of_equal_ratio(fits) {
+        let of_group: Vec<_> = channels.iter().map(|c| (*c, &fits[*c])).collect();
+        let told = Posterior::new(prior, presses, &of_group, sensors_m)?;
+        for block in asked.chunks(BLOCK) {
+            for (c, moments) in channels.iter().zip(told.moments(block)) {
+                let mean_and_variance = |found: &Moments| (presses.centre[*c] + found.mean, found.variance);
+                all[*c].extend(moments.iter().map(mean_and_variance));
+            }
+        }
+    }
+    Ok(all)
 }
 
 /// Processes of some channels that share a ratio, as presses tell them.

@@ -192,11 +192,17 @@ impl Presses {
         }
     }
 
-    /// Evenly picked, no more than `most`.
+    /// No more than `most`, one of every few in their order; not the same one of each, as the order may repeat itself.
     pub fn thinned(&self, most: usize) -> Self {
+        /// Of the golden section: its multiples never come near a period.
+        const IRRATIONAL: f64 = 0.618_033_988_749_895;
         let step = (self.len() as f64 / most as f64).max(1.0);
-        let kept: Vec<usize> =
-            (0..).map(|i| (f64::from(i) * step) as usize).take_while(|i| *i < self.len()).collect();
+        let first_of = |i: u32| (f64::from(i) * step).ceil() as usize;
+        let one_of = |i: u32| {
+            let (from, to) = (first_of(i), first_of(i + 1).min(self.len()));
+            from + ((f64::from(i) * IRRATIONAL).fract() * (to.saturating_sub(from)) as f64) as usize
+        };
+        let kept: Vec<usize> = (0..).take_while(|i| first_of(*i) < self.len()).map(one_of).collect();
         self.select(&kept)
     }
 
@@ -230,14 +236,19 @@ impl Presses {
         cells
     }
 
-    /// Parts of near positions, of about `size` presses each, with presses without force in all of them.
-    pub fn parts(&self, size: usize, lengths_m: &[f64]) -> Vec<Vec<usize>> {
+    /// Parts of near positions, of about `size` presses each and of `places` positions or more where there are so many, with presses
+    /// without force in all of them.
+    pub fn parts(&self, size: usize, places: usize, lengths_m: &[f64]) -> Vec<Vec<usize>> {
         let (untouched, touched): (Vec<usize>, Vec<usize>) =
             (0..self.len()).partition(|i| self.force_n[*i] == 0.0);
-        let cells = self.cells(&touched, self.len().div_ceil(size), lengths_m);
-        // One place may have been pressed more often than that.
-        let mut parts: Vec<Vec<usize>> =
-            cells.iter().flat_map(|cell| cell.chunks(2 * size)).map(<[usize]>::to_vec).collect();
+        let most = self.len().div_ceil(size).min(self.positions_m().len() / places);
+        let cells = self.cells(&touched, most, lengths_m);
+        // Places may have been pressed more often than that; each part has all of a cell.
+        let split = |cell: &Vec<usize>| -> Vec<Vec<usize>> {
+            let count = cell.len().div_ceil(2 * size);
+            (0..count).map(|k| cell.iter().skip(k).step_by(count).copied().collect()).collect()
+        };
+        let mut parts: Vec<Vec<usize>> = cells.iter().flat_map(split).collect();
         let count = parts.len().max(1);
         for (k, i) in untouched.into_iter().enumerate() {
             if let Some(part) = parts.get_mut(k % count) {

@@ -123,6 +123,11 @@ impl Prior {
         self.nonlinearity == 0.0
     }
 
+    /// Whether readings follow the force. Without an exponent in these bounds all forces are alike, or one of them is all there is.
+    pub fn has_response(&self) -> bool {
+        (0.2..=5.0).contains(&self.response)
+    }
+
     /// k between two positions.
     fn correlation(&self, a_m: &[f64], b_m: &[f64]) -> f64 {
         let coordinates = a_m.iter().zip(b_m).zip(&self.lengths_m);

@@ -528,6 +528,15 @@ fn a_response_that_changes_along_the_surface_is_left_to_the_free_structure() {
 }
 
 #[test]
+fn readings_that_hardly_follow_the_force_are_left_to_the_free_structure() {
+    let mut bench = Bench::strip(3, 60, 15);
+    bend_response(&mut bench, [0.03, 0.03]);
+    assert!(bench.fit(Structure::Auto).is_none());
+    let forced = bench.fit(Structure::ForceMonotone).unwrap();
+    assert!((0.1..0.3).contains(&forced.response()), "{}", forced.response());
+}
+
+#[test]
 fn presses_that_nothing_explains_are_set_aside() {
     for (presses, places) in [(25, 9), (60, 15)] {
         let mut bench = Bench::strip(8, presses, places);
@@ -629,6 +638,18 @@ const GAUGE_FIT: evidence::ChannelFit =
 fn functions_of(presses: &Presses, prior: &Prior) -> Functions {
     let places_m: Vec<Vec<f64>> = (0..50).map(|i| vec![STRIP_M * f64::from(i) / 49.0]).collect();
     posterior::functions(prior, presses, &[(0, &GAUGE_FIT)], &[], &places_m, Watch::NONE).unwrap().remove(0)
+}
+
+#[test]
+fn presses_that_come_to_their_places_again_are_thinned_at_all_of_them() {
+    let bench = Bench::strip(0, 600, 10);
+    let presses =
+        Presses::of_recording(&bench.setup(), &bench.recording(), Repeats::Consecutive, &[]).unwrap();
+    for most in [150, 60, 599] {
+        let few = presses.thinned(most);
+        assert_eq!((few.len(), few.positions_m().len()), (most, 10));
+        assert!(few.row.is_sorted_by(|a, b| a < b));
+    }
 }
 
 #[test]

@@ -59,6 +59,43 @@ impl Halves {
     }
 }
 
+/// Noise at places of benches: halves by their locators, and by the same without the noise by place.
+fn halves_with_and_without(
+    count: u64,
+    bench_of: impl Fn(u64) -> Bench,
+    middle_m: f64,
+    noise: NoiseAt,
+) -> [Halves; 2] {
+    let mut halves = [Halves::default(), Halves::default()];
+    for seed in 0..count {
+        let mut bench = bench_of(seed);
+        let mut pressed = bench.presses.clone();
+        let mut touches = bench.touches(200);
+        make_noisy(&mut bench, &mut pressed, noise);
+        make_noisy(&mut bench, &mut touches, noise);
+        bench.presses = pressed;
+        let locator = bench.fit(Structure::Auto).unwrap();
+        halves[0].add(&locator, &touches, middle_m);
+        let mut stored = Stored::from(locator);
+        stored.prior.noise_by_place = None;
+        halves[1].add(&stored.into_locator(), &touches, middle_m);
+    }
+    halves
+}
+
+/// Prints a case; the coverage of either half in percent, and the mean ratio of the greatest to the least noise.
+fn print_case(what: &str, count: u64, [with, without]: &[Halves; 2]) -> ([f64; 2], f64) {
+    let (halves, ratio) = (with.summary(), mean(with.ratios.iter().copied()));
+    eprintln!(
+        "{what}: found on {} of {count}, ratio {ratio:.1}; quiet {:.2?}, noisy {:.2?}; without {:.2?}",
+        with.found,
+        halves[0],
+        halves[1],
+        without.summary(),
+    );
+    (halves.map(|(_, covered)| covered), ratio)
+}
+
 #[test]
 fn noise_by_place_is_found_and_intervals_follow_it() {
     let cases: [(&str, NoiseAt, bool); 3] =
@@ -67,36 +104,29 @@ fn noise_by_place_is_found_and_intervals_follow_it() {
         if benches(0) == 0 { &[(120, 30)] } else { &[(25, 9), (60, 15), (120, 30)] };
     for (presses, places) in sizes.iter().copied() {
         for (name, noise, differs) in cases {
-            let (mut with, mut without) = (Halves::default(), Halves::default());
             let count = benches(3);
-            for seed in 0..count {
-                let mut bench = Bench::strip(seed, presses, places);
-                let mut pressed = bench.presses.clone();
-                let mut touches = bench.touches(200);
-                make_noisy(&mut bench, &mut pressed, noise);
-                make_noisy(&mut bench, &mut touches, noise);
-                bench.presses = pressed;
-                let locator = bench.fit(Structure::Auto).unwrap();
-                with.add(&locator, &touches, 0.5 * STRIP_M);
-                let mut stored = Stored::from(locator);
-                stored.prior.noise_by_place = None;
-                without.add(&stored.into_locator(), &touches, 0.5 * STRIP_M);
-            }
-            let (halves, ratio) = (with.summary(), mean(with.ratios.iter().copied()));
-            eprintln!(
-                "{presses} presses at {places} places, {name}: found on {} of {count}, ratio {ratio:.1}; quiet {:.2?}, noisy {:.2?}; without {:.2?}",
-                with.found,
-                halves[0],
-                halves[1],
-                without.summary(),
-            );
+            let strip = |seed| Bench::strip(seed, presses, places);
+            let halves = halves_with_and_without(count, strip, 0.5 * STRIP_M, noise);
+            let what = format!("strip, {presses} presses at {places} places, {name}");
+            let (covered, ratio) = print_case(&what, count, &halves);
             if presses == 120 {
-                assert_eq!(with.found as u64, if differs { count } else { 0 });
-                assert!(halves.iter().all(|(_, covered)| (91.0..98.0).contains(covered)), "{halves:?}");
+                assert_eq!(halves[0].found as u64, if differs { count } else { 0 });
+                assert!(covered.iter().all(|covered| (91.0..98.0).contains(covered)), "{covered:?}");
                 assert!(!differs || (2.0..6.0).contains(&ratio), "{ratio}");
             }
         }
     }
+}
+
+#[test]
+fn noise_by_place_is_found_on_a_plate() {
+    let half: NoiseAt = |at| if at.x_m > 0.5 * PLATE_M[0] { 4.0 } else { 1.0 };
+    let count = benches(1);
+    let halves = halves_with_and_without(count, Bench::plate, 0.5 * PLATE_M[0], half);
+    let (covered, ratio) = print_case("plate, 160 presses at 80 places, half", count, &halves);
+    assert_eq!(halves[0].found as u64, count);
+    assert!(covered.iter().all(|covered| (90.0..99.5).contains(covered)), "{covered:?}");
+    assert!((2.0..6.0).contains(&ratio), "{ratio}");
 }
 
 #[test]

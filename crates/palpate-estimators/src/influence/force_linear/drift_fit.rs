@@ -1,0 +1,77 @@
+//! Drift of more presses than can be learnt from at once.
+//!
+//! Influences are learnt from presses whose drift was taken off, neighbours in space sharing a cell ([`super::condensed`]); offsets in the
+//! course of the recording from cells of neighbours in time, in which what the influences say that the position changes was taken off. Each is
+//! told by the estimate of the other before it, and the first by some of the presses alone.
+
+use super::condensed::Estimate;
+use super::evidence::ChannelFit;
+use super::posterior::{END, offsets};
+use super::presses::Presses;
+use super::prior::Prior;
+use crate::influence::measured::MeasuredError;
+use ndarray::Array2;
+use palpate_numerics::watch::Watch;
+
+/// Drift of every channel, as presses that were condensed in time tell it.
+pub(super) struct DriftFit {
+    prior: Prior,
+    fits: Vec<ChannelFit>,
+    presses: Presses,
+    /// Mean and variance of the offset of every channel at the end of the recording.
+    at_the_end: Vec<(f64, f64)>,
+}
+
+impl Presses {
+    /// No more than about `most` presses that tell of a separable prior with drift what all of these tell, each as it would read at the end of
+    /// the recording; and the drift.
+    pub fn condensed_under_drift(
+        &self,
+        prior: &Prior,
+        fits: &[ChannelFit],
+        most: usize,
+        watch: Watch,
+    ) -> Result<(Self, DriftFit), MeasuredError> {
+        /// Estimates of the drift, each by influences from the last one.
+        const ROUNDS: usize = 2;
+        let mut few = self.thinned(most);
+        let mut drift = None;
+        for _ in 0..ROUNDS {
+            let estimate = Estimate::new(few, prior, fits)?;
+            let told = DriftFit::new(self.condensed_in_time(prior, &estimate, most, watch)?, prior, fits)?;
+            let still = told.taken_off(self)?;
+            few = still.condensed(prior, fits, most, watch)?;
+            drift = Some(told);
+        }
+        Ok((few, drift.expect("there is a round")))
+    }
+}
+
+impl DriftFit {
+    fn new(presses: Presses, prior: &Prior, fits: &[ChannelFit]) -> Result<Self, MeasuredError> {
+        let at_the_end = offsets(prior, &presses, fits, &[], &[END])?;
+        let at_the_end = at_the_end.iter().map(|of_channel| of_channel[0]).collect();
+        Ok(Self { prior: prior.clone(), fits: fits.to_vec(), presses, at_the_end })
+    }
+
+    /// What every channel drifts from each of some times to the end of the recording, a row a channel.
+    pub fn until_the_end(&self, times: &[f64]) -> Result<Vec<Vec<f64>>, MeasuredError> {
+        let at_times = offsets(&self.prior, &self.presses, &self.fits, &[], times)?;
+        let of_channel = |(offsets, (end, _)): (Vec<(f64, f64)>, &(f64, f64))| {
+            offsets.into_iter().map(|(offset, _)| end - offset).collect()
+        };
+        Ok(at_times.into_iter().zip(&self.at_the_end).map(of_channel).collect())
+    }
+
+    /// Variance of the offset of every channel at the end.
+    pub fn variances_at_the_end(&self) -> impl Iterator<Item = f64> {
+        self.at_the_end.iter().map(|(_, variance)| *variance)
+    }
+
+    /// Presses as they would read at the end.
+    fn taken_off(&self, presses: &Presses) -> Result<Presses, MeasuredError> {
+        let drifts = self.until_the_end(&presses.time)?;
+        let drifts = Array2::from_shape_fn(presses.means.dim(), |(i, c)| drifts[c][i]);
+        Ok(Presses { means: &presses.means + &drifts, time: vec![END; presses.len()], ..presses.clone() })
+    }
+}
