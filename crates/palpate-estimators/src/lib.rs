@@ -45,6 +45,7 @@ pub mod reading_check;
 pub mod recording;
 pub mod setup;
 pub mod simulate;
+mod spread;
 pub mod status;
 pub mod track_errors;
 pub mod tracking;

@@ -8,11 +8,12 @@
 //!   noise fails the second at a rate that the numbers of channels and places give, 0.3 to 1 times the one that is set on the benches of
 //!   docs/at-the-limit.md. Force-linear surfaces without a model have `NoiseBounds` in its place, which noise fails at the rate itself.
 //! - `outside_model`: the misfit χ² of the best contact is one that a contact of the model exceeds less often than
-//!   [`OUTSIDE_MODEL_RATE`].
+//!   [`OUTSIDE_MODEL_RATE`], or the contact seems spread out, as that of a point does less often than
+//!   [`SPREAD_RATE`]: the residual lies along the second derivative of the influences (estimators of a finger do without).
 //! - `ambiguous`: another place has a share of at least [`OTHER_PLACE`] of the posterior probability.
 //!
-//! One reading in a thousand is a false alarm that an engineer sees and can live with: a channel read a hundred times a second
-//! then gives one every ten seconds, and a tracker averages it away; a rate ten times lower moves both bounds by a tenth of their size
+//! One reading in a thousand, or three, is a false alarm that an engineer sees and can live with: a channel read a hundred times a second
+//! then gives one every few seconds, and a tracker averages it away; a rate ten times lower moves both bounds by a tenth of their size
 //! and hides contacts that are that much stronger.
 
 use palpate_core::{ContactEstimate, Estimate, Status};
@@ -93,6 +94,9 @@ impl std::fmt::Display for FalseAlarmRate {
 /// Share of the readings of contacts whose noise makes them `outside_model`.
 pub const OUTSIDE_MODEL_RATE: f64 = 1e-3;
 
+/// Share of the readings of contacts at a point that are `outside_model` as those of a contact spread out, of two close by or of a patch.
+pub const SPREAD_RATE: f64 = 2e-3;
+
 /// The least share of the posterior probability for another place to make an estimate `ambiguous`: of the readings that are `located`,
 /// fewer than one in a hundred comes from another place than the one that is said.
 pub const OTHER_PLACE: f64 = 0.01;
@@ -127,10 +131,10 @@ fn detection_cost(contact_cost: f64, rate: FalseAlarmRate) -> f64 {
     bisect((0.0, 20.0), 40, |u| normal_cdf(-u) > tail).powi(2)
 }
 
-/// The misfit from which on no contact explains a reading, of a surface that is known by its recording alone: [`misfit_bound`] for
-/// normal noise, and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer tails.
-pub(crate) fn learnt_misfit_bound<'a>(
-    freedom: usize,
+/// The misfit, or score of a spread, from which on no contact explains a reading, of a surface that is known by its recording alone: that for
+/// `normal` noise, and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer tails.
+pub(crate) fn learnt_bound<'a>(
+    normal: f64,
     readings: impl ExactSizeIterator<Item = &'a [f64]>,
     misfit: impl Fn(&[f64]) -> f64,
 ) -> f64 {
@@ -141,7 +145,7 @@ pub(crate) fn learnt_misfit_bound<'a>(
         readings.step_by(every).map(misfit).filter(|misfit| misfit.is_finite()).collect();
     misfits.sort_by(f64::total_cmp);
     let usual = misfits.get(misfits.len() * 99 / 100).copied().unwrap_or(0.0);
-    misfit_bound(freedom).max(2.0 * usual)
+    normal.max(2.0 * usual)
 }
 
 /// Places along a line that readings tell apart.

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::recording::Recording;
 use crate::setup::Setup;
+use crate::spread::{About, SpreadDirections, spread_bound};
 use crate::status::{
     FalseAlarmRate, LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, misfit_bound, unknowns,
 };
@@ -352,7 +353,7 @@ impl Posterior<'_> {
             return estimate;
         }
         let mut estimate = Estimate::of_contact(self.contact(best), Status::Located);
-        if best.force_n <= 0.0 || !rule.is_explained(best.chi_squared) {
+        if best.force_n <= 0.0 || !rule.is_explained(best.chi_squared) || self.is_spread(&found) {
             estimate.status = Status::OutsideModel;
             return estimate;
         }
@@ -386,9 +387,7 @@ impl Posterior<'_> {
         }
         let channels = |x_m: f64, _: f64, channels: &mut Vec<[f64; 2]>| {
             channels.clear();
-            let segment = self.segments.iter().find(|segment| x_m <= segment.to_m).or(self.segments.last());
-            let influence = segment.map(|segment| segment.influence_at(x_m)).unwrap_or_default();
-            channels.extend(self.reading.iter().zip(influence).map(|(d, (f, _))| [*d, f]));
+            channels.extend(self.reading.iter().zip(self.influence_at(x_m)).map(|(d, (f, _))| [*d, f]));
         };
         let strongest = found.iter().map(|at| at.force_n).fold(0.0, f64::max);
         let contacts = Contacts {
@@ -405,10 +404,39 @@ impl Posterior<'_> {
         if found[0].to_m - found[0].from_m > 0.01 * self.length_m() {
             estimate.status = Status::Ambiguous;
         }
-        if !rule.is_explained(open.misfit) || estimate.contact.force_n.is_none_or(|force_n| force_n <= 0.0) {
+        let is_pull = estimate.contact.force_n.is_none_or(|force_n| force_n <= 0.0);
+        if is_pull || !rule.is_explained(open.misfit) || self.is_spread(found) {
             estimate.status = Status::OutsideModel;
         }
         Some(estimate)
+    }
+
+    /// Whether the reading is that of a contact that is spread, about every place that competes; false where the noise is not known.
+    fn is_spread(&self, found: &[Explanation]) -> bool {
+        let least = found.iter().fold(f64::INFINITY, |least, at| least.min(at.chi_squared));
+        let competes = |at: &&Explanation| at.chi_squared <= least + NEGLIGIBLE;
+        let bound = spread_bound(1);
+        // The square of the residual is at least that of its part.
+        let is_spread = |at: &Explanation| at.chi_squared > bound && self.spread(at) > bound;
+        self.noise == Noise::Known && found.iter().filter(competes).all(is_spread)
+    }
+
+    /// Score of a [spread](crate::spread) about a place.
+    fn spread(&self, Explanation { position_m, force_n, .. }: &Explanation) -> f64 {
+        let reads = |[x_m, _, force_n]: [f64; 3]| -> Vec<f64> {
+            self.influence_at(x_m).iter().map(|(f, _)| force_n * f).collect()
+        };
+        let force_ends = self.force_n.map_or((0.0, f64::INFINITY), |force_n| (force_n, force_n));
+        let at = [*position_m, 0.0, *force_n];
+        let about = About { at, ends: [(0.0, self.length_m()), (0.0, 0.0), force_ends] };
+        let residual: Vec<f64> = self.reading.iter().zip(reads(at)).map(|(d, reads)| d - reads).collect();
+        SpreadDirections::about(about, reads).score(&residual)
+    }
+
+    /// h̃ of every channel at a place, and its derivative by the position in 1/m.
+    fn influence_at(&self, x_m: f64) -> Vec<(f64, f64)> {
+        let segment = self.segments.iter().find(|segment| x_m <= segment.to_m).or(self.segments.last());
+        segment.map(|segment| segment.influence_at(x_m)).unwrap_or_default()
     }
 
     fn length_m(&self) -> f64 {

@@ -21,9 +21,9 @@ use palpate_numerics::small::add_outer;
 pub(super) struct GaussNewton {
     pub spacing: Spacing,
     /// Groups of eight channels.
-    groups: usize,
+    pub groups: usize,
     /// f and f′ at every node, in groups of eight channels.
-    rows: Vec<[[f64; 8]; 2]>,
+    pub rows: Vec<[[f64; 8]; 2]>,
     /// 1/(1 + v) in every cell, v the calibration's variance of a reading over the noise's at the known force or the
     /// calibration's, in groups of eight channels.
     pub weights: Vec<[f64; 8]>,
@@ -165,7 +165,7 @@ impl GaussNewton {
 
     /// Factor of the calibration's variance over what the weights have of it.
     #[inline(always)]
-    fn weights_grown<N: Number>(&self, force_n: N) -> N {
+    pub fn weights_grown<N: Number>(&self, force_n: N) -> N {
         match self.force {
             ForceBelief::Known(_) => N::splat(1.0),
             _ => self.grown(force_n),

@@ -8,6 +8,7 @@ mod locator;
 mod multi_contact;
 mod posterior;
 mod search;
+mod spread;
 mod table;
 
 pub use likelihood::BeamLikelihood;

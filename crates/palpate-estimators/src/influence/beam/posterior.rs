@@ -49,7 +49,7 @@ pub(super) fn conclude(
     if minima.len() == 1 && clear && narrow {
         estimate.contact = contact(search, best, normal_interval_95(best.x_m, sd_m));
         estimate.status = Status::Located;
-        if !search.rule.is_explained(best.misfit) {
+        if !search.is_explained(read.whitened, best) {
             estimate.status = Status::OutsideModel;
         }
     } else {
@@ -88,7 +88,8 @@ fn write_uncertain(
             minima[0].misfit
         }
     };
-    if !search.rule.is_explained(misfit) {
+    let is_point = minima.iter().any(|minimum| !search.is_spread(read.whitened, minimum));
+    if !search.rule.is_explained(misfit) || !is_point {
         estimate.status = Status::OutsideModel;
     }
 }

@@ -12,6 +12,7 @@
 
 use super::coarse::{Coarse, MOST_MINIMA, Profile};
 use super::gauss_newton::{GaussNewton, Minimum, grouped, paired};
+use super::spread::SpreadTable;
 use super::table::InfluenceTable;
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
@@ -36,6 +37,8 @@ pub(super) struct Search {
     pub greatest_force_n: f64,
     /// The rule for one contact.
     pub rule: StatusRule,
+    /// Directions of a spread.
+    spread: SpreadTable,
 }
 
 /// A minimum this much above the best has a share of e⁻¹² of the probability.
@@ -56,6 +59,7 @@ impl Search {
             from_first: live.iter().enumerate().all(|(i, s)| i == *s),
             scaling: paired(grouped(&offsets, live.len(), 0.0), grouped(&inverse_sd, live.len(), 0.0)),
             coarse: Coarse::new(&table, &gauss_newton.weights, force),
+            spread: SpreadTable::new(&table, &gauss_newton, force),
             gauss_newton,
             rule: StatusRule::new(live.len(), unknowns(1, force.known_n()), LINE_PLACES, *false_alarm_rate),
             greatest_force_n: channels.greatest_force_n(),
@@ -106,6 +110,19 @@ impl Search {
         let (lowest, others) = valleys[..count].split_first()?;
         let floor = others.iter().map(|node| self.coarse.start::<V, f64>(&[&*profile], &[*node]).floor);
         Some((*lowest, floor.fold(f64::INFINITY, f64::min)))
+    }
+
+    /// Whether a point explains a reading by its minimum: neither its misfit nor its spread is more than noise makes it.
+    #[inline(always)]
+    pub fn is_explained(&self, whitened: &[[f64; 8]], minimum: &Minimum) -> bool {
+        self.rule.is_explained(minimum.misfit) && !self.is_spread(whitened, minimum)
+    }
+
+    /// Whether a reading is, by its minimum, that of a contact that is spread.
+    #[inline(always)]
+    pub fn is_spread(&self, whitened: &[[f64; 8]], minimum: &Minimum) -> bool {
+        // The square of the residual is at least that of its part.
+        minimum.misfit > self.spread.bound && self.spread.is_told(&self.gauss_newton, whitened, minimum)
     }
 
     /// The minima that matter, best first, of a reading that was whitened to length `square`.

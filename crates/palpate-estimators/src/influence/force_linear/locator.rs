@@ -18,14 +18,17 @@ use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::influence::config::Structure;
 use crate::influence::grid::{Axis, check_axes, greatest_distances};
 use crate::influence::inversion::{
-    Cells, Explain, Explained, Inversion, Layers, Look, Slopes, ToldForce, look_at_cells,
+    Cells, Explain, Explained, Inversion, Layers, Limits, Look, Slopes, ToldForce, look_at_cells,
 };
 use crate::influence::lanes::{LANES, Lanes, in_lanes};
 use crate::influence::levenberg::{Equations, Unknowns};
 use crate::lightest_touch::LightestTouch;
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::status::{Detection, Directions, FalseAlarmRate, NoiseBounds, learnt_misfit_bound, unknowns};
+use crate::spread::{About, SpreadDirections, spread_bound};
+use crate::status::{
+    Detection, Directions, FalseAlarmRate, NoiseBounds, learnt_bound, misfit_bound, unknowns,
+};
 use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::CramerRaoBound;
@@ -94,6 +97,9 @@ pub(super) struct Stored {
     pub hardest_n: f64,
     /// The squared residual, in variances, from which on no contact explains a reading.
     pub residual_limit: f64,
+    /// The score of a [spread](crate::spread) from which on no contact at a point explains a reading.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spread_limit: Option<f64>,
     /// The prior that the presses chose.
     pub prior: Prior,
     /// Rows of the recording that were set aside, from 0.
@@ -216,7 +222,8 @@ impl Stored {
             |freedom| freedom > 2.0,
             "greater than 2",
         )?;
-        numbers("residual limit", &[self.residual_limit], |limit| limit > 0.0, "greater than 0")
+        numbers("residual limit", &[self.residual_limit], |limit| limit > 0.0, "greater than 0")?;
+        LocatorFault::check_numbers("spread limit", self.spread_limit, |limit| limit > 0.0, "greater than 0")
     }
 }
 
@@ -498,10 +505,12 @@ impl ForceLinearLocator {
     /// Sets the bound of the residual from the recording's own readings.
     pub(super) fn limit_residuals(&mut self, recording: &Recording) {
         let freedom = self.stored.live.len().saturating_sub(self.unknowns());
-        let readings = recording.rows.iter().map(|row| row.reading.as_slice());
-        self.stored.residual_limit = learnt_misfit_bound(freedom, readings, |reading| {
-            Inversion::new(self.seen(&self.relative(reading))).misfit()
-        });
+        let readings = || recording.rows.iter().map(|row| row.reading.as_slice());
+        let seen = |reading: &[f64]| Inversion::new(self.seen(&self.relative(reading)));
+        let misfit = learnt_bound(misfit_bound(freedom), readings(), |reading| seen(reading).misfit());
+        let dimensions = self.stored.prior.extent.dimensions();
+        let spread = learnt_bound(spread_bound(dimensions), readings(), |reading| seen(reading).spread());
+        (self.stored.residual_limit, self.stored.spread_limit) = (misfit, Some(spread));
     }
 
     /// The reading less the offsets, over the noise.
@@ -556,7 +565,9 @@ impl ForceLinearLocator {
 
     /// The estimate of a relative reading.
     fn estimate(&self, relative: &[f64]) -> Estimate {
-        Inversion::new(self.seen(relative)).estimate(self.told_force(), self.stored.residual_limit)
+        let Stored { residual_limit, spread_limit, .. } = self.stored;
+        let limits = Limits { misfit: residual_limit, spread: spread_limit.unwrap_or(f64::INFINITY) };
+        Inversion::new(self.seen(relative)).estimate(self.told_force(), limits)
     }
 
     /// The contact of a reading, summed over the whole grid.
@@ -693,6 +704,22 @@ impl Explain for Seen<'_> {
             (self.weights[g], residual, [times(along), times(across), *f])
         }));
         if self.range().is_some() { equations.with_expected(response_n, *expected) } else { equations }
+    }
+
+    fn spread(&mut self, at: Unknowns) -> f64 {
+        self.weigh(at);
+        let roots: Vec<f64> = self.weights.as_flattened().iter().map(|weight| weight.sqrt()).collect();
+        let live = self.locator.stored.live.len();
+        let mut values = Vec::new();
+        let mut reads = |[x, y, response_n]: Unknowns| -> Vec<f64> {
+            self.locator.layers.interpolate([x, y], VALUES..VALUES + 1, &mut values);
+            values.as_flattened()[..live].iter().zip(&roots).map(|(f, root)| root * response_n * f).collect()
+        };
+        let [x, y] = self.axes().map(|axis| (0.0, (axis.count - 1) as f64));
+        let about = About { at, ends: [x, y, self.range().unwrap_or((at[2], at[2]))] };
+        let relative = self.reading.as_flattened().iter().zip(&roots);
+        let residual: Vec<f64> = relative.zip(reads(at)).map(|((d, root), reads)| root * d - reads).collect();
+        SpreadDirections::about(about, reads).score(&residual)
     }
 
     /// φ is found in steps from about `latent`, each by the variances of the last.

@@ -97,6 +97,7 @@ fn fit_condensed(
         force_sd_n: if forces.1 > 0.0 { forces.1.sqrt() } else { forces.0.abs() },
         hardest_n: prior.response_n(HARDEST * presses.greatest_force_n()),
         residual_limit: f64::INFINITY,
+        spread_limit: None,
         prior: prior.clone(),
         set_aside: learnt.set_aside.clone(),
         structure,

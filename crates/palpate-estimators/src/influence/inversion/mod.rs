@@ -13,7 +13,7 @@ mod tiles;
 
 pub(super) use cells::{CellBlocks, Cells, Look, look_at_cells};
 pub(super) use layers::{Layers, Slopes, Stencil};
-pub(super) use posterior::{Inversion, ToldForce};
+pub(super) use posterior::{Inversion, Limits, ToldForce};
 pub(super) use quadrature::FIVE_POINTS;
 
 use super::grid::Axis;
@@ -53,6 +53,9 @@ pub(super) trait Explain {
 
     /// The normal equations of a contact, with the variances of the contact weighed last.
     fn equations(&mut self, at: Unknowns) -> Equations;
+
+    /// Score of a [spread](crate::spread) about a contact; 0 where contacts side by side do not read the sum of what each reads.
+    fn spread(&mut self, at: Unknowns) -> f64;
 
     /// A place, the latent number integrated out; that is about `latent`.
     fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained;

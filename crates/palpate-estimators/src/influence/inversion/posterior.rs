@@ -26,6 +26,15 @@ pub(in crate::influence) enum ToldForce {
     Untold,
 }
 
+/// The most that a contact at a point leaves of a reading, in variances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::influence) struct Limits {
+    /// Of the square of its residual.
+    pub misfit: f64,
+    /// Of the score of a spread; infinite where that is not looked for.
+    pub spread: f64,
+}
+
 /// A reading with the minima of its misfit.
 #[derive(Debug)]
 pub(in crate::influence) struct Inversion<E> {
@@ -48,8 +57,21 @@ impl<E: Explain> Inversion<E> {
         self.minima.iter().map(|minimum| minimum.found.misfit).fold(f64::INFINITY, f64::min)
     }
 
-    /// The posterior's mean and covariance; that of the most probable mode where there are several; `outside_model` above the residual limit.
-    pub fn estimate(mut self, told: ToldForce, residual_limit: f64) -> Estimate {
+    /// The least score of a spread about a minimum.
+    pub fn spread(&mut self) -> f64 {
+        let Self { reading, minima, .. } = self;
+        minima.iter().map(|minimum| reading.spread(minimum.at)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether a point explains the reading: neither its misfit nor its spread is beyond its limit.
+    fn is_explained(&mut self, limits: Limits) -> bool {
+        let misfit = self.misfit();
+        // The square of the residual is at least that of its part.
+        misfit <= limits.misfit && (misfit <= limits.spread || self.spread() <= limits.spread)
+    }
+
+    /// The posterior's mean and covariance; that of the most probable mode where there are several; `outside_model` beyond the limits.
+    pub fn estimate(mut self, told: ToldForce, limits: Limits) -> Estimate {
         let axes = self.reading.axes();
         let nowhere = Estimate::of_position(middle(axes), Status::OutsideModel);
         if self.minima.is_empty() {
@@ -61,7 +83,7 @@ impl<E: Explain> Inversion<E> {
         {
             (uncertainty.x_95_m, uncertainty.y_95_m) = (x_95_m, y_95_m);
         }
-        if self.misfit() > residual_limit {
+        if !self.is_explained(limits) {
             return Estimate::of_contact(contact, Status::OutsideModel);
         }
         let Some((first, others)) = posterior.modes.split_first().filter(|(_, others)| !others.is_empty())

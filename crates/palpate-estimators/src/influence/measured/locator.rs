@@ -8,7 +8,7 @@ use super::table::Table;
 use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::influence::grid::{Axis, check_axes, greatest_distances, middle};
 use crate::influence::inversion::{
-    Cells, Explain, Explained, Inversion, Layers, Look, Slopes, Stencil, ToldForce, look_at_cells,
+    Cells, Explain, Explained, Inversion, Layers, Limits, Look, Slopes, Stencil, ToldForce, look_at_cells,
 };
 use crate::influence::lanes::{LANES, Lanes, in_lanes};
 use crate::influence::levenberg::{Equations, Unknowns};
@@ -208,7 +208,10 @@ impl Locate for MeasuredLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         let Stored { table, residual_limit, .. } = &self.stored;
         match self.seen(reading) {
-            Some(seen) => Inversion::new(seen).estimate(self.told_force(), *residual_limit),
+            Some(seen) => {
+                let limits = Limits { misfit: *residual_limit, spread: f64::INFINITY };
+                Inversion::new(seen).estimate(self.told_force(), limits)
+            }
             None => Estimate::of_position(middle([table.x, table.y]), Status::OutsideModel),
         }
     }
@@ -429,6 +432,11 @@ impl Explain for Seen<'_> {
 
     fn equations(&mut self, at: Unknowns) -> Equations {
         if self.nodes() > 1 { self.equations_of_line(at) } else { self.equations_of_gain(at) }
+    }
+
+    /// Readings may be logarithms, which do not add up.
+    fn spread(&mut self, _: Unknowns) -> f64 {
+        0.0
     }
 
     fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained {

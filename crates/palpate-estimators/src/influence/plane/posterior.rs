@@ -48,7 +48,7 @@ pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) ->
         estimate.modes.push(palpate_core::Mode { contact: alone(mode), probability: mode.weight });
         estimate.status = Status::Ambiguous;
     }
-    if !search.rule.is_explained(best.misfit) {
+    if !search.is_explained(best.misfit, minima, &scratch.whitened) {
         estimate.status = Status::OutsideModel;
     }
     estimate

@@ -10,6 +10,7 @@ use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::influence::lanes::{LANES, Lanes};
 use crate::influence::levenberg::{Equations, Unknowns, descend};
+use crate::spread::{About, SpreadDirections, spread_bound};
 use crate::status::{StatusRule, unknowns};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::small::{Matrix, add_outer};
@@ -151,6 +152,34 @@ impl Search {
         found[..kept].sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
         let matters = |minimum: &&Minimum| minimum.misfit <= found[0].misfit + NEGLIGIBLE;
         (found, found[..kept].iter().take_while(matters).count().max(1))
+    }
+
+    /// Whether a point explains a reading: its least misfit is one of noise, and by one minimum at least it is not spread.
+    pub fn is_explained(&self, misfit: f64, minima: &[Minimum], whitened: &[f64]) -> bool {
+        self.rule.is_explained(misfit) && minima.iter().any(|minimum| !self.is_spread(whitened, minimum))
+    }
+
+    /// Whether a reading is, by its minimum, that of a contact that is spread.
+    fn is_spread(&self, whitened: &[f64], Minimum { at, misfit, .. }: &Minimum) -> bool {
+        // The square of the residual is at least that of its part.
+        if *misfit <= spread_bound(2) {
+            return false;
+        }
+        let [x_m, y_m, force_n] = *at;
+        let scale = force_n.max(self.weights_force_n).powi(2);
+        let variances = self.nearest_groups(&self.variances, [x_m, y_m]).as_flattened();
+        let roots: Vec<f64> =
+            variances[..self.live.len()].iter().map(|v| (1.0 + scale * v).sqrt().recip()).collect();
+        let reads = |[x_m, y_m, force_n]: Unknowns| -> Vec<f64> {
+            let place = self.patches.place(x_m, y_m);
+            let f = (0..self.patches.groups).flat_map(|group| self.patches.value(&place, group));
+            f.zip(&roots).map(|(f, root)| root * force_n * f).collect()
+        };
+        let force = self.force.known_n().map_or((0.0, self.greatest_force_n), |force_n| (force_n, force_n));
+        let about = About { at: *at, ends: [(0.0, self.size_m[0]), (0.0, self.size_m[1]), force] };
+        let residual: Vec<f64> =
+            whitened.iter().zip(&roots).zip(reads(*at)).map(|((d, root), reads)| root * d - reads).collect();
+        SpreadDirections::about(about, reads).score(&residual) > spread_bound(2)
     }
 
     /// About the least misfit in a coarse cell, of which the profile holds that without weights.

@@ -1,0 +1,63 @@
+//! Directions of a spread about every place of a line, ready for the residuals of readings; see [`crate::spread`].
+
+use super::gauss_newton::{GaussNewton, Minimum, grouped};
+use super::table::InfluenceTable;
+use crate::influence::config::ForceBelief;
+use crate::spread::{About, SpreadDirections, spread_bound};
+
+/// The direction of a spread in every cell of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct SpreadTable {
+    /// u·√w in groups of eight channels: u the direction, w the weights of the cell. 0 where there is none.
+    units: Vec<[f64; 8]>,
+    /// Σ u²·(1 − w): the part of the variance along u that the calibration has, which grows with the force.
+    calibrated: Vec<f64>,
+    /// The score from which on a contact is spread.
+    pub bound: f64,
+}
+
+impl SpreadTable {
+    /// Over a whitened table.
+    pub fn new(table: &InfluenceTable, gauss_newton: &GaussNewton, force: ForceBelief) -> Self {
+        let (mut units, mut calibrated) = (Vec::new(), Vec::new());
+        let force_ends = force.known_n().map_or((0.0, f64::INFINITY), |_| (1.0, 1.0));
+        for cell in 0..table.nodes() - 1 {
+            let middle_m = (cell as f64 + 0.5) * table.spacing_m();
+            let weights = &gauss_newton.weights[cell * gauss_newton.groups..][..gauss_newton.groups];
+            let weights = &weights.as_flattened()[..table.sensors];
+            let about =
+                About { at: [middle_m, 0.0, 1.0], ends: [(0.0, table.length_m), (0.0, 0.0), force_ends] };
+            let directions = SpreadDirections::about(about, |[x_m, _, force_n]| {
+                let mut reads = vec![0.0; table.sensors];
+                table.for_each(table.cell(x_m), |s, f, _| reads[s] = weights[s].sqrt() * force_n * f);
+                reads
+            });
+            let unit = directions.on_line().unwrap_or_else(|| vec![0.0; table.sensors]);
+            calibrated.push(unit.iter().zip(weights).map(|(u, w)| u * u * (1.0 - w)).sum());
+            let weighted: Vec<f64> = unit.iter().zip(weights).map(|(u, w)| u * w.sqrt()).collect();
+            units.extend(grouped(&weighted, table.sensors, 0.0));
+        }
+        Self { units, calibrated, bound: spread_bound(1) }
+    }
+
+    /// Whether the residual of a minimum is that of a contact that is spread.
+    #[inline]
+    pub fn is_told(&self, gauss_newton: &GaussNewton, whitened: &[[f64; 8]], minimum: &Minimum) -> bool {
+        let (cell, groups) = (gauss_newton.spacing.cell(minimum.x_m), gauss_newton.groups);
+        let node = cell.node as usize;
+        let (left, right) = gauss_newton.rows[node * groups..][..2 * groups].split_at(groups);
+        let units = &self.units[node * groups..][..groups];
+        let mut along = [0.0; 8];
+        for (((d, unit), left), right) in whitened.iter().zip(units).zip(left).zip(right) {
+            let [v0, v1, v2, v3] = cell.value;
+            for l in 0..8 {
+                let f = v0 * left[0][l] + v1 * right[0][l] + (v2 * left[1][l] + v3 * right[1][l]);
+                along[l] += unit[l] * (d[l] - minimum.force_n * f);
+            }
+        }
+        let z: f64 = along.iter().sum();
+        let grown = gauss_newton.weights_grown(minimum.force_n);
+        let variance = 1.0 + (grown - 1.0) * self.calibrated[node];
+        z > 0.0 && z * z > self.bound * variance
+    }
+}

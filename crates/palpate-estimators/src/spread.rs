@@ -1,0 +1,128 @@
+//! The test whether more than one point presses: a second contact close by, or a patch.
+//!
+//! Two contacts at a − h and a + h, or a patch that presses with variance h² about a, read W·(f(a) + ½·h²·f″(a) + …): f influence, W force of them all.
+//! Of the change along f″ a point takes up what lies along f and f′, by pressing harder and by moving. What is left has a direction u of
+//! unit length, over the noise. Of the best point's residual e, z = e·u is a standard normal variable where a point presses, and greater where
+//! h² > 0. This is the score of h² at 0 (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948), the most powerful test of a small h: χ² looks along all
+//! directions, and so tells less along each. On a plane h² is a matrix of three numbers, f″ are three derivatives, and Σz² along three
+//! directions is χ² of three.
+//!
+//! A residual is at right angles to f and f′ whatever u is. So z errs no more often where u is of differences in place of derivatives, or of a
+//! place near by, but tells a little less.
+
+use crate::status::SPREAD_RATE;
+use palpate_numerics::chi_squared_critical_value;
+use std::sync::OnceLock;
+
+/// Position along and across, and force or whatever else a reading depends on.
+pub(crate) type Unknowns = [f64; 3];
+
+/// A contact about which readings are looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct About {
+    pub at: Unknowns,
+    /// Ends of each unknown; the same of one that is known.
+    pub ends: [(f64, f64); 3],
+}
+
+/// Share of a side over which second differences are taken on either side: short against the way over which influences bend, and long against
+/// the distance between the nodes of a table.
+const REACH: f64 = 1.0 / 32.0;
+/// Share of the reach over which first differences are taken.
+const STEP: f64 = 1e-3;
+/// A direction of which all but this share lies along the others is not told.
+const LEAST_LEFT: f64 = 1e-3;
+
+/// Directions of unit length along which a spread moves a reading, and a point does not.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct SpreadDirections {
+    units: Vec<Vec<f64>>,
+    is_line: bool,
+}
+
+impl SpreadDirections {
+    /// The directions about a contact; `reads` is what contacts read, channel by channel, over the noise about this one.
+    pub fn about(About { at, ends }: About, mut reads: impl FnMut(Unknowns) -> Vec<f64>) -> Self {
+        let side = |k: usize| ends[k].1 - ends[k].0;
+        let is_free = |k: usize| side(k) > 0.0;
+        let is_line = !is_free(1);
+        // Where differences to both sides stay within the ends.
+        let within = |reach: Unknowns| -> Unknowns {
+            std::array::from_fn(|k| at[k].max(ends[k].0 + reach[k]).min(ends[k].1 - reach[k]))
+        };
+        let reach: Unknowns = [REACH * side(0), REACH * side(1), 0.0];
+        let mut basis: Vec<Vec<f64>> = Vec::new();
+        for k in (0..3).filter(|k| is_free(*k)) {
+            let mut step = [0.0; 3];
+            step[k] = STEP * if k < 2 { reach[k] } else { at[k].abs().max(STEP * side(k).min(1.0)) };
+            let from = within(step);
+            let moved = |way: f64| std::array::from_fn(|i| from[i] + way * step[i]);
+            let tangent = combined(&[(1.0, reads(moved(1.0))), (-1.0, reads(moved(-1.0)))]);
+            push_rest(&mut basis, tangent, f64::EPSILON.sqrt());
+        }
+        let tangents = basis.len();
+        let from = within(reach);
+        let mut moved = |x: f64, y: f64| reads([from[0] + x * reach[0], from[1] + y * reach[1], at[2]]);
+        let here = moved(0.0, 0.0);
+        for (x, y) in [(1.0, 0.0), (0.0, 1.0)].into_iter().take(if is_line { 1 } else { 2 }) {
+            let second = combined(&[(-2.0, here.clone()), (1.0, moved(x, y)), (1.0, moved(-x, -y))]);
+            push_rest(&mut basis, second, LEAST_LEFT);
+        }
+        if !is_line {
+            let corners = [(1.0, 1.0, 1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0), (1.0, -1.0, -1.0)];
+            let mixed = combined(&corners.map(|(sign, x, y)| (sign, moved(x, y))));
+            push_rest(&mut basis, mixed, LEAST_LEFT);
+        }
+        Self { units: basis.split_off(tangents), is_line }
+    }
+
+    /// The square of what a residual has along them; on a line, where a spread has but one sign, 0 for the other.
+    pub fn score(&self, residual: &[f64]) -> f64 {
+        let along = |unit: &Vec<f64>| product(unit, residual);
+        match self.units.as_slice() {
+            [unit] if self.is_line => along(unit).max(0.0).powi(2),
+            units => units.iter().map(|unit| along(unit).powi(2)).sum(),
+        }
+    }
+
+    /// The direction on a line; `None` where there is none.
+    pub fn on_line(self) -> Option<Vec<f64>> {
+        self.units.into_iter().next().filter(|_| self.is_line)
+    }
+}
+
+/// The score that a point exceeds at [`SPREAD_RATE`], on a surface of so many dimensions.
+pub(crate) fn spread_bound(dimensions: usize) -> f64 {
+    static KNOWN: [OnceLock<f64>; 2] = [const { OnceLock::new() }; 2];
+    if dimensions == 1 {
+        // Of one sign.
+        return *KNOWN[0].get_or_init(|| chi_squared_critical_value(2.0 * SPREAD_RATE, 1));
+    }
+    *KNOWN[1].get_or_init(|| chi_squared_critical_value(SPREAD_RATE, 3))
+}
+
+fn combined(parts: &[(f64, Vec<f64>)]) -> Vec<f64> {
+    let channels = parts.first().map_or(0, |(_, part)| part.len());
+    (0..channels).map(|c| parts.iter().map(|(factor, part)| factor * part[c]).sum()).collect()
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Pushes what of a vector lies across the basis, at unit length; nothing where that is no more than a share of it.
+fn push_rest(basis: &mut Vec<Vec<f64>>, mut vector: Vec<f64>, least: f64) {
+    let length = product(&vector, &vector).sqrt();
+    for unit in &*basis {
+        let along = product(unit, &vector);
+        vector.iter_mut().zip(unit).for_each(|(v, u)| *v -= along * u);
+    }
+    let left = product(&vector, &vector).sqrt();
+    if left > least * length && left.is_finite() {
+        vector.iter_mut().for_each(|v| *v /= left);
+        basis.push(vector);
+    }
+}
+
+#[cfg(test)]
+mod tests;
