@@ -53,9 +53,9 @@ pub struct Uncertainty {
     pub x_95_m: (f64, f64),
     /// Lower and upper end of the 95 % interval across, in metres; both 0 on a one-dimensional surface.
     pub y_95_m: (f64, f64),
-    /// Lower and upper end of the 95 % interval of the force, in newtons, where force and place trade off: beside an end a harder contact
-    /// nearer to it reads like a softer one farther away, and the force's standard deviation does not describe what is known of it. `None`
-    /// elsewhere.
+    /// Lower and upper end of the 95 % interval of the force, in newtons, where force and place trade off: beside an end or an edge a
+    /// harder contact nearer to it reads like a softer one farther away, and the force's standard deviation does not describe what is known
+    /// of it. `None` elsewhere.
     pub force_95_n: Option<(f64, f64)>,
 }
 

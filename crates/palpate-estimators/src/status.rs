@@ -207,6 +207,12 @@ impl StatusRule {
         square <= misfit + self.detection_cost && self.is_within_noise(square)
     }
 
+    /// What a contact whose χ² is `misfit` takes off the length of a reading, `square` = |d|², beyond the least with which a reading within the
+    /// noise is a contact's.
+    pub fn taken_beyond_cost(&self, square: f64, misfit: f64) -> f64 {
+        square - misfit - self.detection_cost
+    }
+
     /// Whether a contact whose χ² is `misfit` explains the reading; otherwise it is `outside_model`.
     #[inline(always)]
     pub fn is_explained(&self, misfit: f64) -> bool {

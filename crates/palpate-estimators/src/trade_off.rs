@@ -429,7 +429,7 @@ pub(crate) fn interval_on_line_95(x_m: f64, sd_m: f64, length_m: f64) -> (f64, f
 ///
 /// With z ~ N(μ, 1) the reading's distance from the boundary, which the best fit holds to 0 or more, χ² − χ²_min is (z − μ)² for z ≥ 0 and
 /// μ² − 2·μ·z below. It is at most q for z − μ from −(q + μ²)/(2μ), or −√q where that is above −μ, to √q.
-fn likelihood_bound(distance: f64) -> f64 {
+pub(crate) fn likelihood_bound(distance: f64) -> f64 {
     const STEP: f64 = 0.02;
     const STEPS: usize = 100;
     static BOUNDS: OnceLock<Vec<f64>> = OnceLock::new();

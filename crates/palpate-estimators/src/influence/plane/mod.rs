@@ -2,8 +2,10 @@
 //! refined by Levenberg's steps.
 
 mod coarse;
+mod edges;
 mod likelihood;
 mod locator;
+mod not_excluded;
 mod posterior;
 mod search;
 mod table;

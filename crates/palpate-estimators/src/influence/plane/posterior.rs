@@ -2,13 +2,16 @@
 //! estimate that they give.
 //!
 //! A minimum that is alone, narrow, clear of the edges and no more bent than a paraboloid is a normal distribution (Laplace's
-//! approximation). Any other reading's probability is summed up over the surface: near an edge it is cut off, where the
-//! readings tell little it is bent, and several minima share it. Of the coarse cells those that could matter are halved
-//! until the misfit is smooth within their parts, each with the force that is best there; a part that is too far from the
-//! reading is left out with all that it holds. The prior is flat over the surface, and in the size of the signal.
+//! approximation), of places and, where the best force is straight as well, of forces. Any other reading's probability is summed up over
+//! the surface: near an edge it is cut off, where the readings tell little it is bent, and several minima share it. Of the coarse cells
+//! those that could matter are halved until the misfit is smooth within their parts, each with the force that is best there; a part that
+//! is too far from the reading is left out with all that it holds. The prior is flat over the surface, and in the size of the signal.
+//! Where nothing is known of the force, the intervals of what is no normal distribution are those of `not_excluded`.
 
 use super::coarse::{MOST_VALLEYS, Profile};
-use super::search::{Minimum, Search};
+use super::not_excluded::Looked;
+use super::search::{Minimum, Profiled, Search};
+use crate::influence::config::ForceBelief;
 use crate::influence::levenberg::Unknowns;
 use crate::influence::moments::Moments;
 use crate::status::OTHER_PLACE;
@@ -44,6 +47,12 @@ pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) ->
     let modes = surroundings.modes();
     let alone = |mode: &Mode| contact(search, mode, mode.covariance);
     let mut estimate = Estimate::of_contact(contact(search, &modes[0], surroundings.region), Status::Located);
+    let is_traded_off =
+        matches!(surroundings.shape, Shape::Bent | Shape::Summed) && search.force == ForceBelief::Unknown;
+    if let (true, Some(uncertainty)) = (is_traded_off, &mut estimate.contact.uncertainty) {
+        let looked = scratch.leaves.iter().map(|leaf| leaf.looked);
+        search.not_excluded((&scratch.whitened, square), minima, looked, modes[0].mean).write(uncertainty);
+    }
     for mode in modes[1..].iter().filter(|mode| mode.weight >= OTHER_PLACE) {
         estimate.modes.push(palpate_core::Mode { contact: alone(mode), probability: mode.weight });
         estimate.status = Status::Ambiguous;
@@ -96,6 +105,20 @@ struct Surroundings {
     /// Covariance about the mean of the first mode: of the normal distribution whose 95 % ellipse is as large as one of this
     /// shape must be to hold 95 % of the probability.
     pub region: [f64; 6],
+    pub shape: Shape,
+}
+
+/// What the posterior is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shape {
+    /// A normal distribution.
+    Normal,
+    /// A normal distribution of places, but not of forces.
+    Bent,
+    /// Summed up over parts of the surface.
+    Summed,
+    /// Nothing that could be summed up.
+    Unexplained,
 }
 
 impl Surroundings {
@@ -111,6 +134,8 @@ const MOST_CELLS: f64 = 0.6;
 const CLEAR: f64 = 3.0;
 /// At two standard deviations a paraboloid is 4 above its minimum; what is off by more than this is bent.
 const MOST_BENT: f64 = 1.0;
+/// So many standard deviations the best force there may be off the straight way.
+const MOST_BENT_FORCE: f64 = 0.25;
 /// A misfit this much above the best has no probability worth adding up: e⁻⁶.
 const CUT: f64 = 12.0;
 /// A block stands for its middle when its whitened length is no longer: the sum over a normal distribution at steps of h
@@ -134,9 +159,11 @@ impl Search {
         });
         let sum: f64 = modes.iter().map(|mode| mode.weight).sum();
         let is_alone = are_plain && modes[0].weight >= (1.0 - OTHER_PLACE) * sum;
-        if is_alone && self.is_paraboloid(&scratch.whitened, &modes[0]) {
+        let alone = if is_alone { self.shape(&scratch.whitened, &modes[0]) } else { Shape::Summed };
+        if alone != Shape::Summed {
             modes[0].weight = 1.0;
-            return Surroundings { modes, count: 1, region: modes[0].covariance };
+            scratch.leaves.clear();
+            return Surroundings { modes, count: 1, region: modes[0].covariance, shape: alone };
         }
         if self.sum_up(minima, scratch) {
             self.summed(minima, &mut scratch.leaves)
@@ -168,21 +195,25 @@ impl Search {
         minimum.misfit + self.spread([minimum.at[0], minimum.at[1]])
     }
 
-    /// Whether the misfit rises from a mode as from a paraboloid's, two standard deviations away along both axes.
-    fn is_paraboloid(&self, whitened: &[f64], mode: &Mode) -> bool {
-        let [xx, xy, _, yy, ..] = mode.covariance;
+    /// What the posterior of a mode is that is alone, by the misfit and the best force two standard deviations away along both axes.
+    fn shape(&self, whitened: &[f64], mode: &Mode) -> Shape {
+        let [xx, xy, _, yy, _, ff] = mode.covariance;
         let [longer, shorter] = principal_variances([xx, xy, yy]).map(f64::sqrt);
         let [cos, sin] = principal_direction([xx, xy, yy]);
         let [x_m, y_m, _] = mode.mean;
-        let here = self.profiled(whitened, [x_m, y_m]).1;
-        let is_straight = |along: f64, across: f64| {
-            let rise = self.profiled(whitened, [x_m + 2.0 * along, y_m + 2.0 * across]).1 - here;
-            (rise - 4.0).abs() <= MOST_BENT
+        let here = self.profiled(whitened, [x_m, y_m]);
+        let axes = [[longer * cos, longer * sin], [-shorter * sin, shorter * cos]];
+        let ends = axes.map(|[along, across]| {
+            [2.0, -2.0].map(|side| self.profiled(whitened, [x_m + side * along, y_m + side * across]))
+        });
+        if ends.as_flattened().iter().any(|there| (there.misfit - here.misfit - 4.0).abs() > MOST_BENT) {
+            return Shape::Summed;
+        }
+        let is_straight = |[ahead, behind]: &[Profiled; 2]| {
+            let bent_n = 0.5 * (ahead.force_n + behind.force_n) - here.force_n;
+            bent_n.abs() <= MOST_BENT_FORCE * ff.sqrt()
         };
-        [1.0, -1.0].iter().all(|side| {
-            is_straight(side * longer * cos, side * longer * sin)
-                && is_straight(-side * shorter * sin, side * shorter * cos)
-        })
+        if ends.iter().all(is_straight) { Shape::Normal } else { Shape::Bent }
     }
 
     /// The inverse of the information; `None` where the reading does not tell.
@@ -212,27 +243,30 @@ impl Search {
                 length: self.coarse.lengths[cell].map(|length| force_n * length),
                 held_length: self.coarse.whole_lengths[cell].map(|length| self.greatest_force_n * length),
             });
-            while let Some(mut block) = blocks.pop() {
+            while let Some(block) = blocks.pop() {
                 looked_at += 1;
                 if looked_at > MOST_BLOCKS {
                     return false;
                 }
-                let (force_n, misfit) = self.profiled(whitened, block.middle_m);
-                if force_n > HELD * self.greatest_force_n {
-                    block.length = block.held_length;
-                }
+                let there = self.profiled(whitened, block.middle_m);
+                let Profiled { force_n, misfit, .. } = there;
+                let length = block.length_with(&there, self.greatest_force_n);
                 let spread = self.spread(block.middle_m);
-                if block.floor(misfit) + spread > most {
+                if floor_within(misfit, length) + spread > most {
                     continue;
                 }
-                if let Some(halves) = block.halves() {
+                if let Some(halves) = block.halves(length) {
                     blocks.extend(halves);
                 } else {
                     let area = block.size_m[0] * block.size_m[1];
                     let [x_m, y_m] = block.middle_m;
                     leaves.push(Leaf {
                         weight: (0.5 * (best - misfit - spread)).exp() * area,
-                        at: [x_m, y_m, force_n],
+                        looked: Looked {
+                            at: [x_m, y_m, force_n],
+                            cost: misfit + spread,
+                            steps: [0.5 * block.size_m[0], 0.5 * block.size_m[1], there.sd_n()],
+                        },
                         mode: nearest(minima, block.middle_m),
                         distance: 0.0,
                     });
@@ -247,8 +281,8 @@ impl Search {
         let mut moments = [Moments::default(); MOST_VALLEYS];
         let mut all = Moments::default();
         for leaf in &*leaves {
-            moments[leaf.mode].add(leaf.weight, leaf.at);
-            all.add(leaf.weight, leaf.at);
+            moments[leaf.mode].add(leaf.weight, leaf.looked.at);
+            all.add(leaf.weight, leaf.looked.at);
         }
         if !(all.weight.is_finite() && all.weight > 0.0) {
             return self.nothing_summed(&minima[0]);
@@ -267,7 +301,7 @@ impl Search {
         covariance.iter_mut().zip(squares).for_each(|(value, square)| *value += square);
         covariance[5] += self.own_variance(&minima[0]);
         let growth = growth(leaves, modes[0].mean, &covariance);
-        Surroundings { modes, count, region: covariance.map(|value| growth * value) }
+        Surroundings { modes, count, region: covariance.map(|value| growth * value), shape: Shape::Summed }
     }
 
     /// Variance of a force at a place that is known.
@@ -282,7 +316,7 @@ impl Search {
         let region = [xx, 0.0, 0.0, yy, 0.0, self.own_variance(minimum)];
         let mut modes = [Mode::default(); MOST_VALLEYS];
         modes[0] = Mode { weight: 1.0, mean: minimum.at, covariance: region };
-        Surroundings { modes, count: 1, region }
+        Surroundings { modes, count: 1, region, shape: Shape::Unexplained }
     }
 }
 
@@ -300,7 +334,7 @@ fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
     let [xx, xy, _, yy, ..] = *covariance;
     let Some(factors) = Ldl::new(&[[xx, xy], [xy, yy]]) else { return 1.0 };
     for leaf in &mut *leaves {
-        leaf.distance = factors.quadratic([leaf.at[0] - about[0], leaf.at[1] - about[1]]);
+        leaf.distance = factors.quadratic([leaf.looked.at[0] - about[0], leaf.looked.at[1] - about[1]]);
     }
     leaves.sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance));
     let all: f64 = leaves.iter().map(|leaf| leaf.weight).sum();
@@ -324,8 +358,7 @@ fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
 struct Leaf {
     /// Its probability, but for a factor.
     weight: f64,
-    /// x, y and the force that is best there.
-    at: [f64; 3],
+    looked: Looked,
     /// Index of the nearest minimum.
     mode: usize,
     /// Squared, from the estimate, in standard deviations.
@@ -344,17 +377,22 @@ struct Block {
 }
 
 impl Block {
-    /// About the least misfit within it, from that of its middle.
-    fn floor(&self, misfit: f64) -> f64 {
-        let reach = 0.5 * self.length[0].hypot(self.length[1]);
-        let closest = (misfit.max(0.0).sqrt() - reach).max(0.0);
-        closest * closest
+    /// Its lengths where the greatest force could hold contacts within it, by the best in its middle, or those of elsewhere.
+    fn length_with(&self, best: &Profiled, greatest_force_n: f64) -> [f64; 2] {
+        let is_near = best.force_n > HELD * greatest_force_n;
+        // The readings of contacts with the greatest force, as weak as anywhere within, are then weaker than the best's in the middle.
+        let reach = 0.5 * self.held_length[0].hypot(self.held_length[1]);
+        if is_near && greatest_force_n - best.force_n < reach * best.sd_n() {
+            self.held_length
+        } else {
+            self.length
+        }
     }
 
-    /// Its halves along the longer way; `None` of one that is short both ways.
-    fn halves(&self) -> Option<[Self; 2]> {
-        let k = usize::from(self.length[1] > self.length[0]);
-        if self.length[k].is_nan() || self.length[k] <= FINE || self.size_m[k] <= LEAST_M {
+    /// Its halves along the longer way; `None` where it is short both ways.
+    fn halves(&self, length: [f64; 2]) -> Option<[Self; 2]> {
+        let k = usize::from(length[1] > length[0]);
+        if length[k].is_nan() || length[k] <= FINE || self.size_m[k] <= LEAST_M {
             return None;
         }
         let half = |side: f64| {
@@ -367,6 +405,13 @@ impl Block {
         };
         Some([half(-1.0), half(1.0)])
     }
+}
+
+/// About the least misfit within a part of such lengths, from that of its middle.
+fn floor_within(misfit: f64, length: [f64; 2]) -> f64 {
+    let reach = 0.5 * length[0].hypot(length[1]);
+    let closest = (misfit.max(0.0).sqrt() - reach).max(0.0);
+    closest * closest
 }
 
 /// Which minimum is nearest to a place.

@@ -5,6 +5,7 @@
 //! χ²(x, y, W) = Σ w·e² (+ the force's own misfit where it is believed to be near a value).
 
 use super::coarse::{Coarse, MOST_VALLEYS, Profile};
+use super::edges::Edges;
 use super::table::{Patches, PlaneTable};
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
@@ -34,6 +35,8 @@ pub(super) struct Search {
     /// The force of these weights, in newtons.
     weights_force_n: f64,
     pub coarse: Coarse,
+    /// How far contacts are from the edges, where their force is not known.
+    pub edges: Edges,
     pub force: ForceBelief,
     /// Greatest force of a contact, in newtons; infinite where more is known of the force than that.
     pub greatest_force_n: f64,
@@ -50,6 +53,31 @@ pub(super) struct Minimum {
     pub misfit: f64,
     /// JᵀwJ there, J the derivatives of W·f by x, y and W.
     pub information: Matrix<3>,
+}
+
+/// A place with the best force there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Profiled {
+    pub force_n: f64,
+    /// χ² with it.
+    pub misfit: f64,
+    /// The force that would be best if contacts could pull, and press with any force.
+    free_n: f64,
+    /// 1/variance of the force; infinite where it is known.
+    precision: f64,
+}
+
+impl Profiled {
+    /// Standard deviation of the force at this place.
+    pub fn sd_n(&self) -> f64 {
+        self.precision.sqrt().recip()
+    }
+
+    /// χ² with another force.
+    pub fn misfit_with(&self, force_n: f64) -> f64 {
+        let square = |force_n: f64| (force_n - self.free_n).powi(2);
+        self.misfit + self.precision * (square(force_n) - square(self.force_n))
+    }
 }
 
 /// A channel so many standard deviations off is nothing that a contact does.
@@ -86,7 +114,13 @@ impl Search {
             node(patches.nearest(x_m, y_m)).copied().fold(1.0, f64::min)
         };
         let least_weights = (0..coarse.cells()).map(least).collect();
+        let edges = if force == ForceBelief::Unknown {
+            Edges::new(table, &patches, &weights)
+        } else {
+            Edges::default()
+        };
         Self {
+            edges,
             offsets: live.iter().map(|s| offsets[*s]).collect(),
             rule: StatusRule::new(
                 live.len(),
@@ -199,13 +233,13 @@ impl Search {
                 let t = step as f64 / STEPS as f64;
                 let at = |k: usize| a.at[k] + t * (b.at[k] - a.at[k]);
                 let [x_m, y_m] = [at(0), at(1)];
-                self.profiled(whitened, [x_m, y_m]).1 <= a.misfit.max(b.misfit) + RISE
+                self.profiled(whitened, [x_m, y_m]).misfit <= a.misfit.max(b.misfit) + RISE
             })
     }
 
-    /// The best force at a place, and the misfit with it.
+    /// A place with the best force there.
     #[inline]
-    pub fn profiled(&self, whitened: &[f64], [x_m, y_m]: [f64; 2]) -> (f64, f64) {
+    pub fn profiled(&self, whitened: &[f64], [x_m, y_m]: [f64; 2]) -> Profiled {
         let place = self.patches.place(x_m, y_m);
         let weights = self.nearest_groups(&self.weights, [x_m, y_m]);
         let mut sums = [[0.0; 8]; 3];
@@ -222,12 +256,15 @@ impl Search {
         }
         let [square, product, norm] = sums.map(|lanes| lanes.iter().sum::<f64>());
         if let ForceBelief::Known(force_n) = self.force {
-            return (force_n, square + force_n * (force_n * norm - 2.0 * product));
+            let misfit = square + force_n * (force_n * norm - 2.0 * product);
+            return Profiled { force_n, misfit, free_n: force_n, precision: f64::INFINITY };
         }
         let (mean, precision) = self.force.mean_and_precision();
         let (score, norm) = (product + mean * precision, norm + precision);
-        let force_n = if norm > 0.0 { (score / norm).clamp(0.0, self.greatest_force_n) } else { 0.0 };
-        (force_n, square + mean * mean * precision + force_n * (force_n * norm - 2.0 * score))
+        let free_n = if norm > 0.0 { score / norm } else { 0.0 };
+        let force_n = free_n.clamp(0.0, self.greatest_force_n);
+        let misfit = square + mean * mean * precision + force_n * (force_n * norm - 2.0 * score);
+        Profiled { force_n, misfit, free_n, precision: norm }
     }
 
     /// Σ ln(1 + v) at a place, by which a reading is less likely where the calibration tells less.
@@ -237,7 +274,7 @@ impl Search {
 
     /// The best force at a place.
     pub fn best_force(&self, whitened: &[f64], at: [f64; 2]) -> f64 {
-        self.force.known_n().unwrap_or_else(|| self.profiled(whitened, at).0)
+        self.force.known_n().unwrap_or_else(|| self.profiled(whitened, at).force_n)
     }
 
     /// The groups of the node nearest to a place.

@@ -1,0 +1,206 @@
+//! The contacts on a plane that a reading does not exclude, where nothing is known of the force and no normal distribution describes them.
+//!
+//! Beside an edge a harder contact nearer to it reads like a softer one farther away, as at the ends of a line ([`crate::trade_off`]).
+//! The 95 % intervals of x, y and force are by the likelihood ratio, as there: each holds every value with which some contact's cost, minus
+//! twice the logarithm of its likelihood, is at most q above the least. q falls from 3.84 to 2.71 towards the edges that bound the value,
+//! such that contacts beside them are covered as often as others. The parts over which the posterior was summed up say from where on the
+//! farthest such values are to be looked for: each end is followed outwards from there, the other two unknowns being the best.
+
+use super::search::{Minimum, Search};
+use crate::influence::levenberg::{Unknowns, descend};
+use crate::trade_off::{CALIBRATED, likelihood_bound};
+use palpate_core::Uncertainty;
+
+/// Of a reading from which the best contact takes no more than so much beyond what it must, nothing is excluded.
+///
+/// A contact too soft to be found is found where noise makes its reading look like another's, which explains it better by what was missing
+/// and by χ² of the three unknowns, greater than this in 2 % of the readings. With the likelihood ratio alone 91 % of the places were covered
+/// where a third of the contacts are found (`plane/coverage.rs`).
+const FAINT: f64 = 9.84;
+
+/// The most that the cost of a contact is above the least: q far from all edges.
+const MOST_ABOVE: f64 = CALIBRATED * 3.85;
+/// A step that lowers the misfit by less than this is the last one.
+const SMALL: f64 = 0.02;
+/// An end is as exact as this, in standard deviations.
+const CLOSE: f64 = 0.003;
+/// A value so many standard deviations beyond the end says little of where the end is: the way to it is halved.
+const STEEP: f64 = 3.0;
+/// Contacts that are tried between one that is not excluded and one that is.
+const ROUNDS: usize = 12;
+/// Number of the force among the unknowns.
+const FORCE: usize = 2;
+
+/// 95 % intervals of x, y and force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct NotExcluded([(f64, f64); 3]);
+
+impl NotExcluded {
+    /// Writes the intervals over others.
+    pub fn write(&self, uncertainty: &mut Uncertainty) {
+        let Self([x_95_m, y_95_m, force_95_n]) = *self;
+        *uncertainty = Uncertainty { x_95_m, y_95_m, force_95_n: Some(force_95_n), ..*uncertainty };
+    }
+}
+
+/// A place that was looked at, with the best force there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Looked {
+    /// x, y and the force that is best there.
+    pub at: Unknowns,
+    /// Minus twice the logarithm of its likelihood, but for a constant.
+    pub cost: f64,
+    /// Lengths from which on other values of the three are looked for.
+    pub steps: [f64; 3],
+}
+
+/// Which of x, y and force is followed, and where to.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    /// Its number among the three.
+    unknown: usize,
+    /// −1 downwards, 1 upwards.
+    side: f64,
+    /// Where it ends at the latest.
+    limit: f64,
+}
+
+/// A contact, and how far each of x, y and force is from being excluded with it.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    at: Unknowns,
+    /// Root of what the cost is above the least, less that of q: a value is excluded where this is more than 0.
+    beyond: [f64; 3],
+}
+
+impl Search {
+    /// The 95 % intervals of a whitened reading of length `square`, with its minima, best first, and the places that were looked at. They hold
+    /// the estimate.
+    pub fn not_excluded(
+        &self,
+        (whitened, square): (&[f64], f64),
+        minima: &[Minimum],
+        looked: impl Iterator<Item = Looked>,
+        estimate: Unknowns,
+    ) -> NotExcluded {
+        let limits = [self.size_m[0], self.size_m[1], self.greatest_force_n];
+        if self.rule.taken_beyond_cost(square, minima[0].misfit) <= FAINT {
+            return NotExcluded(limits.map(|limit| (0.0, limit)));
+        }
+        let looked: Vec<Looked> =
+            looked.chain(minima.iter().map(|minimum| self.looked_at(whitened, minimum))).collect();
+        let least = looked.iter().map(|looked| looked.cost).fold(f64::INFINITY, f64::min);
+        let reading = Reading { search: self, whitened, least };
+        let likely: Vec<(Found, [f64; 3])> = looked
+            .iter()
+            .filter(|looked| looked.cost - least <= MOST_ABOVE)
+            .map(|looked| (reading.found(looked.at, looked.cost), looked.steps))
+            .collect();
+        let end = |unknown: usize, side: f64| {
+            let way = Way { unknown, side, limit: if side < 0.0 { 0.0 } else { limits[unknown] } };
+            reading.end(way, &likely).unwrap_or(estimate[unknown])
+        };
+        NotExcluded(std::array::from_fn(|k| {
+            (end(k, -1.0).min(estimate[k]), end(k, 1.0).max(estimate[k]).min(limits[k]))
+        }))
+    }
+
+    /// The place of a minimum.
+    fn looked_at(&self, whitened: &[f64], minimum: &Minimum) -> Looked {
+        let [x_m, y_m, _] = minimum.at;
+        let best = self.profiled(whitened, [x_m, y_m]);
+        let [along_m, across_m] = self.coarse.cell_m.map(|cell_m| 0.125 * cell_m);
+        Looked {
+            at: [x_m, y_m, best.force_n],
+            cost: best.misfit + self.spread([x_m, y_m]),
+            steps: [along_m, across_m, best.sd_n()],
+        }
+    }
+}
+
+/// A reading whose intervals are looked for.
+struct Reading<'a> {
+    search: &'a Search,
+    whitened: &'a [f64],
+    /// The least cost of all contacts.
+    least: f64,
+}
+
+impl Reading<'_> {
+    fn found(&self, at: Unknowns, cost: f64) -> Found {
+        let root = (cost - self.least).max(0.0).sqrt();
+        let [along, across] = self.search.edges.distances(at);
+        let distances = [along, across, along.min(across)];
+        let beyond = distances.map(|distance| root - (CALIBRATED * likelihood_bound(distance)).sqrt());
+        Found { at, beyond }
+    }
+
+    /// The contact with one value of an unknown and the best of the others, looked for from another contact on.
+    fn held(&self, unknown: usize, value: f64, from: &Found) -> Found {
+        let Self { search, whitened, .. } = *self;
+        let mut start = from.at;
+        start[unknown] = value;
+        let near = [start[0], start[1]];
+        if unknown != FORCE {
+            start[FORCE] = search.best_force(whitened, near);
+        }
+        let mut ends = [(0.0, search.size_m[0]), (0.0, search.size_m[1]), (0.0, search.greatest_force_n)];
+        ends[unknown] = (value, value);
+        let (mut at, _) = descend(start, ends, SMALL, |at| search.equations(whitened, at, Some(near)));
+        let place = [at[0], at[1]];
+        let best = search.profiled(whitened, place);
+        if unknown != FORCE {
+            at[FORCE] = best.force_n;
+        }
+        self.found(at, best.misfit_with(at[FORCE]) + search.spread(place))
+    }
+
+    /// The last value on a way that is not excluded; `None` where there is none among likely contacts.
+    fn end(&self, way: Way, likely: &[(Found, [f64; 3])]) -> Option<f64> {
+        let Way { unknown, side, limit } = way;
+        let is_inside = |found: &Found| found.beyond[unknown] <= 0.0;
+        let reach = |(found, steps): &(Found, [f64; 3])| {
+            side * found.at[unknown] - found.beyond[unknown] * steps[unknown]
+        };
+        let farthest =
+            likely.iter().filter(|(found, _)| is_inside(found)).max_by(|a, b| reach(a).total_cmp(&reach(b)));
+        let (mut inside, mut step) = farthest.map(|(found, steps)| (*found, steps[unknown]))?;
+        loop {
+            let left = (limit - inside.at[unknown]).abs();
+            if left <= 0.0 {
+                return Some(limit);
+            }
+            let next = if step < left { inside.at[unknown] + side * step } else { limit };
+            let found = self.held(unknown, next, &inside);
+            if !is_inside(&found) {
+                return Some(self.between(unknown, inside, found));
+            }
+            inside = found;
+            step *= 2.0;
+        }
+    }
+
+    /// The last value between a contact that is not excluded and one that is, by Illinois' regula falsi (Dowell and Jarratt, BIT 11, 1971):
+    /// an end that stays counts half.
+    fn between(&self, unknown: usize, mut inside: Found, mut outside: Found) -> f64 {
+        let (mut stayed, mut weights) = (None, [1.0, 1.0]);
+        for _ in 0..ROUNDS {
+            let beyond = [&inside, &outside].map(|found| found.beyond[unknown]);
+            if beyond[0] >= -CLOSE {
+                break;
+            }
+            let [below, above] = [weights[0] * beyond[0], weights[1] * beyond[1]];
+            let share = if beyond[1] > STEEP { 0.5 } else { below / (below - above) };
+            let value = inside.at[unknown] + share * (outside.at[unknown] - inside.at[unknown]);
+            let found = self.held(unknown, value, &inside);
+            let moved = usize::from(found.beyond[unknown] > 0.0);
+            *[&mut inside, &mut outside][moved] = found;
+            weights[moved] = 1.0;
+            if stayed == Some(1 - moved) {
+                weights[1 - moved] *= 0.5;
+            }
+            stayed = Some(1 - moved);
+        }
+        inside.at[unknown]
+    }
+}
