@@ -65,7 +65,7 @@ pub enum CsvProblem {
     #[error("a quoted field does not end on this line")]
     OpenQuote,
     /// The header lacks a column.
-    #[error("there is no column `{wanted}`; there are {}", list(present))]
+    #[error("there is no column `{wanted}`; there are {}{}", list(present), advice_on_header(present))]
     MissingColumn {
         /// The name that was looked for.
         wanted: String,
@@ -289,6 +289,15 @@ impl fmt::Display for Prefix<'_> {
             }
         }
         f.write_str(": ")
+    }
+}
+
+/// What to do where the header has numbers alone.
+fn advice_on_header(names: &[String]) -> &'static str {
+    if names.iter().all(|name| name.replace(',', ".").trim().parse::<f64>().is_ok()) {
+        ": numbers; where no line names the columns, give `--no-header`, or `header = false` in [recording]"
+    } else {
+        ""
     }
 }
 

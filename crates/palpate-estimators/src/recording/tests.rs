@@ -87,6 +87,8 @@ fn rows_have_times_where_a_column_tells_them() {
 
     let missing = times(&foreign().time("Zeit"), "X,Pl,Pr,F\n10,1,2,3\n").unwrap_err().to_string();
     assert_eq!(missing, "bench.csv:1: there is no column `Zeit`; there are `X`, `Pl`, `Pr`, `F`");
+    let headless = times(&foreign(), "10,1,2.5,3\n12,1,2,3\n").unwrap_err().to_string();
+    assert!(headless.contains("`2.5`, `3`: numbers; where no line names the columns"), "{headless}");
     let other = times(&foreign().time("Zeit"), "X,Pl,Pr,F,Zeit\n10,1,2,3,14:03:25\n11,1,2,3,4\n");
     assert!(other.unwrap_err().to_string().starts_with("bench.csv:3:5: `4` is written in another way"));
 }
