@@ -14,13 +14,11 @@ use crate::status::SPREAD_RATE;
 use palpate_numerics::chi_squared_critical_value;
 use std::sync::OnceLock;
 
-/// Position along and across, and force or whatever else a reading depends on.
-pub(crate) type Unknowns = [f64; 3];
-
 /// A contact about which readings are looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct About {
-    pub at: Unknowns,
+    /// Position along and across, and force or whatever else a reading depends on.
+    pub at: [f64; 3],
     /// Ends of each unknown; the same of one that is known.
     pub ends: [(f64, f64); 3],
 }
@@ -42,15 +40,15 @@ pub(crate) struct SpreadDirections {
 
 impl SpreadDirections {
     /// The directions about a contact; `reads` is what contacts read, channel by channel, over the noise about this one.
-    pub fn about(About { at, ends }: About, mut reads: impl FnMut(Unknowns) -> Vec<f64>) -> Self {
+    pub fn about(About { at, ends }: About, mut reads: impl FnMut([f64; 3]) -> Vec<f64>) -> Self {
         let side = |k: usize| ends[k].1 - ends[k].0;
         let is_free = |k: usize| side(k) > 0.0;
         let is_line = !is_free(1);
         // Where differences to both sides stay within the ends.
-        let within = |reach: Unknowns| -> Unknowns {
+        let within = |reach: [f64; 3]| -> [f64; 3] {
             std::array::from_fn(|k| at[k].max(ends[k].0 + reach[k]).min(ends[k].1 - reach[k]))
         };
-        let reach: Unknowns = [REACH * side(0), REACH * side(1), 0.0];
+        let reach = [REACH * side(0), REACH * side(1), 0.0];
         let mut basis: Vec<Vec<f64>> = Vec::new();
         for k in (0..3).filter(|k| is_free(*k)) {
             let mut step = [0.0; 3];
@@ -89,6 +87,16 @@ impl SpreadDirections {
     pub fn on_line(self) -> Option<Vec<f64>> {
         self.units.into_iter().next().filter(|_| self.is_line)
     }
+}
+
+/// Score of a reading about a contact by which it is explained best; `reads` as for [`SpreadDirections::about`], and the reading over the same noise.
+pub(crate) fn spread_score(
+    about: About,
+    reading: impl IntoIterator<Item = f64>,
+    mut reads: impl FnMut([f64; 3]) -> Vec<f64>,
+) -> f64 {
+    let residual: Vec<f64> = reading.into_iter().zip(reads(about.at)).map(|(d, f)| d - f).collect();
+    SpreadDirections::about(about, reads).score(&residual)
 }
 
 /// The score that a point exceeds at [`SPREAD_RATE`], on a surface of so many dimensions.

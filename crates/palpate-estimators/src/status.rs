@@ -131,21 +131,24 @@ fn detection_cost(contact_cost: f64, rate: FalseAlarmRate) -> f64 {
     bisect((0.0, 20.0), 40, |u| normal_cdf(-u) > tail).powi(2)
 }
 
-/// The misfit, or score of a spread, from which on no contact explains a reading, of a surface that is known by its recording alone: that for
-/// `normal` noise, and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer tails.
-pub(crate) fn learnt_bound<'a>(
-    normal: f64,
+/// Bounds of misfit, score of a spread or the like, from which on no contact explains a reading, of a surface that is known by its recording
+/// alone: each that for `normal` noise, and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer
+/// tails.
+pub(crate) fn learnt_bounds<'a, const N: usize>(
+    normal: [f64; N],
     readings: impl ExactSizeIterator<Item = &'a [f64]>,
-    misfit: impl Fn(&[f64]) -> f64,
-) -> f64 {
+    left: impl Fn(&[f64]) -> [f64; N],
+) -> [f64; N] {
     /// Readings that are tried.
     const TRIED: usize = 400;
     let every = readings.len().div_ceil(TRIED).max(1);
-    let mut misfits: Vec<f64> =
-        readings.step_by(every).map(misfit).filter(|misfit| misfit.is_finite()).collect();
-    misfits.sort_by(f64::total_cmp);
-    let usual = misfits.get(misfits.len() * 99 / 100).copied().unwrap_or(0.0);
-    normal.max(2.0 * usual)
+    let tried: Vec<[f64; N]> = readings.step_by(every).map(left).collect();
+    std::array::from_fn(|k| {
+        let mut own: Vec<f64> = tried.iter().map(|left| left[k]).filter(|left| left.is_finite()).collect();
+        own.sort_by(f64::total_cmp);
+        let usual = own.get(own.len() * 99 / 100).copied().unwrap_or(0.0);
+        normal[k].max(2.0 * usual)
+    })
 }
 
 /// Places along a line that readings tell apart.
@@ -207,7 +210,7 @@ impl StatusRule {
         square <= misfit + self.detection_cost && self.is_within_noise(square)
     }
 
-    /// What a contact whose χ² is `misfit` takes off the length of a reading, `square` = |d|², beyond the least with which a reading within the
+    /// The part that a contact whose χ² is `misfit` takes off the length of a reading, `square` = |d|², beyond the least with which a reading within the
     /// noise is a contact's.
     pub fn taken_beyond_cost(&self, square: f64, misfit: f64) -> f64 {
         square - misfit - self.detection_cost

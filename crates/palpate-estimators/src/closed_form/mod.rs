@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::spread::{About, SpreadDirections, spread_bound};
+use crate::spread::{About, spread_bound, spread_score};
 use crate::status::{
     FalseAlarmRate, LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, misfit_bound, unknowns,
 };
@@ -411,7 +411,7 @@ impl Posterior<'_> {
         Some(estimate)
     }
 
-    /// Whether the reading is that of a contact that is spread, about every place that competes; false where the noise is not known.
+    /// True for the reading of a contact that is spread, about every place that competes; false where the noise is not known.
     fn is_spread(&self, found: &[Explanation]) -> bool {
         let least = found.iter().fold(f64::INFINITY, |least, at| least.min(at.chi_squared));
         let competes = |at: &&Explanation| at.chi_squared <= least + NEGLIGIBLE;
@@ -429,8 +429,7 @@ impl Posterior<'_> {
         let force_ends = self.force_n.map_or((0.0, f64::INFINITY), |force_n| (force_n, force_n));
         let at = [*position_m, 0.0, *force_n];
         let about = About { at, ends: [(0.0, self.length_m()), (0.0, 0.0), force_ends] };
-        let residual: Vec<f64> = self.reading.iter().zip(reads(at)).map(|(d, reads)| d - reads).collect();
-        SpreadDirections::about(about, reads).score(&residual)
+        spread_score(about, self.reading.iter().copied(), reads)
     }
 
     /// h̃ of every channel at a place, and its derivative by the position in 1/m.

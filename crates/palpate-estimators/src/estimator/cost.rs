@@ -1,7 +1,7 @@
 //! The cost of a fit, before it is begun: memory and time by the sizes of what each method factors and tabulates.
 //!
-//! Times are for one core of some 3 GHz. Where a fit takes a second or more, both are to be within a factor of two; `cargo bench -p palpate
-//! --bench cost` measures them, and docs/measured.md has what it found.
+//! Times are for one core that has other work too, and on an idle one up to four times too long. `cargo bench -p palpate --bench cost` measures
+//! them, and docs/measured.md has what it found.
 
 use super::{CHOICE_FOLDS, Estimator, is_learnt};
 use crate::features::FeatureKind;
@@ -219,14 +219,13 @@ impl Sizes {
     }
 
     /// Influence functions of presses with forces: hyperparameters are searched, two priors are judged, each by as many factors as there are
-    /// folds, and each channel has one of its own; residuals of every press are another. Few presses are learnt from again without those that
+    /// folds, and each channel has one of its own; residuals of every press are another. Presses are learnt from again without those that
     /// nothing explains, and with noise by place.
     fn force_linear(&self, extent: Extent) -> FitCost {
-        /// Evaluations of the evidence in a search, and how often few presses are learnt from, as a rule.
+        /// Evaluations of the evidence in a search, and how often presses are learnt from, as a rule.
         const EVALUATIONS: f64 = 700.0;
         const LEARNT: f64 = 2.2;
         let presses = self.presses.min(force_linear::MOST_PRESSES as f64);
-        let learnt = if presses < self.presses { 1.0 } else { LEARNT };
         let searched = presses.min(force_linear::MOST_SEARCHED as f64);
         let nodes = force_linear::most_nodes(extent) as f64;
         let kept = presses * (1.0 - 1.0 / force_linear::FOLDS as f64);
@@ -235,8 +234,8 @@ impl Sizes {
         FitCost {
             memory_bytes: NUMBER * (7.0 * presses * presses + 4.0 * nodes * self.channels)
                 + 2.0 * NUMBER * self.presses * (2.0 * self.channels + 10.0),
-            seconds: self.channels * (learnt * learning + nodes * presses * presses / 2.0 / PRODUCTS)
-                + self.presses * presses * 5e-8,
+            seconds: self.channels * (LEARNT * learning + nodes * presses * presses / 2.0 / PRODUCTS)
+                + LEARNT * self.presses * presses * 5e-8,
         }
     }
 }

@@ -292,7 +292,7 @@ impl fmt::Display for Prefix<'_> {
     }
 }
 
-/// What to do where the header has numbers alone.
+/// Advice where the header has numbers alone.
 fn advice_on_header(names: &[String]) -> &'static str {
     if names.iter().all(|name| name.replace(',', ".").trim().parse::<f64>().is_ok()) {
         ": numbers; where no line names the columns, give `--no-header`, or `header = false` in [recording]"

@@ -18,8 +18,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// What seven smooth channels read of a force at a place.
-fn bells([x, y, force]: Unknowns) -> Vec<f64> {
+/// Readings of seven smooth channels of a force at a place.
+fn bells([x, y, force]: [f64; 3]) -> Vec<f64> {
     let bell = |(u, v): (f64, f64)| force * (-4.0 * ((x - u).powi(2) + (y - v).powi(2))).exp();
     [(0.0, 0.0), (0.5, 0.1), (1.0, 0.0), (0.1, 0.6), (0.6, 0.5), (0.2, 1.0), (0.9, 0.8)].map(bell).to_vec()
 }
@@ -33,7 +33,7 @@ fn tangent(k: usize) -> Vec<f64> {
     moved(1e-6).iter().zip(moved(-1e-6)).map(|(a, b)| (a - b) / 2e-6).collect()
 }
 
-/// What is left of a vector across the tangents by these unknowns.
+/// The rest of a vector across the tangents by these unknowns.
 fn residual(of: Vec<f64>, unknowns: &[usize]) -> Vec<f64> {
     let mut basis = Vec::new();
     unknowns.iter().for_each(|k| push_rest(&mut basis, tangent(*k), 0.0));

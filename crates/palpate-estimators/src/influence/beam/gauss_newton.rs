@@ -313,7 +313,7 @@ impl<L: AsRef<[f64]>> Points<L> {
 
 /// f and f′ in a cell, from values and slopes at its ends.
 #[inline(always)]
-fn interpolate<V: Eight>(cell: &Cell<f64>, left: &[[f64; 8]; 2], right: &[[f64; 8]; 2]) -> (V, V) {
+pub(super) fn interpolate<V: Eight>(cell: &Cell<f64>, left: &[[f64; 8]; 2], right: &[[f64; 8]; 2]) -> (V, V) {
     let at = [V::load(&left[0]), V::load(&right[0]), V::load(&left[1]), V::load(&right[1])];
     (mix(&cell.value, &at), mix(&cell.slope, &at))
 }

@@ -112,13 +112,13 @@ impl Search {
         Some((*lowest, floor.fold(f64::INFINITY, f64::min)))
     }
 
-    /// Whether a point explains a reading by its minimum: neither its misfit nor its spread is more than noise makes it.
+    /// True where a point explains a reading by its minimum: neither its misfit nor its spread is more than noise makes it.
     #[inline(always)]
     pub fn is_explained(&self, whitened: &[[f64; 8]], minimum: &Minimum) -> bool {
         self.rule.is_explained(minimum.misfit) && !self.is_spread(whitened, minimum)
     }
 
-    /// Whether a reading is, by its minimum, that of a contact that is spread.
+    /// True for a reading that is, by its minimum, one of a contact that is spread.
     #[inline(always)]
     pub fn is_spread(&self, whitened: &[[f64; 8]], minimum: &Minimum) -> bool {
         // The square of the residual is at least that of its part.

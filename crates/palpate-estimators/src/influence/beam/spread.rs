@@ -1,9 +1,13 @@
 //! Directions of a spread about every place of a line, ready for the residuals of readings; see [`crate::spread`].
 
-use super::gauss_newton::{GaussNewton, Minimum, grouped};
+use super::gauss_newton::{GaussNewton, Minimum, grouped, interpolate};
 use super::table::InfluenceTable;
 use crate::influence::config::ForceBelief;
 use crate::spread::{About, SpreadDirections, spread_bound};
+use palpate_numerics::simd::{Arithmetic, Array, Eight, Vector};
+
+/// A group of eight channels: a reading is looked at by one minimum or two, which is no work worth a set of instructions.
+type Group = Array<f64, 8, false>;
 
 /// The direction of a spread in every cell of a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,22 +44,19 @@ impl SpreadTable {
         Self { units, calibrated, bound: spread_bound(1) }
     }
 
-    /// Whether the residual of a minimum is that of a contact that is spread.
+    /// True where the residual of a minimum is that of a contact that is spread.
     #[inline]
     pub fn is_told(&self, gauss_newton: &GaussNewton, whitened: &[[f64; 8]], minimum: &Minimum) -> bool {
         let (cell, groups) = (gauss_newton.spacing.cell(minimum.x_m), gauss_newton.groups);
         let node = cell.node as usize;
         let (left, right) = gauss_newton.rows[node * groups..][..2 * groups].split_at(groups);
         let units = &self.units[node * groups..][..groups];
-        let mut along = [0.0; 8];
+        let mut along = Group::splat(0.0);
         for (((d, unit), left), right) in whitened.iter().zip(units).zip(left).zip(right) {
-            let [v0, v1, v2, v3] = cell.value;
-            for l in 0..8 {
-                let f = v0 * left[0][l] + v1 * right[0][l] + (v2 * left[1][l] + v3 * right[1][l]);
-                along[l] += unit[l] * (d[l] - minimum.force_n * f);
-            }
+            let (f, _) = interpolate::<Group>(&cell, left, right);
+            along = along + Group::load(unit) * (Group::load(d) - Group::splat(minimum.force_n) * f);
         }
-        let z: f64 = along.iter().sum();
+        let z = along.sum();
         let grown = gauss_newton.weights_grown(minimum.force_n);
         let variance = 1.0 + (grown - 1.0) * self.calibrated[node];
         z > 0.0 && z * z > self.bound * variance

@@ -12,8 +12,9 @@
 //!
 //! and what the cells tell of the offset whatever the influence is a press without force that reads ô, of weight Σ w·(1 − φ̄²/φ_r²).
 
+use super::drift::END;
 use super::evidence::{ChannelFit, Evidence};
-use super::posterior::{END, of_equal_ratio};
+use super::posterior::of_equal_ratio;
 use super::presses::Presses;
 use super::prior::Prior;
 use crate::influence::measured::MeasuredError;
@@ -72,7 +73,7 @@ impl Presses {
         let all = All { presses: self, responses: prior.responses(self), prior };
         let mut order: Vec<usize> = (0..self.len()).collect();
         order.sort_by(|a, b| self.time[*a].total_cmp(&self.time[*b]));
-        let mut few = Self { repeated: self.repeated.clone(), ..self.select(&[]) };
+        let mut few = self.select(&[]);
         for cell in order.chunks((2 * self.len()).div_ceil(most)) {
             watch.round()?;
             few.add_pair(&all, cell, Some(estimate));
@@ -195,6 +196,7 @@ impl All<'_> {
         readings
     }
 
+    /// Rows of a press over the variance of one, relative to that of an untouched board.
     fn weight(&self, i: usize) -> f64 {
         self.presses.count[i] / self.prior.relative_noise_of(self.presses, i)
     }
@@ -213,6 +215,7 @@ impl All<'_> {
 struct Sums {
     position_m: Vec<f64>,
     weight: f64,
+    /// Mean.
     time: f64,
     /// Mean of φ/F̄, and of its square.
     response: f64,

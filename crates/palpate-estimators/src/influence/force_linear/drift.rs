@@ -3,6 +3,9 @@
 use palpate_numerics::regression::Kernel;
 use serde::{Deserialize, Serialize};
 
+/// Time of the recording's last row, for whose offset is asked: what is located comes after it.
+pub(super) const END: f64 = 1.0;
+
 /// Course of the drift, as a Gaussian process of the time from 0 at the recording's first row to 1 at its last.
 ///
 /// Whatever the course, the variance of what the drift changes from the first row to the last is 1.

@@ -5,8 +5,9 @@
 //! told by the estimate of the other before it, and the first by some of the presses alone.
 
 use super::condensed::Estimate;
+use super::drift::END;
 use super::evidence::ChannelFit;
-use super::posterior::{END, offsets};
+use super::posterior::offsets;
 use super::presses::Presses;
 use super::prior::Prior;
 use crate::influence::measured::MeasuredError;
@@ -18,8 +19,6 @@ pub(super) struct DriftFit {
     prior: Prior,
     fits: Vec<ChannelFit>,
     presses: Presses,
-    /// Mean and variance of the offset of every channel at the end of the recording.
-    at_the_end: Vec<(f64, f64)>,
 }
 
 impl Presses {
@@ -38,7 +37,8 @@ impl Presses {
         let mut drift = None;
         for _ in 0..ROUNDS {
             let estimate = Estimate::new(few, prior, fits)?;
-            let told = DriftFit::new(self.condensed_in_time(prior, &estimate, most, watch)?, prior, fits)?;
+            let presses = self.condensed_in_time(prior, &estimate, most, watch)?;
+            let told = DriftFit { prior: prior.clone(), fits: fits.to_vec(), presses };
             let still = told.taken_off(self)?;
             few = still.condensed(prior, fits, most, watch)?;
             drift = Some(told);
@@ -48,24 +48,24 @@ impl Presses {
 }
 
 impl DriftFit {
-    fn new(presses: Presses, prior: &Prior, fits: &[ChannelFit]) -> Result<Self, MeasuredError> {
-        let at_the_end = offsets(prior, &presses, fits, &[], &[END])?;
-        let at_the_end = at_the_end.iter().map(|of_channel| of_channel[0]).collect();
-        Ok(Self { prior: prior.clone(), fits: fits.to_vec(), presses, at_the_end })
+    /// Mean and variance of the offset of every channel at each of some times.
+    fn offsets_at(&self, times: &[f64]) -> Result<Vec<Vec<(f64, f64)>>, MeasuredError> {
+        offsets(&self.prior, &self.presses, &self.fits, &[], times)
     }
 
-    /// What every channel drifts from each of some times to the end of the recording, a row a channel.
+    /// The drift of every channel from each of some times to the end of the recording, a row a channel.
     pub fn until_the_end(&self, times: &[f64]) -> Result<Vec<Vec<f64>>, MeasuredError> {
-        let at_times = offsets(&self.prior, &self.presses, &self.fits, &[], times)?;
-        let of_channel = |(offsets, (end, _)): (Vec<(f64, f64)>, &(f64, f64))| {
-            offsets.into_iter().map(|(offset, _)| end - offset).collect()
+        let all = self.offsets_at(&[&[END], times].concat())?;
+        let of_channel = |offsets: Vec<(f64, f64)>| {
+            let (end, _) = offsets[0];
+            offsets[1..].iter().map(|(offset, _)| end - offset).collect()
         };
-        Ok(at_times.into_iter().zip(&self.at_the_end).map(of_channel).collect())
+        Ok(all.into_iter().map(of_channel).collect())
     }
 
     /// Variance of the offset of every channel at the end.
-    pub fn variances_at_the_end(&self) -> impl Iterator<Item = f64> {
-        self.at_the_end.iter().map(|(_, variance)| *variance)
+    pub fn variances_at_the_end(&self) -> Result<Vec<f64>, MeasuredError> {
+        Ok(self.offsets_at(&[END])?.iter().map(|of_channel| of_channel[0].1).collect())
     }
 
     /// Presses as they would read at the end.

@@ -5,13 +5,13 @@
 //! the process claims of them is checked, and its variance widened where it is too small. Presses that no function explains are set
 //! aside, and the rest learnt anew.
 
-use super::drift::DriftCourse;
+use super::drift::{DriftCourse, END};
 use super::drift_fit::DriftFit;
 use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
 use super::outliers::OutlierTest;
 use super::place_noise::PlaceNoise;
 use super::place_noise_search::PlaceNoiseSearch;
-use super::posterior::{END, Functions, functions, of_equal_ratio, offsets, readings};
+use super::posterior::{Functions, functions, of_equal_ratio, offsets, readings};
 use super::presses::{Presses, Repeats, compare};
 use super::prior::{Prior, Source};
 use crate::influence::config::Structure;
@@ -170,7 +170,7 @@ impl Learnt {
         let per_newton = 1.0 / self.prior.force_scale_n;
         let widening = self.widening * dependence(&self.prior, &self.presses);
         if let Some(drift) = &self.drift {
-            for (functions, variance) in functions.iter_mut().zip(drift.variances_at_the_end()) {
+            for (functions, variance) in functions.iter_mut().zip(drift.variances_at_the_end()?) {
                 functions.offset_variance += variance;
             }
         }

@@ -25,9 +25,9 @@ use crate::influence::levenberg::{Equations, Unknowns};
 use crate::lightest_touch::LightestTouch;
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::spread::{About, SpreadDirections, spread_bound};
+use crate::spread::{About, spread_bound, spread_score};
 use crate::status::{
-    Detection, Directions, FalseAlarmRate, NoiseBounds, learnt_bound, misfit_bound, unknowns,
+    Detection, Directions, FalseAlarmRate, NoiseBounds, learnt_bounds, misfit_bound, unknowns,
 };
 use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::{Contact, Position};
@@ -505,11 +505,12 @@ impl ForceLinearLocator {
     /// Sets the bound of the residual from the recording's own readings.
     pub(super) fn limit_residuals(&mut self, recording: &Recording) {
         let freedom = self.stored.live.len().saturating_sub(self.unknowns());
-        let readings = || recording.rows.iter().map(|row| row.reading.as_slice());
-        let seen = |reading: &[f64]| Inversion::new(self.seen(&self.relative(reading)));
-        let misfit = learnt_bound(misfit_bound(freedom), readings(), |reading| seen(reading).misfit());
-        let dimensions = self.stored.prior.extent.dimensions();
-        let spread = learnt_bound(spread_bound(dimensions), readings(), |reading| seen(reading).spread());
+        let readings = recording.rows.iter().map(|row| row.reading.as_slice());
+        let normal = [misfit_bound(freedom), spread_bound(self.stored.prior.extent.dimensions())];
+        let [misfit, spread] = learnt_bounds(normal, readings, |reading| {
+            let mut seen = Inversion::new(self.seen(&self.relative(reading)));
+            [seen.misfit(), seen.spread()]
+        });
         (self.stored.residual_limit, self.stored.spread_limit) = (misfit, Some(spread));
     }
 
@@ -711,15 +712,14 @@ impl Explain for Seen<'_> {
         let roots: Vec<f64> = self.weights.as_flattened().iter().map(|weight| weight.sqrt()).collect();
         let live = self.locator.stored.live.len();
         let mut values = Vec::new();
-        let mut reads = |[x, y, response_n]: Unknowns| -> Vec<f64> {
+        let reads = |[x, y, response_n]: Unknowns| -> Vec<f64> {
             self.locator.layers.interpolate([x, y], VALUES..VALUES + 1, &mut values);
             values.as_flattened()[..live].iter().zip(&roots).map(|(f, root)| root * response_n * f).collect()
         };
         let [x, y] = self.axes().map(|axis| (0.0, (axis.count - 1) as f64));
         let about = About { at, ends: [x, y, self.range().unwrap_or((at[2], at[2]))] };
-        let relative = self.reading.as_flattened().iter().zip(&roots);
-        let residual: Vec<f64> = relative.zip(reads(at)).map(|((d, root), reads)| root * d - reads).collect();
-        SpreadDirections::about(about, reads).score(&residual)
+        let reading = self.reading.as_flattened().iter().zip(&roots).map(|(d, root)| root * d);
+        spread_score(about, reading, reads)
     }
 
     /// φ is found in steps from about `latent`, each by the variances of the last.

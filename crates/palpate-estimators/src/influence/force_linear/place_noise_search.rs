@@ -65,9 +65,10 @@ impl PlaceNoiseSearch<'_> {
         let places_m = self.presses.positions_m();
         let dimensions = self.prior.extent.dimensions();
         // Presses that scatter with their force look like noise of the places of hard ones, and that like scatter.
-        let scattered = self.fitted(self.prior.clone(), None).map_or(f64::NEG_INFINITY, |found| found.total);
         let even = Prior { scatter: 0.0, ..self.prior.clone() };
         let Some(before) = self.fitted(even, None) else { return Ok(None) };
+        let scattered = if self.prior.scatter > 0.0 { self.fitted(self.prior.clone(), None) } else { None };
+        let rival = scattered.map_or(before.total, |scattered| scattered.total.max(before.total));
         let residuals = Residuals::new(self.presses, &before.prior, &before.fits, self.sensors_m)?;
         let with_gain = |shape: Shape| {
             let score = self.score(&before, &residuals, &PlaceNoise::even(&places_m, shape));
@@ -109,9 +110,7 @@ impl PlaceNoiseSearch<'_> {
             if let Shape::Smooth { .. } = shape {
                 theta = noise.coefficients().to_vec();
             }
-            let gain = found.total
-                - before.total.max(scattered)
-                - LEAST_MORE * noise.shape().parameters(dimensions) as f64;
+            let gain = found.total - rival - LEAST_MORE * noise.shape().parameters(dimensions) as f64;
             if gain > best.as_ref().map_or(LEAST_GAIN, |(most, _)| *most) {
                 best = Some((gain, noise));
             }

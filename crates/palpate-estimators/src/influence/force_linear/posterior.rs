@@ -6,6 +6,7 @@
 //! amplitude times what of its own functional the presses do not tell; the functions of several sources are averaged, and how far
 //! they are apart is variance.
 
+use super::drift::END;
 use super::evidence::{ChannelFit, Evidence, Restricted, SourceFit};
 use super::presses::Presses;
 use super::prior::Prior;
@@ -43,9 +44,6 @@ struct Functional<'a> {
 
 /// Functionals that are asked at once.
 const BLOCK: usize = 256;
-
-/// Share of the recording at whose end the offset is asked: what is located comes after it.
-pub(super) const END: f64 = 1.0;
 
 impl<'a> Functional<'a> {
     /// The offset at a time.

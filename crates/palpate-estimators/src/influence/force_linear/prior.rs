@@ -123,7 +123,7 @@ impl Prior {
         self.nonlinearity == 0.0
     }
 
-    /// Whether readings follow the force. Without an exponent in these bounds all forces are alike, or one of them is all there is.
+    /// True for readings that follow the force: beyond these exponents all forces are alike, or one of them is all there is.
     pub fn has_response(&self) -> bool {
         (0.2..=5.0).contains(&self.response)
     }

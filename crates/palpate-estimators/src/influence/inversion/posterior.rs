@@ -63,7 +63,7 @@ impl<E: Explain> Inversion<E> {
         minima.iter().map(|minimum| reading.spread(minimum.at)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether a point explains the reading: neither its misfit nor its spread is beyond its limit.
+    /// True where a point explains the reading: neither its misfit nor its spread is beyond its limit.
     fn is_explained(&mut self, limits: Limits) -> bool {
         let misfit = self.misfit();
         // The square of the residual is at least that of its part.

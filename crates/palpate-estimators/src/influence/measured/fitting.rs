@@ -10,7 +10,7 @@ use crate::influence::inversion::{Layers, Stencil};
 use crate::influence::noise::{Noise, Whitening};
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::status::{learnt_bound, misfit_bound};
+use crate::status::{learnt_bounds, misfit_bound};
 use ndarray::{Array1, Array2, s};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::{GaussianProcess, Regression, Samples};
@@ -262,7 +262,8 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     let fitted = [table.x, table.y, table.nuisance].iter().filter(|axis| axis.count > 1).count();
     let freedom = locator.whitening().channels().saturating_sub(fitted).max(1);
     let readings = recording.rows.iter().map(|row| row.reading.as_slice());
-    learnt_bound(misfit_bound(freedom), readings, |reading| locator.misfit(reading))
+    let [limit] = learnt_bounds([misfit_bound(freedom)], readings, |reading| [locator.misfit(reading)]);
+    limit
 }
 
 /// Distinct positions from which on some can be held out.

@@ -1,4 +1,4 @@
-//! How far contacts are from the edges of a plane, in what readings tell of it.
+//! Distances of contacts from the edges of a plane, in what readings tell of them.
 //!
 //! Beside an edge that a support holds readings keep their shape while their size goes to zero: what tells a place from the edge is the
 //! part of its readings that no contact at the edge has, whatever its force and its place along the edge.
@@ -28,26 +28,39 @@ impl Edges {
             let place = patches.place(x_m, y_m);
             (0..patches.groups).flat_map(|group| patches.value(&place, group)).collect()
         };
-        let distance = |node: usize, k: usize, side: f64| {
-            let (at, weights) =
-                (table.node(node), weights[node * patches.groups..][..patches.groups].as_flattened());
-            let at = [at.x_m, at.y_m];
+        // Readings at an edge across the k-th side, beside each node along it, and their change along the edge.
+        let at_edge = |k: usize, side: f64| -> Vec<[Vec<f64>; 2]> {
+            let count = [table.rows, table.columns][k];
             let beside = |along: f64| {
-                let mut place = at;
+                let mut place = [0.0; 2];
                 place[k] = side * size_m[k];
-                place[1 - k] += along * spacing_m[1 - k];
+                place[1 - k] = along * spacing_m[1 - k];
                 reading(place)
             };
-            let (before, behind) = (beside(-0.5), beside(0.5));
-            let along = before.iter().zip(&behind).map(|(before, behind)| behind - before).collect();
-            part_outside(reading(at), [beside(0.0), along], weights)
+            let of_node = |node: usize| {
+                let (before, behind) = (beside(node as f64 - 0.5), beside(node as f64 + 0.5));
+                let along = before.iter().zip(&behind).map(|(before, behind)| behind - before).collect();
+                [beside(node as f64), along]
+            };
+            (0..count).map(of_node).collect()
         };
-        let nearer = |node: usize, k: usize| distance(node, k, BESIDE).min(distance(node, k, 1.0 - BESIDE));
+        let edges = [0, 1].map(|k| [BESIDE, 1.0 - BESIDE].map(|side| at_edge(k, side)));
+        let of_node = |node: usize| {
+            let weights = weights[node * patches.groups..][..patches.groups].as_flattened();
+            let at = table.node(node);
+            let own = reading([at.x_m, at.y_m]);
+            let along = [node / table.columns, node % table.columns];
+            let nearer = |k: usize| {
+                let distances = edges[k].each_ref().map(|edge| part_outside(&own, &edge[along[k]], weights));
+                distances[0].min(distances[1])
+            };
+            [nearer(0), nearer(1)]
+        };
         Self {
             columns: table.columns,
             rows: table.rows,
             inverse_spacing: spacing_m.map(f64::recip),
-            per_newton: (0..table.nodes()).map(|node| [nearer(node, 0), nearer(node, 1)]).collect(),
+            per_newton: (0..table.nodes()).map(of_node).collect(),
         }
     }
 
@@ -70,17 +83,15 @@ impl Edges {
     }
 }
 
-/// Length of what is left of `of` without its parts along two others.
-fn part_outside(mut of: Vec<f64>, [first, mut second]: [Vec<f64>; 2], weights: &[f64]) -> f64 {
+/// Length of what is left of a reading without its parts along two others.
+fn part_outside(reading: &[f64], [first, second]: &[Vec<f64>; 2], weights: &[f64]) -> f64 {
     let product =
         |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).zip(weights).map(|((a, b), w)| w * a * b).sum() };
-    let without = |of: &mut [f64], other: &[f64]| {
+    let without = |of: &[f64], other: &[f64]| -> Vec<f64> {
         let square = product(other, other);
         let share = if square > 0.0 { product(of, other) / square } else { 0.0 };
-        of.iter_mut().zip(other).for_each(|(of, other)| *of -= share * other);
+        of.iter().zip(other).map(|(of, other)| of - share * other).collect()
     };
-    without(&mut second, &first);
-    without(&mut of, &first);
-    without(&mut of, &second);
-    product(&of, &of).sqrt()
+    let left = without(&without(reading, first), &without(second, first));
+    product(&left, &left).sqrt()
 }

@@ -10,16 +10,20 @@ use super::search::{Minimum, Search};
 use crate::influence::levenberg::{Unknowns, descend};
 use crate::trade_off::{CALIBRATED, likelihood_bound};
 use palpate_core::Uncertainty;
+use palpate_numerics::chi_squared_critical_value;
+use std::sync::OnceLock;
 
-/// Of a reading from which the best contact takes no more than so much beyond what it must, nothing is excluded.
+/// The part of a reading beyond what a contact must take off it, up to which nothing is excluded.
 ///
 /// A contact too soft to be found is found where noise makes its reading look like another's, which explains it better by what was missing
 /// and by χ² of the three unknowns, greater than this in 2 % of the readings. With the likelihood ratio alone 91 % of the places were covered
 /// where a third of the contacts are found (`plane/coverage.rs`).
-const FAINT: f64 = 9.84;
+fn faint() -> f64 {
+    const RATE: f64 = 0.02;
+    static KNOWN: OnceLock<f64> = OnceLock::new();
+    *KNOWN.get_or_init(|| chi_squared_critical_value(RATE, 3))
+}
 
-/// The most that the cost of a contact is above the least: q far from all edges.
-const MOST_ABOVE: f64 = CALIBRATED * 3.85;
 /// A step that lowers the misfit by less than this is the last one.
 const SMALL: f64 = 0.02;
 /// An end is as exact as this, in standard deviations.
@@ -54,18 +58,18 @@ pub(super) struct Looked {
     pub steps: [f64; 3],
 }
 
-/// Which of x, y and force is followed, and where to.
+/// One of x, y and force that is followed, and its way.
 #[derive(Clone, Copy, Debug)]
 struct Way {
     /// Its number among the three.
     unknown: usize,
     /// −1 downwards, 1 upwards.
     side: f64,
-    /// Where it ends at the latest.
+    /// Its last value at the latest.
     limit: f64,
 }
 
-/// A contact, and how far each of x, y and force is from being excluded with it.
+/// A contact, and the distance of each of x, y and force from being excluded with it.
 #[derive(Clone, Copy, Debug)]
 struct Found {
     at: Unknowns,
@@ -84,16 +88,18 @@ impl Search {
         estimate: Unknowns,
     ) -> NotExcluded {
         let limits = [self.size_m[0], self.size_m[1], self.greatest_force_n];
-        if self.rule.taken_beyond_cost(square, minima[0].misfit) <= FAINT {
+        if self.rule.taken_beyond_cost(square, minima[0].misfit) <= faint() {
             return NotExcluded(limits.map(|limit| (0.0, limit)));
         }
         let looked: Vec<Looked> =
             looked.chain(minima.iter().map(|minimum| self.looked_at(whitened, minimum))).collect();
         let least = looked.iter().map(|looked| looked.cost).fold(f64::INFINITY, f64::min);
         let reading = Reading { search: self, whitened, least };
+        // q far from all edges.
+        let most_above = CALIBRATED * likelihood_bound(f64::INFINITY);
         let likely: Vec<(Found, [f64; 3])> = looked
             .iter()
-            .filter(|looked| looked.cost - least <= MOST_ABOVE)
+            .filter(|looked| looked.cost - least <= most_above)
             .map(|looked| (reading.found(looked.at, looked.cost), looked.steps))
             .collect();
         let end = |unknown: usize, side: f64| {

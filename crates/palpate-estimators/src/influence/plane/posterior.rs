@@ -6,7 +6,7 @@
 //! the surface: near an edge it is cut off, where the readings tell little it is bent, and several minima share it. Of the coarse cells
 //! those that could matter are halved until the misfit is smooth within their parts, each with the force that is best there; a part that
 //! is too far from the reading is left out with all that it holds. The prior is flat over the surface, and in the size of the signal.
-//! Where nothing is known of the force, the intervals of what is no normal distribution are those of `not_excluded`.
+//! Intervals of what is no normal distribution are those of `not_excluded` where nothing is known of the force.
 
 use super::coarse::{MOST_VALLEYS, Profile};
 use super::not_excluded::Looked;
@@ -108,7 +108,7 @@ struct Surroundings {
     pub shape: Shape,
 }
 
-/// What the posterior is.
+/// Shape of the posterior.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shape {
     /// A normal distribution.
@@ -117,7 +117,7 @@ enum Shape {
     Bent,
     /// Summed up over parts of the surface.
     Summed,
-    /// Nothing that could be summed up.
+    /// None, of a reading that could not be summed up.
     Unexplained,
 }
 
@@ -195,7 +195,7 @@ impl Search {
         minimum.misfit + self.spread([minimum.at[0], minimum.at[1]])
     }
 
-    /// What the posterior of a mode is that is alone, by the misfit and the best force two standard deviations away along both axes.
+    /// Shape of the posterior of a mode that is alone, by the misfit and the best force two standard deviations away along both axes.
     fn shape(&self, whitened: &[f64], mode: &Mode) -> Shape {
         let [xx, xy, _, yy, _, ff] = mode.covariance;
         let [longer, shorter] = principal_variances([xx, xy, yy]).map(f64::sqrt);

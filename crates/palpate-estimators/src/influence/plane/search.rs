@@ -11,7 +11,7 @@ use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::influence::lanes::{LANES, Lanes};
 use crate::influence::levenberg::{Equations, Unknowns, descend};
-use crate::spread::{About, SpreadDirections, spread_bound};
+use crate::spread::{About, spread_bound, spread_score};
 use crate::status::{StatusRule, unknowns};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::small::{Matrix, add_outer};
@@ -35,7 +35,7 @@ pub(super) struct Search {
     /// The force of these weights, in newtons.
     weights_force_n: f64,
     pub coarse: Coarse,
-    /// How far contacts are from the edges, where their force is not known.
+    /// Distances of contacts from the edges, where their force is not known.
     pub edges: Edges,
     pub force: ForceBelief,
     /// Greatest force of a contact, in newtons; infinite where more is known of the force than that.
@@ -188,12 +188,12 @@ impl Search {
         (found, found[..kept].iter().take_while(matters).count().max(1))
     }
 
-    /// Whether a point explains a reading: its least misfit is one of noise, and by one minimum at least it is not spread.
+    /// True where a point explains a reading: its least misfit is one of noise, and by one minimum at least it is not spread.
     pub fn is_explained(&self, misfit: f64, minima: &[Minimum], whitened: &[f64]) -> bool {
         self.rule.is_explained(misfit) && minima.iter().any(|minimum| !self.is_spread(whitened, minimum))
     }
 
-    /// Whether a reading is, by its minimum, that of a contact that is spread.
+    /// True for a reading that is, by its minimum, one of a contact that is spread.
     fn is_spread(&self, whitened: &[f64], Minimum { at, misfit, .. }: &Minimum) -> bool {
         // The square of the residual is at least that of its part.
         if *misfit <= spread_bound(2) {
@@ -211,9 +211,8 @@ impl Search {
         };
         let force = self.force.known_n().map_or((0.0, self.greatest_force_n), |force_n| (force_n, force_n));
         let about = About { at: *at, ends: [(0.0, self.size_m[0]), (0.0, self.size_m[1]), force] };
-        let residual: Vec<f64> =
-            whitened.iter().zip(&roots).zip(reads(*at)).map(|((d, root), reads)| root * d - reads).collect();
-        SpreadDirections::about(about, reads).score(&residual) > spread_bound(2)
+        let reading = whitened.iter().zip(&roots).map(|(d, root)| root * d);
+        spread_score(about, reading, reads) > spread_bound(2)
     }
 
     /// About the least misfit in a coarse cell, of which the profile holds that without weights.

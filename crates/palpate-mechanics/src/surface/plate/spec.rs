@@ -266,7 +266,7 @@ pub enum Unsolvable {
 }
 
 impl Unsolvable {
-    /// What to do about it.
+    /// Advice on a remedy.
     pub fn help(&self) -> &'static str {
         "take fewer `elements`, or lengths and stiffnesses that are less far apart"
     }
