@@ -51,7 +51,7 @@ impl ReadingCheck {
         let mut methods = vec![Influence::default()];
         if task.setup.surface().model().is_some() {
             // Too few presses to correct mechanics by.
-            methods.push(Influence { from: InfluenceSource::Mechanics, ..Influence::default() });
+            methods.push(Influence { source: InfluenceSource::Mechanics, ..Influence::default() });
         }
         for method in methods {
             match method.fit_method(task) {

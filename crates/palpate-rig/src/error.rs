@@ -338,8 +338,15 @@ fn suggestion(word: &str, known: &[&'static str]) -> String {
     }
 }
 
-/// The known word that is a slip of the pen away: one edit, and one more for every four letters.
+/// Words that files had before, and those that they have now.
+const RENAMED: [(&str, &str); 1] = [("from", "source")];
+
+/// The known word that `word` was before, or that is a slip of the pen away: one edit, and one more for every four letters.
 fn closest(word: &str, known: &[&'static str]) -> Option<&'static str> {
+    let renamed = RENAMED.iter().find(|(before, now)| *before == word && known.contains(now));
+    if let Some((_, now)) = renamed {
+        return Some(now);
+    }
     let (distance, other) =
         known.iter().map(|other| (strsim::damerau_levenshtein(word, other), *other)).min()?;
     (distance <= 1 + word.chars().count() / 4).then_some(other)

@@ -79,7 +79,7 @@ pub(crate) struct NetworkKeys {
 #[serde(deny_unknown_fields)]
 pub(crate) struct InfluenceKeys {
     /// Source of the influence functions; `corrected` unless said otherwise.
-    pub from: Option<InfluenceSource>,
+    pub source: Option<InfluenceSource>,
     /// The most contacts that may touch at once, more than one only on a line with a model; 1 unless said otherwise.
     pub contacts: Option<Count<1, 3>>,
     /// Standard deviation of the contact's force about that of `[contact]`; 0 unless said otherwise.
@@ -203,7 +203,7 @@ impl InfluenceKeys {
             return Err(force_sd.place.unused(with));
         }
         Ok(Influence {
-            from: self.from.unwrap_or(default.from),
+            source: self.source.unwrap_or(default.source),
             contacts: self.contacts.map_or(default.contacts, Count::get),
             force_sd_n: self.force_sd.as_ref().map(|force_sd| force_sd.si),
             structure: self.structure,

@@ -265,6 +265,8 @@ fn a_bad_estimator_is_refused_with_a_caret() {
         with("input_scale = \"5 N\""),
         with("input_scale = \"fullscale\""),
         with("learning_rat = 0.7"),
+        pointed(&BENCH.replace(network, "kind = \"influence\"\nfrom = \"mechanics\"")),
+        pointed(&BENCH.replace(network, "kind = \"neighbours\"\nfrom = \"mechanics\"")),
     ];
     insta::assert_snapshot!(shown.join("\n\n"));
 }

@@ -20,8 +20,8 @@ fn main() {
     let text = include_str!("../../../examples/paper.toml").replace("repeats = 1", "repeats = 10");
     let rig = Rig::from_toml(&text).expect("the paper's rig is sound");
     let recording = rig.simulate(0).expect("the paper's rig can be simulated");
-    for from in [InfluenceSource::Recording, InfluenceSource::Corrected] {
-        let config = Influence { from, ..Influence::default() };
+    for source in [InfluenceSource::Recording, InfluenceSource::Corrected] {
+        let config = Influence { source, ..Influence::default() };
         let times: Vec<f64> = (0..21)
             .map(|_| {
                 let start = ThreadTime::now();
@@ -29,7 +29,7 @@ fn main() {
                 start.elapsed().as_secs_f64()
             })
             .collect();
-        println!("fit of 10 × 10 presses, {from:?}: {:.2} ms", median(times).expect("rounds") * 1e3);
+        println!("fit of 10 × 10 presses, {source:?}: {:.2} ms", median(times).expect("rounds") * 1e3);
     }
     for force_n in [Some(3.0), None] {
         let setup = rig.setup.clone().with_force(force_n).expect("a force is more than 0");

@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::fs;
 
 /// Sections that the example lacks for presses at points.
-const PRESSED: &str = "\n[training]\ncount = 2\nrepeats = 5\nforce = \"3 N\"\n[estimator]\nkind = \"influence\"\nfrom = \"mechanics\"\n";
+const PRESSED: &str = "\n[training]\ncount = 2\nrepeats = 5\nforce = \"3 N\"\n[estimator]\nkind = \"influence\"\nsource = \"mechanics\"\n";
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))

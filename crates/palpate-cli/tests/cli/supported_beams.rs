@@ -53,7 +53,7 @@ fn the_continuous_beam_is_located_at_the_limit() {
     assert!((0.9..1.1).contains(&known), "{known}");
     let unknown = limit_ratio(unknown_force(CONTINUOUS_BEAM));
     assert!((0.9..1.1).contains(&unknown), "{unknown}");
-    let from_recording = limit_ratio(Toml::parse(CONTINUOUS_BEAM).add("estimator.from", "recording"));
+    let from_recording = limit_ratio(Toml::parse(CONTINUOUS_BEAM).add("estimator.source", "recording"));
     assert!((0.9..1.2).contains(&from_recording), "{from_recording}");
 }
 

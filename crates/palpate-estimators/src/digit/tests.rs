@@ -282,7 +282,7 @@ fn for_small_forces_influence_functions_are_at_the_limit() {
     let rig = fixtures::digit(ForceDirection::Normal, 0.3);
     let recording = rig.simulate(1);
     let config = Estimator::Influence(crate::influence::Influence {
-        from: crate::influence::InfluenceSource::Mechanics,
+        source: crate::influence::InfluenceSource::Mechanics,
         ..Default::default()
     });
     let locator = config.fit(&rig.setup, &recording).unwrap();

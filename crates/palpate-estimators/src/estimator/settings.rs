@@ -65,7 +65,7 @@ fn nodes(hidden: &[usize]) -> String {
 }
 
 fn influence(config: Influence) -> Vec<Setting> {
-    let from = match config.from {
+    let source = match config.source {
         InfluenceSource::Recording => "the recording alone",
         InfluenceSource::Mechanics => "the mechanics alone",
         InfluenceSource::Corrected => "the mechanics, corrected by the recording",
@@ -75,7 +75,7 @@ fn influence(config: Influence) -> Vec<Setting> {
         None => "as the bench says: known, or unknown".to_owned(),
     };
     vec![
-        Setting::new("from", "influence functions from", from),
+        Setting::new("source", "influence functions from", source),
         Setting::new("contacts", "contacts at once, at most", config.contacts.to_string()),
         Setting::new("force_sd", "contact force", force),
         false_alarms(config.false_alarm_rate),
@@ -90,7 +90,7 @@ fn measured_influence(config: Influence) -> Vec<Setting> {
         Structure::Free => "free",
     };
     vec![
-        Setting::new("from", "influence functions from", "the recording alone"),
+        Setting::new("source", "influence functions from", "the recording alone"),
         Setting::new("structure", "structure of the readings", structure),
         false_alarms(config.false_alarm_rate),
     ]

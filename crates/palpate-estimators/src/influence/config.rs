@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Influence {
     /// Source of the influence functions.
-    pub from: InfluenceSource,
+    pub source: InfluenceSource,
     /// The most contacts that may touch at once; 1 to 3.
     pub contacts: usize,
     /// Standard deviation of the contact's force about the bench's, in newtons, where it is known only roughly.
@@ -53,7 +53,7 @@ pub enum InfluenceSource {
 impl Default for Influence {
     fn default() -> Self {
         Self {
-            from: InfluenceSource::Corrected,
+            source: InfluenceSource::Corrected,
             contacts: 1,
             force_sd_n: None,
             structure: Structure::Auto,

@@ -41,7 +41,7 @@ impl LearntInfluence<'_, '_> {
 
 /// Learns the influence functions of all living sensors at `places`, and hands each, with the sensor's number, to `take`.
 pub(super) fn learn(
-    Influence { from, false_alarm_rate, .. }: Influence,
+    Influence { source, false_alarm_rate, .. }: Influence,
     task: FitTask,
     places: &[Position],
     take: &mut dyn FnMut(usize, &LearntInfluence),
@@ -50,7 +50,7 @@ pub(super) fn learn(
     let layout = task.setup.layout();
     check_sensors(layout)?;
     let presses = Presses::average(task.recording)?.thinned(MOST_LEARNT);
-    let needed = match (from, surface.extent().dimensions()) {
+    let needed = match (source, surface.extent().dimensions()) {
         (InfluenceSource::Recording, 1) => 3,
         // A plane's simplest curved surface has six numbers.
         (InfluenceSource::Recording, _) => 6,
@@ -68,7 +68,7 @@ pub(super) fn learn(
         greatest_force_n: task.setup.greatest_force_n(),
         false_alarm_rate,
     };
-    let learning = Learning { from, surface, layout, presses: &presses, places };
+    let learning = Learning { source, surface, layout, presses: &presses, places };
     for kind in SensorKind::ALL {
         let is_meant = |s: &usize| {
             let sensor = &layout.sensors()[*s];
@@ -95,7 +95,7 @@ fn check_sensors(layout: &Layout) -> Result<(), InfluenceFitError> {
 
 /// Task of learning: source, presses, and the places to learn at.
 struct Learning<'a> {
-    from: InfluenceSource,
+    source: InfluenceSource,
     surface: &'a dyn Surface,
     layout: &'a Layout,
     presses: &'a Presses,
@@ -112,8 +112,8 @@ impl<'a> Learning<'a> {
         channels: &mut Channels,
         take: &mut dyn FnMut(usize, &LearntInfluence),
     ) -> Result<(), InfluenceFitError> {
-        let Self { from, surface, layout, presses, places } = *self;
-        let mean = if from == InfluenceSource::Recording { Mean::Zero } else { Mean::Model };
+        let Self { source, surface, layout, presses, places } = *self;
+        let mean = if source == InfluenceSource::Recording { Mean::Zero } else { Mean::Model };
         let pressed: Vec<Position> = presses.presses.iter().map(|press| press.position).collect();
         let remainders = Remainders::new(surface, kind, &pressed, places, watch)?;
         let prior = |s: &usize| -> Result<Prior<'a>, Cancelled> {
@@ -135,7 +135,7 @@ impl<'a> Learning<'a> {
         let is_reaction_alone = mean == Mean::Zero && kind == SensorKind::Reaction && has_one_force;
         let told = Told { noise: noise_is_told, offset: is_reaction_alone };
         let mut hyper = most_probable(&searched, mean, surface.length_m(), told);
-        if from == InfluenceSource::Mechanics {
+        if source == InfluenceSource::Mechanics {
             hyper = Hyperparameters { noise: hyper.noise, ..Hyperparameters::NONE };
         }
         for (done, (prior, &s)) in priors.iter().zip(living).enumerate() {

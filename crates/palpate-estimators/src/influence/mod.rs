@@ -127,7 +127,7 @@ impl Influence {
     /// correct.
     fn check_measured(&self) -> Result<(), InfluenceFitError> {
         match self {
-            Self { from: InfluenceSource::Mechanics, .. } => Err(InfluenceFitError::NoModel),
+            Self { source: InfluenceSource::Mechanics, .. } => Err(InfluenceFitError::NoModel),
             Self { contacts: 2.., .. } => {
                 Err(InfluenceFitError::NotOnMeasured { what: "telling several contacts apart" })
             }

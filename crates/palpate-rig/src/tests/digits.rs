@@ -21,7 +21,7 @@ fn a_bad_digit_is_refused_with_a_caret() {
             ("\"4 N\"", "\"40 N\""),
             ("[training]", "[contact]\nforce = \"15 N\"\n[training]"),
             ("[estimator]", "[estimator]\ntheory = \"lineal\""),
-            ("[estimator]", "[estimator]\nfrom = \"mechanics\""),
+            ("[estimator]", "[estimator]\nsource = \"mechanics\""),
         ],
     );
     let without = pointed(&DIGIT.replacen("direction", "#", 1));

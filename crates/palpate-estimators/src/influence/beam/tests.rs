@@ -57,10 +57,10 @@ fn limit_m(setup: &Setup, x_m: f64, force_known: bool) -> f64 {
 
 #[test]
 fn clean_presses_locate_to_a_thousandth_of_a_percent() {
-    for from in SOURCES {
+    for source in SOURCES {
         let rig = paper(0.0, 1);
         let recording = rig.simulate(1);
-        let locator = fit(Influence { from, ..Influence::default() }, &rig.setup, &recording);
+        let locator = fit(Influence { source, ..Influence::default() }, &rig.setup, &recording);
         let errors: Vec<f64> = (1..400)
             .map(|mm| {
                 let x_m = f64::from(mm) / 1e3;
@@ -69,9 +69,9 @@ fn clean_presses_locate_to_a_thousandth_of_a_percent() {
             })
             .collect();
         let percent = errors.iter().sum::<f64>() / 399.0 / 0.4 * 100.0;
-        eprintln!("{from:?}, clean: average error {percent:.2e} %");
-        assert!(percent <= 0.001, "{from:?}: {percent} %");
-        assert!(errors.iter().all(|error| *error < 2e-3), "{from:?}: effective length");
+        eprintln!("{source:?}, clean: average error {percent:.2e} %");
+        assert!(percent <= 0.001, "{source:?}: {percent} %");
+        assert!(errors.iter().all(|error| *error < 2e-3), "{source:?}: effective length");
     }
 }
 
@@ -84,7 +84,7 @@ struct Faults {
 }
 
 /// Mean error over the limit's mean error, and the share of intervals that hold the truth, over 5–395 mm.
-fn ratio_and_coverage(from: InfluenceSource, force_known: bool, faults: Faults) -> (f64, f64) {
+fn ratio_and_coverage(source: InfluenceSource, force_known: bool, faults: Faults) -> (f64, f64) {
     let (mut error_m, mut limit, mut covered, mut count) = (0.0, 0.0, 0, 0);
     for seed in 0..40 {
         let mut rig = paper(5e-6, 10);
@@ -102,7 +102,7 @@ fn ratio_and_coverage(from: InfluenceSource, force_known: bool, faults: Faults) 
             row.reading = measure(rig.setup.layout(), &truth, &errors, &mut rng);
         }
         let setup = known.with_force(force_known.then_some(3.0)).unwrap();
-        let mut locator = fit(Influence { from, ..Influence::default() }, &setup, &recording);
+        let mut locator = fit(Influence { source, ..Influence::default() }, &setup, &recording);
         if let Some(channel) = faults.dead {
             assert!(locator.leave_out(channel));
             rig.setup.set_dead(channel, true);
@@ -126,19 +126,19 @@ fn ratio_and_coverage(from: InfluenceSource, force_known: bool, faults: Faults) 
     }
     let (ratio, coverage) = (error_m / limit, covered as f64 / f64::from(count));
     let force = if force_known { "known" } else { "unknown" };
-    eprintln!("{from:?}, force {force}, {faults:?}: {ratio:.3} × limit, {:.1} % covered", 100.0 * coverage);
+    eprintln!("{source:?}, force {force}, {faults:?}: {ratio:.3} × limit, {:.1} % covered", 100.0 * coverage);
     (ratio, coverage)
 }
 
 #[test]
 fn noisy_presses_locate_at_the_limit_and_intervals_hold_what_they_say() {
-    for from in SOURCES {
+    for source in SOURCES {
         for (force_known, bound) in [(true, 1.06), (false, 1.15)] {
             for dead in [None, Some(3)] {
                 let (ratio, coverage) =
-                    ratio_and_coverage(from, force_known, Faults { dead, ..Faults::default() });
-                assert!(ratio < bound, "{from:?}, known {force_known}, dead {dead:?}: {ratio}");
-                assert!((0.93..0.97).contains(&coverage), "{from:?}, known {force_known}: {coverage}");
+                    ratio_and_coverage(source, force_known, Faults { dead, ..Faults::default() });
+                assert!(ratio < bound, "{source:?}, known {force_known}, dead {dead:?}: {ratio}");
+                assert!((0.93..0.97).contains(&coverage), "{source:?}, known {force_known}: {coverage}");
             }
         }
     }
@@ -154,11 +154,11 @@ fn unknown_gains_offsets_and_places_cost_little() {
         ..ChannelModel::default()
     };
     let faults = Faults { channel: Some(channel), dead: None };
-    for from in SOURCES {
+    for source in SOURCES {
         for force_known in [true, false] {
-            let (ratio, coverage) = ratio_and_coverage(from, force_known, faults);
-            assert!(ratio < 1.2, "{from:?}, known {force_known}: {ratio}");
-            assert!((0.93..0.97).contains(&coverage), "{from:?}, known {force_known}: {coverage}");
+            let (ratio, coverage) = ratio_and_coverage(source, force_known, faults);
+            assert!(ratio < 1.2, "{source:?}, known {force_known}: {ratio}");
+            assert!((0.93..0.97).contains(&coverage), "{source:?}, known {force_known}: {coverage}");
         }
     }
 }
@@ -273,9 +273,9 @@ fn presses_that_say_too_little_are_refused() {
     let refuse = |config: Influence, setup: &Setup, recording: &Recording| {
         config.fit_beam(FitTask::new(setup, recording)).unwrap_err()
     };
-    let from = InfluenceSource::Recording;
+    let source = InfluenceSource::Recording;
     recording.rows.truncate(2);
-    let error = refuse(Influence { from, ..Influence::default() }, &rig.setup, &recording);
+    let error = refuse(Influence { source, ..Influence::default() }, &rig.setup, &recording);
     assert_eq!(error, InfluenceFitError::TooFewPositions { needed: 3, found: 2 });
     recording.rows[1].force_n = None;
     let error = refuse(Influence::default(), &rig.setup, &recording);

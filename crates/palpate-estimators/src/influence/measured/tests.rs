@@ -355,7 +355,7 @@ fn settings_that_need_mechanics_are_refused() {
         let task = FitTask::new(&setup, &recording);
         config.fit_method(task).unwrap_err().to_string()
     };
-    assert!(refused(Influence { from: InfluenceSource::Mechanics, ..good }).contains("no mechanics"));
+    assert!(refused(Influence { source: InfluenceSource::Mechanics, ..good }).contains("no mechanics"));
     assert!(refused(Influence { contacts: 2, ..good }).contains("several contacts"));
     assert!(refused(Influence { force_sd_n: Some(0.1), ..good }).contains("`force_sd`"));
     assert!(refused(good).contains("0 distinct positions"));

@@ -56,8 +56,8 @@ const CALIBRATIONS: u64 = 2;
 const SIDE: usize = 28;
 
 /// Locators from [`CALIBRATIONS`] calibrations with 5 N.
-fn calibrated(rig: &Example, from: InfluenceSource) -> Vec<PlaneLocator> {
-    let config = Influence { from, ..Influence::default() };
+fn calibrated(rig: &Example, source: InfluenceSource) -> Vec<PlaneLocator> {
+    let config = Influence { source, ..Influence::default() };
     (0..CALIBRATIONS).map(|seed| fit(config, &rig.setup, &rig.simulate(seed))).collect()
 }
 
@@ -131,21 +131,21 @@ const SOURCES: [InfluenceSource; 3] =
 fn the_plate_is_located_at_the_limit_and_ellipses_hold_what_they_say() {
     let rig = rig();
     let ranges = [0.0..3.0, 3.0..10.0, 10.0..15.0, 15.0..f64::INFINITY];
-    for from in SOURCES {
-        let known = calibrated(&rig, from);
+    for source in SOURCES {
+        let known = calibrated(&rig, source);
         let unknown: Vec<PlaneLocator> = known.iter().map(without_force).collect();
         for (force, locators) in [(Force::Known, known), (Force::Unknown, unknown)] {
-            eprintln!("{from:?}, force {}", force.name());
+            eprintln!("{source:?}, force {}", force.name());
             let touches = touches(&rig, &locators, force);
             let _ = ranges.clone().map(|range| summed(&touches, range));
             // Where an unbiased estimator can be off by more than the plate, the limit is far above any error, and so the
             // ratio is held where the limit is a bound, too.
             let (everywhere, covered) = summed(&touches, 0.0..f64::INFINITY);
             let (where_it_binds, _) = summed(&touches, 0.0..10.0);
-            assert!(everywhere <= 1.2 && where_it_binds <= 1.2, "{from:?}, {force:?}");
+            assert!(everywhere <= 1.2 && where_it_binds <= 1.2, "{source:?}, {force:?}");
             // Without mechanics the remainder's evidence, from 36 places, is itself uncertain.
-            let least = if from == InfluenceSource::Recording { 0.91 } else { 0.93 };
-            assert!((least..=0.97).contains(&covered), "{from:?}, {force:?}: {covered}");
+            let least = if source == InfluenceSource::Recording { 0.91 } else { 0.93 };
+            assert!((least..=0.97).contains(&covered), "{source:?}, {force:?}: {covered}");
         }
     }
 }
@@ -365,7 +365,7 @@ fn what_a_plane_cannot_do_is_refused_in_words() {
         "the surface is a plane: telling several contacts apart works on a line, such as a beam, only"
     );
     recording.rows.truncate(25);
-    let from = InfluenceSource::Recording;
-    let few = refuse(Influence { from, ..Influence::default() }, &recording);
+    let source = InfluenceSource::Recording;
+    let few = refuse(Influence { source, ..Influence::default() }, &recording);
     assert_eq!(few, InfluenceFitError::TooFewPositions { needed: 6, found: 5 });
 }

@@ -16,14 +16,14 @@ fn rig() -> Example {
 }
 
 fn likelihood(rig: &Example, force_n: Option<f64>) -> PlateLikelihood {
-    likelihood_from(Influence::default().from, rig, force_n)
+    likelihood_from(Influence::default().source, rig, force_n)
 }
 
-fn likelihood_from(from: InfluenceSource, rig: &Example, force_n: Option<f64>) -> PlateLikelihood {
+fn likelihood_from(source: InfluenceSource, rig: &Example, force_n: Option<f64>) -> PlateLikelihood {
     let recording = rig.simulate(1);
     let setup = rig.setup.clone().with_force(force_n).unwrap();
     let task = FitTask::new(&setup, &recording);
-    let config = Influence { from, ..Influence::default() };
+    let config = Influence { source, ..Influence::default() };
     match config.fit_method(task).unwrap() {
         InfluenceLocator::Plane(plane) => PlateLikelihood::new(&plane),
         other => panic!("{other:?}"),
