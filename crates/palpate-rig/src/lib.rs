@@ -1,8 +1,9 @@
 //! The rig file and the study file: TOML documents that say what is on the bench, read into the types of palpate.
 //!
 //! A [`Rig`] says which surface is touched, what its sensors read, where it is pressed to calibrate it, and which estimator
-//! locates. A [`Study`] is a rig with arms, each of which replaces some of its sections. Values are checked as they are read: an
-//! unknown key, a wrong unit, a value outside its bounds is a [`RigError`], which knows its place in the text.
+//! locates; [`RigSections`] are parts of one, read by themselves. A [`Study`] is a rig with arms, each of which replaces some of its
+//! sections. Values are checked as they are read: an unknown key, a wrong unit, a value outside its bounds is a [`RigError`], which knows
+//! its place in the text.
 //!
 //! ```
 //! use palpate_estimators::fit::Fit;
@@ -52,6 +53,7 @@ mod first_rig;
 mod motion;
 mod recording;
 mod rig;
+mod sections;
 mod sensors;
 mod study;
 mod surface;
@@ -61,6 +63,7 @@ mod values;
 pub use error::{RigError, RigProblem};
 pub use first_rig::{FirstRig, FirstRigError, Hints};
 pub use rig::{Rig, RigSimulationError};
+pub use sections::RigSections;
 pub use study::{Arm, AskedLayout, Judging, Study};
 
 #[cfg(test)]

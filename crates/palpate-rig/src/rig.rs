@@ -1,28 +1,17 @@
 //! The rig: a bench with its calibration and estimator, read from one file.
 
-use serde::Deserialize;
-
 use palpate_design::sensors::SensorDesign;
 use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::Estimator;
 use palpate_estimators::evaluation::{Calibration, Split};
 use palpate_estimators::recording::{Recording, TimedRecording};
-use palpate_estimators::setup::{Setup, SetupError};
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::{MovingContacts, SimulateError, simulate_moving};
-use palpate_mechanics::sensing::Layout;
-use palpate_mechanics::surface::{SurfaceSpec, UniformLoad};
+use palpate_mechanics::surface::UniformLoad;
 use palpate_numerics::OutOfRange;
 
-use crate::design::DesignKeys;
-use crate::document::{self, At};
-use crate::error::{RigError, RigProblem};
-use crate::estimator::EstimatorKeys;
-use crate::motion::{self, MotionKeys};
-use crate::recording::RecordingKeys;
-use crate::sensors::{self, SensorsKeys};
-use crate::surface::SurfaceKeys;
-use crate::training::{ContactKeys, LoadKeys, TrainingKeys, check_force};
-use crate::values::OneOrMany;
+use crate::error::RigError;
+use crate::sections::RigSections;
 
 /// A bench, where to press it, and the method that then locates: all checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +50,23 @@ impl Rig {
     /// # Ok::<(), palpate_rig::RigError>(())
     /// ```
     pub fn from_toml(text: &str) -> Result<Self, RigError> {
-        document::read::<RigFile>("", &document::parse(text)?)?.build()
+        Self::from_sections(&RigSections::from_toml(text)?)
+    }
+
+    /// The rig that sections make together.
+    ///
+    /// # Errors
+    /// [`RigError`] for a section that is missing, or that does not go with the others.
+    pub fn from_sections(sections: &RigSections) -> Result<Self, RigError> {
+        let setup = sections.setup()?;
+        Ok(Self {
+            training: sections.training(&setup)?,
+            estimator: sections.estimator(&setup)?.unwrap_or_default(),
+            loads: sections.loads(setup.surface())?,
+            motion: sections.motion(&setup)?,
+            design: sections.design(&setup)?,
+            setup,
+        })
     }
 
     /// The bench as it is when pressed to calibrate: with the force of the training presses.
@@ -153,95 +158,4 @@ pub enum RigSimulationError {
     /// A bench that cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-}
-
-/// Greatest number of values that a recording of the training positions should hold in memory.
-const MOST_VALUES: usize = 100_000_000;
-
-/// A rig file.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct RigFile {
-    /// The elastic body that is touched; every rig has it.
-    pub surface: Option<At<SurfaceKeys>>,
-    /// The sensors; every rig has some.
-    pub sensors: Option<At<OneOrMany<SensorsKeys>>>,
-    /// The contacts to be located.
-    pub contact: Option<ContactKeys>,
-    /// The presses of a calibration.
-    pub training: Option<At<TrainingKeys>>,
-    /// The method that locates; the founding paper's network unless said otherwise.
-    pub estimator: Option<EstimatorKeys>,
-    /// Columns of a CSV file by their roles.
-    pub recording: Option<At<RecordingKeys>>,
-    /// Motions of contacts.
-    pub motion: Option<At<OneOrMany<MotionKeys>>>,
-    /// Forces spread over parts of the surface.
-    #[serde(default)]
-    pub load: Vec<At<LoadKeys>>,
-    /// Candidates of a sensor design, and its constraints.
-    pub design: Option<At<DesignKeys>>,
-}
-
-impl RigFile {
-    /// Checks the sections beside each other.
-    ///
-    /// # Errors
-    /// [`RigError`] for the first thing that is wrong.
-    pub fn build(&self) -> Result<Rig, RigError> {
-        let missing = |section| RigProblem::MissingSection { section }.without_place();
-        let surface_keys = self.surface.as_ref().ok_or_else(|| missing("[surface]"))?;
-        let sensors = self.sensors.as_ref().ok_or_else(|| missing("[sensors]"))?;
-        let contact_force = self.contact.as_ref().and_then(|contact| contact.force.as_ref());
-        let force_n = contact_force.map(|force| force.si);
-
-        let surface = surface_keys.build()?;
-        let layout = sensors::build(sensors, self.recording.as_deref(), &surface)?;
-        check_force(contact_force, &surface)?;
-        let greatest_force_n = match &self.contact {
-            Some(contact) => contact.greatest_force_n(&surface)?,
-            None => None,
-        };
-        let training = self.training(&surface, &layout, force_n)?;
-        let estimator = match &self.estimator {
-            Some(keys) => keys.build(&layout, force_n)?,
-            None => Default::default(),
-        };
-        let loads = self.load.iter().map(|load| load.build(&surface)).collect::<Result<_, _>>()?;
-        let columns =
-            self.recording.as_ref().map(|keys| keys.build(&layout, surface.extent())).transpose()?;
-        let moving = |keys| motion::build(keys, &surface, surface_keys.density(), force_n);
-        let motion = self.motion.as_ref().map(moving).transpose()?;
-        let setup = Setup::new(surface).with_layout(layout).map_err(SetupError::from);
-        let setup =
-            setup.and_then(|setup| Ok(setup.with_force(force_n)?.with_greatest_force(greatest_force_n)?));
-        let mut setup = setup.map_err(|error| RigProblem::Setup(error).without_place())?;
-        if let Some(columns) = columns {
-            setup = setup.recorded_as(columns);
-        }
-        let design = self.design.as_ref().map(|keys| keys.build(&setup)).transpose()?;
-        Ok(Rig { setup, training, estimator, loads, motion, design })
-    }
-
-    /// The training positions, of which the readings can be simulated or are recorded.
-    fn training(
-        &self,
-        surface: &SurfaceSpec,
-        layout: &Layout,
-        force_n: Option<f64>,
-    ) -> Result<Option<Training>, RigError> {
-        let Some(keys) = &self.training else { return Ok(None) };
-        let training = keys.build(surface.extent())?;
-        let simulated = surface.model().is_some() && self.recording.is_none();
-        if simulated && training.force_n.or(force_n).is_none() {
-            return Err(RigProblem::NoForce.at_place(&keys.place));
-        }
-        check_force(keys.force.as_ref(), surface)?;
-        let values = training.count.saturating_mul(training.repeats).saturating_mul(layout.len());
-        if values > MOST_VALUES {
-            let value = format!("{values} values, positions × repeats × sensors");
-            return Err(keys.place.refuse_as(value, format!("at most {MOST_VALUES}")));
-        }
-        Ok(Some(training))
-    }
 }

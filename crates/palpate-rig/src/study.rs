@@ -18,7 +18,8 @@ use crate::design::DesignKeys;
 use crate::document::{self, At, place};
 use crate::error::{RigError, RigProblem};
 use crate::estimator::EstimatorKeys;
-use crate::rig::{Rig, RigFile};
+use crate::rig::Rig;
+use crate::sections::{RigFile, RigSections};
 use crate::sensors::SensorsKeys;
 use crate::surface::SurfaceKeys;
 use crate::training::{ContactKeys, TrainingKeys};
@@ -232,7 +233,7 @@ impl ArmKeys {
             ..RigFile::default()
         };
         let layout = self.asked_layout()?;
-        let rig = rig.build()?;
+        let rig = Rig::from_sections(&RigSections::from(rig))?;
         if let (Some(surface), None) = (&base.surface, rig.setup.surface().model()) {
             return Err(surface.place.refuse_as("measured", "a surface with a model: a study simulates it"));
         }

@@ -2,6 +2,7 @@ mod digits;
 mod loads;
 mod planes;
 mod plates;
+mod sections;
 
 use super::*;
 use palpate_estimators::arrangement::Arrangement;

@@ -25,7 +25,7 @@ pub fn page(root: &Path) -> Result<String> {
         types.find(&folder.join(file), name).with_context(|| format!("there is no {name} in {file}"))
     };
     let mut page = Page { types: &types, text: HEAD.to_owned(), told: BTreeMap::new() };
-    page.sections("The rig", find("rig.rs", "RigFile")?);
+    page.sections("The rig", find("sections.rs", "RigFile")?);
     page.sections("The study", find("study.rs", "StudyFile")?);
     Ok(page.text.trim_end().to_owned() + "\n")
 }

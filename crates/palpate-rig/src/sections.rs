@@ -1,0 +1,182 @@
+//! The sections of a rig, each read by itself: what somebody needs who has a surface and sensors, but no whole rig.
+
+use serde::Deserialize;
+
+use palpate_design::sensors::SensorDesign;
+use palpate_estimators::arrangement::Training;
+use palpate_estimators::estimator::Estimator;
+use palpate_estimators::setup::{Setup, SetupError};
+use palpate_estimators::simulate::MovingContacts;
+use palpate_mechanics::surface::{SurfaceSpec, UniformLoad};
+
+use crate::design::DesignKeys;
+use crate::document::{self, At};
+use crate::error::{RigError, RigProblem};
+use crate::estimator::EstimatorKeys;
+use crate::motion::{self, MotionKeys};
+use crate::recording::RecordingKeys;
+use crate::sensors::{self, SensorsKeys};
+use crate::surface::SurfaceKeys;
+use crate::training::{ContactKeys, LoadKeys, TrainingKeys, check_force};
+use crate::values::OneOrMany;
+
+/// Sections of a rig: those that a text has, whichever they are. Keys and single values are checked; what a section makes with others is
+/// checked where it is built.
+///
+/// ```
+/// use palpate_rig::RigSections;
+///
+/// let bench = RigSections::from_toml(
+///     r#"
+///     surface = { kind = "beam", length = "400 mm", width = "40 mm", thickness = "1.2 mm", youngs_modulus = "200 GPa" }
+///     sensors = { measure = "deflection", count = 8, noise = "5 um" }
+///     "#,
+/// )?;
+/// let setup = bench.setup()?;
+/// assert_eq!(bench.training(&setup)?, None);
+///
+/// let presses = RigSections::from_toml(r#"training = { count = 10, repeats = 5, force = "3 N" }"#)?;
+/// let training = presses.training(&setup)?.expect("the text has a section [training]");
+/// assert_eq!(setup.simulate(&training, 0)?.rows.len(), 50);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct RigSections(RigFile);
+
+/// A rig file.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RigFile {
+    /// The elastic body that is touched; every rig has it.
+    pub surface: Option<At<SurfaceKeys>>,
+    /// The sensors; every rig has some.
+    pub sensors: Option<At<OneOrMany<SensorsKeys>>>,
+    /// The contacts to be located.
+    pub contact: Option<ContactKeys>,
+    /// The presses of a calibration.
+    pub training: Option<At<TrainingKeys>>,
+    /// The method that locates; the founding paper's network unless said otherwise.
+    pub estimator: Option<EstimatorKeys>,
+    /// Columns of a CSV file by their roles.
+    pub recording: Option<At<RecordingKeys>>,
+    /// Motions of contacts.
+    pub motion: Option<At<OneOrMany<MotionKeys>>>,
+    /// Forces spread over parts of the surface.
+    #[serde(default)]
+    pub load: Vec<At<LoadKeys>>,
+    /// Candidates of a sensor design, and its constraints.
+    pub design: Option<At<DesignKeys>>,
+}
+
+/// Greatest number of values that a recording of the training positions should hold in memory.
+const MOST_VALUES: usize = 100_000_000;
+
+impl From<RigFile> for RigSections {
+    fn from(file: RigFile) -> Self {
+        Self(file)
+    }
+}
+
+impl RigSections {
+    /// Reads the sections of a text.
+    ///
+    /// # Errors
+    /// [`RigError`] for a section, key or value that no rig can have, with its place in `text`.
+    pub fn from_toml(text: &str) -> Result<Self, RigError> {
+        document::read("", &document::parse(text)?).map(Self)
+    }
+
+    /// `[surface]`
+    ///
+    /// # Errors
+    /// [`RigError`] without this section, or for a surface that cannot be computed.
+    pub fn surface(&self) -> Result<SurfaceSpec, RigError> {
+        self.0.surface.as_ref().ok_or_else(|| missing("[surface]"))?.build()
+    }
+
+    /// `[surface]` and `[sensors]`, with what `[contact]` says of the force and `[recording]` of the columns.
+    ///
+    /// # Errors
+    /// [`RigError`] without a surface or sensors, and for what does not go together.
+    pub fn setup(&self) -> Result<Setup, RigError> {
+        let RigFile { surface, sensors, contact, recording, .. } = &self.0;
+        // A file without sensors is told so before its surface, which may be large, is set up.
+        let surface = surface.as_ref().ok_or_else(|| missing("[surface]"))?;
+        let sensors = sensors.as_ref().ok_or_else(|| missing("[sensors]"))?;
+        let surface = surface.build()?;
+        let layout = sensors::build(sensors, recording.as_deref(), &surface)?;
+        let force = contact.as_ref().and_then(|contact| contact.force.as_ref());
+        check_force(force, &surface)?;
+        let greatest_force_n =
+            contact.as_ref().map_or(Ok(None), |contact| contact.greatest_force_n(&surface))?;
+        let columns = recording.as_ref().map(|keys| keys.build(&layout, surface.extent())).transpose()?;
+        let setup = Setup::new(surface).with_layout(layout).map_err(SetupError::from).and_then(|setup| {
+            let force_n = force.map(|force| force.si);
+            Ok(setup.with_force(force_n)?.with_greatest_force(greatest_force_n)?)
+        });
+        let setup = setup.map_err(|error| RigProblem::Setup(error).without_place())?;
+        Ok(match columns {
+            Some(columns) => setup.recorded_as(columns),
+            None => setup,
+        })
+    }
+
+    /// `[training]` on a setup, of which the readings can be simulated or are recorded.
+    ///
+    /// # Errors
+    /// [`RigError`] for positions or a force that do not go with the setup.
+    pub fn training(&self, setup: &Setup) -> Result<Option<Training>, RigError> {
+        let Some(keys) = &self.0.training else { return Ok(None) };
+        let surface = setup.surface();
+        let training = keys.build(surface.extent())?;
+        let simulated = surface.model().is_some() && setup.columns().is_none();
+        if simulated && training.force_n.or(setup.force_n()).is_none() {
+            return Err(RigProblem::NoForce.at_place(&keys.place));
+        }
+        check_force(keys.force.as_ref(), surface)?;
+        let values = training.count.saturating_mul(training.repeats).saturating_mul(setup.layout().len());
+        if values > MOST_VALUES {
+            let value = format!("{values} values, positions × repeats × sensors");
+            return Err(keys.place.refuse_as(value, format!("at most {MOST_VALUES}")));
+        }
+        Ok(Some(training))
+    }
+
+    /// `[estimator]` for a setup.
+    ///
+    /// # Errors
+    /// [`RigError`] for settings that do not go with the setup.
+    pub fn estimator(&self, setup: &Setup) -> Result<Option<Estimator>, RigError> {
+        self.0.estimator.as_ref().map(|keys| keys.build(setup.layout(), setup.force_n())).transpose()
+    }
+
+    /// `[[load]]`s on a surface.
+    ///
+    /// # Errors
+    /// [`RigError`] for a load that does not go with the surface.
+    pub fn loads(&self, surface: &SurfaceSpec) -> Result<Vec<UniformLoad>, RigError> {
+        self.0.load.iter().map(|load| load.build(surface)).collect()
+    }
+
+    /// `[motion]` on a setup; a beam swings where `[surface]`, in the same text, has a `density`.
+    ///
+    /// # Errors
+    /// [`RigError`] for a motion that does not go with the setup.
+    pub fn motion(&self, setup: &Setup) -> Result<Option<MovingContacts>, RigError> {
+        let density = self.0.surface.as_ref().and_then(|surface| surface.density());
+        let moving = |keys| motion::build(keys, setup.surface(), density, setup.force_n());
+        self.0.motion.as_ref().map(moving).transpose()
+    }
+
+    /// `[design]` for a setup.
+    ///
+    /// # Errors
+    /// [`RigError`] for candidates or constraints that do not go with the setup.
+    pub fn design(&self, setup: &Setup) -> Result<Option<SensorDesign>, RigError> {
+        self.0.design.as_ref().map(|keys| keys.build(setup)).transpose()
+    }
+}
+
+fn missing(section: &'static str) -> RigError {
+    RigProblem::MissingSection { section }.without_place()
+}
