@@ -1,0 +1,84 @@
+"""palpate: turns an elastic surface with a few sensors into a calibrated contact locator.
+
+>>> import palpate as pp
+>>> setup = pp.Setup(pp.Beam("400 mm", "40 mm", "1.2 mm", "200 GPa"), pp.deflection(8, noise="5 um"))
+>>> presses = setup.simulate(pp.even(10), force="3 N", repeats=10, seed=0)
+>>> locator = pp.Influence().fit(presses)
+>>> estimates = locator.locate(presses.readings)
+>>> bool(abs(estimates.x - presses.x)[40] < 1e-3)
+True
+
+Lengths are in metres, forces in newtons, moduli in pascals; a text with a unit may stand wherever such a number may: ``"400 mm"``.
+"""
+
+from __future__ import annotations
+
+from ._errors import FileError, PalpateError
+from ._estimators import (
+    Auto,
+    Centroid,
+    ClosedForm,
+    DigitEstimator,
+    GaussianProcess,
+    Influence,
+    LevenbergMarquardt,
+    Neighbours,
+    Network,
+)
+from ._palpate import (
+    Estimate,
+    Estimates,
+    Estimator,
+    Locator,
+    Recording,
+    Rig,
+    Setup,
+    Training,
+    __version__,
+    parse_quantity,
+)
+from ._sensors import Columns, Sensors, deflection, raw, reaction, slope, strain
+from ._surfaces import Beam, BeamSection, Digit, Measured, Plate, Support
+from ._training import at, chebyshev, edge_dense, even, grid
+
+__all__ = [
+    "Auto",
+    "Beam",
+    "BeamSection",
+    "Centroid",
+    "ClosedForm",
+    "Columns",
+    "Digit",
+    "DigitEstimator",
+    "Estimate",
+    "Estimates",
+    "Estimator",
+    "FileError",
+    "GaussianProcess",
+    "Influence",
+    "LevenbergMarquardt",
+    "Locator",
+    "Measured",
+    "Neighbours",
+    "Network",
+    "PalpateError",
+    "Plate",
+    "Recording",
+    "Rig",
+    "Sensors",
+    "Setup",
+    "Support",
+    "Training",
+    "__version__",
+    "at",
+    "chebyshev",
+    "deflection",
+    "edge_dense",
+    "even",
+    "grid",
+    "parse_quantity",
+    "raw",
+    "reaction",
+    "slope",
+    "strain",
+]

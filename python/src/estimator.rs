@@ -1,0 +1,146 @@
+//! Estimators of a setup, and how they are fitted.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use palpate::estimators::estimator::{self, Choice, TimeLimit, choose};
+use palpate::estimators::fit::{Fit, FitTask};
+use palpate::estimators::network::{TrainingOutcome, TrainingStatus};
+use palpate::estimators::setup;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::bench::{Recording, Setup};
+use crate::errors::{of_work, refused};
+use crate::locator::Locator;
+use crate::sections;
+use crate::work;
+
+/// A configured method for one setup, its keys checked; `fit` turns it into a locator.
+#[pyclass(frozen, module = "palpate")]
+pub struct Estimator {
+    pub setup: Arc<setup::Setup>,
+    pub inner: estimator::Estimator,
+    /// The section that says it, where there is one.
+    text: Option<String>,
+}
+
+impl Estimator {
+    pub fn new_of(setup: Arc<setup::Setup>, inner: estimator::Estimator) -> Self {
+        Self { setup, inner, text: None }
+    }
+}
+
+/// Seconds that the choice of `auto` may take unless said otherwise, as in the command.
+const AUTO_SECONDS: f64 = 300.0;
+
+#[pymethods]
+impl Estimator {
+    /// The method that a rig's section ``[estimator]`` says, for a setup.
+    #[new]
+    fn new(text: String, setup: &Setup) -> PyResult<Self> {
+        let inner = sections::estimator(&text, &setup.0)?;
+        Ok(Self { setup: setup.0.clone(), inner, text: Some(text) })
+    }
+
+    /// Kind of the method, as in a rig: "influence".
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.inner.kind()
+    }
+
+    /// Every setting, in words.
+    #[getter]
+    fn settings(&self) -> Vec<(&'static str, String)> {
+        self.inner.settings(&self.setup).into_iter().map(|setting| (setting.name, setting.value)).collect()
+    }
+
+    /// Calibrate: fit the method to a recording.
+    ///
+    /// Parameters
+    /// ----------
+    /// recording : Recording
+    ///     Readings with their contacts.
+    /// seed : int
+    ///     Seed of whatever the method draws at random.
+    /// progress : bool or callable, optional
+    ///     A progress bar where somebody sees it (the default), `False` for none, `True` for one anywhere, or a function of
+    ///     (stage, done, total).
+    /// auto_seconds : float
+    ///     Seconds that the choice of `Auto` may take; an estimator that is not done by then is left out.
+    ///
+    /// Returns
+    /// -------
+    /// Locator
+    ///
+    /// Raises
+    /// ------
+    /// PalpateError
+    ///     When the recording does not suit the setup or the method.
+    #[pyo3(signature = (recording, *, seed=0, progress=None, auto_seconds=AUTO_SECONDS))]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        recording: &Recording,
+        seed: u64,
+        progress: Option<&Bound<'_, PyAny>>,
+        auto_seconds: f64,
+    ) -> PyResult<Locator> {
+        if auto_seconds.is_nan() || auto_seconds <= 0.0 {
+            return Err(refused(format!("`auto_seconds` is {auto_seconds}; it must be greater than 0")));
+        }
+        let needed = self.inner.positions_needed();
+        recording.inner.check_distinct_positions(needed).map_err(refused)?;
+        let task = FitTask::new(&self.setup, &recording.inner).seed(seed);
+        let choice = match &self.inner {
+            estimator::Estimator::Auto => {
+                let begun = Instant::now();
+                let clock = || begun.elapsed().as_secs_f64();
+                let limit = TimeLimit { clock: &clock, seconds: auto_seconds };
+                Some(work::run(py, progress, None, |watch| choose(task.watch(watch), Some(limit)))?)
+            }
+            _ => None,
+        };
+        let chosen = choice.as_ref().map_or(&self.inner, |choice| &choice.best);
+        let rounds = Some(chosen.most_rounds()).filter(|most| *most > 0);
+        let fitted = work::run_with(py, progress, rounds, |watch| chosen.fit_task(task.watch(watch)))?;
+        let locator = fitted.map_err(|error| of_work(&error))?;
+        if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) =
+            locator.training_outcome()
+        {
+            return Err(refused(format!(
+                "training diverged after {epochs} epochs: lower the learning rate or the momentum"
+            )));
+        }
+        let choice = choice.map(|choice| choice_dict(py, &choice).map(Bound::unbind)).transpose()?;
+        Ok(Locator::new(locator, choice))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Estimator: {}>", self.kind())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String, Setup))> {
+        let own = slf.get();
+        let text =
+            own.text.clone().ok_or_else(|| refused("an estimator of a rig is pickled with its rig"))?;
+        Ok((slf.get_type().into_any(), (text, Setup(own.setup.clone()))))
+    }
+}
+
+/// What the choice of `auto` was made by: the chosen kind, what every contender came to, and who was left out.
+fn choice_dict<'py>(py: Python<'py>, choice: &Choice) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("best", choice.best.kind())?;
+    let tried = choice.tried.iter().map(|tried| {
+        let one = PyDict::new(py);
+        one.set_item("kind", tried.kind)?;
+        one.set_item("mean_error", tried.mean_error_m)?;
+        one.set_item("interval_score", tried.interval_score_m)?;
+        one.set_item("coverage", tried.coverage_percent.map(|percent| percent / 100.0))?;
+        Ok(one)
+    });
+    dict.set_item("tried", tried.collect::<PyResult<Vec<_>>>()?)?;
+    dict.set_item("left_out", choice.left_out.iter().cloned().collect::<std::collections::BTreeMap<_, _>>())?;
+    Ok(dict)
+}

@@ -1,0 +1,42 @@
+//! The Python package of palpate: the facade's types as classes, readings as arrays.
+//!
+//! Each file holds one concept. What is written in Python (`python/palpate`) is what needs no speed: sections of a rig as data classes, the
+//! showing of progress, figures, the estimators of scikit-learn.
+#![forbid(unsafe_code)]
+#![expect(clippy::needless_pass_by_value, reason = "PyO3 extracts arguments by value")]
+
+mod arrays;
+mod bench;
+mod errors;
+mod estimates;
+mod estimator;
+mod files;
+mod locator;
+mod quantities;
+mod rig;
+mod sections;
+mod training;
+mod work;
+
+use pyo3::prelude::*;
+
+/// The part of the package that is written in Rust; `palpate` exports it.
+#[pymodule(gil_used = false)]
+mod _palpate {
+    use super::*;
+    #[pymodule_export]
+    use crate::{
+        bench::{Recording, Setup},
+        estimates::{Estimate, Estimates},
+        estimator::Estimator,
+        locator::Locator,
+        quantities::parse_quantity,
+        rig::Rig,
+        training::Training,
+    };
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,202 @@
+//! Locators: what fitting gives, and how readings are located.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use palpate::estimators::estimator;
+use palpate::estimators::fit::ReadingError;
+use palpate::estimators::setup;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::arrays::{self, Readings};
+use crate::bench::Setup;
+use crate::errors::{io_error, of_locator, refused};
+use crate::estimates::{Estimate, Estimates, Table};
+use crate::files::write_whole;
+
+/// A locator: a fitted method with its setup, so that nothing it needs is outside it.
+///
+/// `fit` of an estimator makes one, and `Locator.load` reads one from its file.
+#[pyclass(frozen, module = "palpate")]
+pub struct Locator {
+    pub inner: estimator::Locator,
+    setup: Arc<setup::Setup>,
+    channels: Vec<String>,
+    choice: Option<Py<PyDict>>,
+}
+
+impl Locator {
+    pub fn new(inner: estimator::Locator, choice: Option<Py<PyDict>>) -> Self {
+        let (setup, channels) = (Arc::new(inner.setup.clone()), inner.layout().names());
+        Self { inner, setup, channels, choice }
+    }
+}
+
+/// Readings that are located between two looks for Ctrl-C.
+const CHUNK: usize = 2048;
+
+#[pymethods]
+impl Locator {
+    /// Estimate the contacts of readings.
+    ///
+    /// Parameters
+    /// ----------
+    /// readings : array_like
+    ///     In SI units, or raw: one reading of the shape (channels), or many of the shape (readings, channels). A C-contiguous array of
+    ///     64-bit floats is read as it lies in memory; of a data frame the columns of the channels are taken.
+    ///
+    /// Returns
+    /// -------
+    /// Estimate or Estimates
+    ///     Of one reading its numbers, of many their columns.
+    ///
+    /// Raises
+    /// ------
+    /// PalpateError
+    ///     For another number of channels, and for a value that is not finite, with its row and channel.
+    fn locate<'py>(&self, py: Python<'py>, readings: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let extent = self.setup.surface().extent();
+        match arrays::readings(readings, &self.channels)? {
+            Readings::One(reading) => {
+                let estimate = self.inner.locate(reading.as_slice()?).map_err(refused)?;
+                Ok(Bound::new(py, Estimate::new(estimate, extent))?.into_any())
+            }
+            Readings::Many(readings) => {
+                let readings = readings.as_slice()?;
+                let rows = readings.len() / self.channels.len();
+                let mut table = Table::with_capacity(rows, extent);
+                for (k, chunk) in readings.chunks(CHUNK * self.channels.len()).enumerate() {
+                    py.detach(|| self.locate_into(chunk, &mut table))
+                        .map_err(|(row, error)| refused(format!("reading {}: {error}", k * CHUNK + row)))?;
+                    py.check_signals()?;
+                }
+                Ok(Bound::new(py, Estimates::new(py, table, extent)?)?.into_any())
+            }
+        }
+    }
+
+    /// Kind of its estimator: "influence".
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.inner.kind()
+    }
+
+    /// The setup whose readings it locates.
+    #[getter]
+    fn setup(&self) -> Setup {
+        Setup(self.setup.clone())
+    }
+
+    /// Seed of its fit.
+    #[getter]
+    fn seed(&self) -> u64 {
+        self.inner.provenance.seed
+    }
+
+    /// Version of palpate that fitted it.
+    #[getter]
+    fn version(&self) -> &str {
+        &self.inner.provenance.palpate
+    }
+
+    /// What `Auto` chose it by; None of another estimator.
+    ///
+    /// "best" is the kind; "tried" has of each contender "kind", "mean_error" in metres, "interval_score" in metres and "coverage" at
+    /// positions held out; "left_out" says who was not tried, and why.
+    #[getter]
+    fn choice(&self, py: Python<'_>) -> Option<Py<PyDict>> {
+        self.choice.as_ref().map(|choice| choice.clone_ref(py))
+    }
+
+    /// Outcome of training, of a network: "status", "epochs" and "aggregate_error"; None of other methods.
+    #[getter]
+    fn training<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let Some(outcome) = self.inner.training_outcome() else { return Ok(None) };
+        let json = serde_json::to_string(&outcome).map_err(refused)?;
+        Ok(Some(py.import("json")?.call_method1("loads", (json,))?))
+    }
+
+    /// Write the locator to a file, which the command reads too.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or path
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let json = py.detach(|| self.inner.to_json()).map_err(refused)?;
+        write_whole(&path, json.as_bytes())
+    }
+
+    /// Read a locator from its file, whoever wrote it.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or path
+    ///
+    /// Raises
+    /// ------
+    /// FileError
+    ///     With line and column where there is a place, for what is no locator, or one of a version that this palpate does not read.
+    /// OSError
+    ///     Where the file cannot be read.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let bytes = std::fs::read(&path).map_err(|error| io_error(&error, &path))?;
+        let name = path.display().to_string();
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let at = error.utf8_error().valid_up_to();
+            refused(format!("{name} is not UTF-8 text: byte {} is no character", at + 1))
+        })?;
+        let locator = py.detach(|| estimator::Locator::from_json(&text));
+        Ok(Self::new(locator.map_err(|error| of_locator(&error, &name, &text))?, None))
+    }
+
+    /// The locator as the text of its file.
+    fn to_json(&self) -> PyResult<String> {
+        self.inner.to_json().map_err(refused)
+    }
+
+    /// Read a locator from the text of its file.
+    #[staticmethod]
+    fn from_json(text: &str) -> PyResult<Self> {
+        let locator = estimator::Locator::from_json(text);
+        Ok(Self::new(locator.map_err(|error| of_locator(&error, "locator", text))?, None))
+    }
+
+    fn __repr__(&self) -> String {
+        let provenance = &self.inner.provenance.recording;
+        format!("<Locator: {}, fitted to {} rows of {}>", self.kind(), provenance.rows, provenance.source)
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("palpate._html")?.call_method1("locator", (slf,))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| self.inner == other.get().inner)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let py = slf.py();
+        let own = slf.get();
+        let json = serde_json::to_vec(&own.inner).map_err(refused)?;
+        let rebuild = py.import("palpate._palpate")?.getattr("Locator")?.getattr("_unpickle")?;
+        Ok((rebuild, (PyBytes::new(py, &json), own.choice(py)).into_pyobject(py)?.into_any()))
+    }
+
+    #[staticmethod]
+    fn _unpickle(json: &[u8], choice: Option<Py<PyDict>>) -> PyResult<Self> {
+        Ok(Self::new(serde_json::from_slice(json).map_err(refused)?, choice))
+    }
+}
+
+impl Locator {
+    /// Adds the estimates of readings to a table; an error names the row within these readings.
+    fn locate_into(&self, readings: &[f64], table: &mut Table) -> Result<(), (usize, ReadingError)> {
+        let extent = self.setup.surface().extent();
+        for (row, reading) in readings.chunks_exact(self.channels.len()).enumerate() {
+            table.push(&self.inner.locate(reading).map_err(|error| (row, error))?, extent);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,59 @@
+//! Quantities: numbers in SI units, or texts with units.
+
+use palpate::mechanics::units::{Dimension, Quantity};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+
+use crate::errors::refused;
+
+/// The SI value of a number or a text with a unit, finite.
+fn si(value: &Bound<'_, PyAny>, name: &str, dimension: Dimension) -> PyResult<f64> {
+    let number = if let Ok(text) = value.extract::<std::borrow::Cow<'_, str>>() {
+        Quantity::parse_as(&text, dimension).map_err(|error| refused(format!("`{name}`: {error}")))?
+    } else {
+        value.extract::<f64>().map_err(|_| {
+            let found = value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string());
+            let words = dimension.noun();
+            PyTypeError::new_err(format!(
+                "`{name}` is of the type {found}; it must be {words}, a number in SI units or a text with a unit"
+            ))
+        })?
+    };
+    if number.is_finite() {
+        Ok(number)
+    } else {
+        Err(refused(format!("`{name}` is {number}; it must be finite")))
+    }
+}
+
+/// A length in metres.
+pub fn length_m(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    si(value, name, Dimension::Length)
+}
+
+/// A force in newtons.
+pub fn force_n(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    si(value, name, Dimension::Force)
+}
+
+/// The SI value of a text with a unit, and the noun of what it measures.
+///
+/// Parameters
+/// ----------
+/// text : str
+///     A quantity, as in "400 mm" or "5 um".
+///
+/// Returns
+/// -------
+/// tuple of (float, str)
+///     Its value in SI units, and what it is: "a length".
+///
+/// Raises
+/// ------
+/// PalpateError
+///     For a text that is no quantity, or a unit that is not known.
+#[pyfunction]
+pub fn parse_quantity(text: &str) -> PyResult<(f64, &'static str)> {
+    let quantity: Quantity = text.parse().map_err(refused)?;
+    Ok((quantity.value, quantity.dimension.noun()))
+}

@@ -1,0 +1,29 @@
+//! Sections of a rig that are held apart: a setup's, an estimator's.
+
+use palpate::estimators::estimator::Estimator;
+use palpate::estimators::setup::Setup;
+use palpate::rig::RigSections;
+use pyo3::prelude::*;
+
+use crate::errors::{of_rig, refused};
+
+/// The setup that a rig's sections say.
+///
+/// # Errors
+/// `FileError`, with the place.
+pub fn setup(text: &str) -> PyResult<Setup> {
+    let sections = RigSections::from_toml(text);
+    let setup = sections.and_then(|sections| sections.setup());
+    setup.map_err(|error| of_rig(&error, "setup", text))
+}
+
+/// The estimator that a section says, for a setup.
+///
+/// # Errors
+/// `FileError`, with the place.
+pub fn estimator(text: &str, setup: &Setup) -> PyResult<Estimator> {
+    let sections = RigSections::from_toml(text);
+    let estimator = sections.and_then(|sections| sections.estimator(setup));
+    let estimator = estimator.map_err(|error| of_rig(&error, "estimator", text))?;
+    estimator.ok_or_else(|| refused("the text has no section [estimator]"))
+}

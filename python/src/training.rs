@@ -1,0 +1,151 @@
+//! Training positions: the rule that places them, and how each is pressed.
+
+use palpate::estimators::arrangement::{self, Arrangement};
+use palpate::mechanics::contact::Position;
+use palpate::mechanics::units::format_length_mm;
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+
+use crate::errors::refused;
+use crate::quantities::{force_n, length_m};
+
+/// Training positions: the rule that places them, and how each is pressed.
+///
+/// `even`, `edge_dense`, `chebyshev`, `grid` and `at` make them.
+#[pyclass(frozen, eq, from_py_object, module = "palpate")]
+#[derive(Clone, PartialEq)]
+pub struct Training(pub arrangement::Training);
+
+#[pymethods]
+impl Training {
+    /// Training positions by a rule; `even` and its like are shorter.
+    #[new]
+    #[pyo3(signature = (arrangement, count=None, *, middle=None, portion=None, grid=None, positions=None, repeats=1, force=None))]
+    #[expect(clippy::too_many_arguments, reason = "keys of a section, each by its name")]
+    fn new(
+        arrangement: &str,
+        count: Option<usize>,
+        middle: Option<usize>,
+        portion: Option<(f64, f64)>,
+        grid: Option<(usize, usize)>,
+        positions: Option<Vec<Bound<'_, PyAny>>>,
+        repeats: usize,
+        force: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let needed =
+            |name: &str| refused(format!("training positions by the rule \"{arrangement}\" need `{name}`"));
+        let own_count = count.ok_or_else(|| needed("count"));
+        let (rule, count) = match arrangement {
+            "even" => {
+                (portion.map_or(Arrangement::Even, |portion| Arrangement::EvenOver { portion }), own_count?)
+            }
+            "edge-dense" => {
+                let portion = portion.unwrap_or(Arrangement::PAPER_PORTION);
+                (
+                    Arrangement::EdgeDense { middle: middle.ok_or_else(|| needed("middle"))?, portion },
+                    own_count?,
+                )
+            }
+            "chebyshev" => (Arrangement::Chebyshev, own_count?),
+            "grid" => {
+                let (columns, rows) = grid.ok_or_else(|| needed("grid"))?;
+                (Arrangement::Grid { columns, rows }, columns.saturating_mul(rows))
+            }
+            "explicit" => {
+                let positions = positions.ok_or_else(|| needed("positions"))?;
+                let positions: Vec<Position> = positions.iter().map(position).collect::<PyResult<_>>()?;
+                let count = positions.len();
+                (Arrangement::Explicit(positions), count)
+            }
+            other => {
+                return Err(refused(format!(
+                    "`arrangement` is \"{other}\"; it must be one of even, edge-dense, chebyshev, grid, explicit"
+                )));
+            }
+        };
+        if repeats == 0 {
+            return Err(refused("`repeats` is 0; it must be at least 1"));
+        }
+        let training = arrangement::Training::new(rule, count).repeated(repeats);
+        Ok(Self(match force {
+            Some(force) => training.with_force(checked_force(&force)?),
+            None => training,
+        }))
+    }
+
+    /// Number of positions.
+    #[getter]
+    fn count(&self) -> usize {
+        self.0.count
+    }
+
+    /// Presses at each position.
+    #[getter]
+    fn repeats(&self) -> usize {
+        self.0.repeats
+    }
+
+    /// Force of the presses in newtons; None where it is the setup's.
+    #[getter]
+    fn force(&self) -> Option<f64> {
+        self.0.force_n
+    }
+
+    fn __repr__(&self) -> String {
+        let arrangement::Training { arrangement, count, repeats, force_n } = &self.0;
+        let rule = match arrangement {
+            Arrangement::Even | Arrangement::EvenOver { .. } => "even".to_owned(),
+            Arrangement::EdgeDense { middle, .. } => format!("edge-dense, {middle} in the middle"),
+            Arrangement::Chebyshev => "Chebyshev's nodes".to_owned(),
+            Arrangement::Grid { columns, rows } => format!("grid of {columns} × {rows}"),
+            Arrangement::Explicit(positions) => match positions.as_slice() {
+                [first, .., last] => {
+                    format!("from {} to {}", format_length_mm(first.x_m), format_length_mm(last.x_m))
+                }
+                _ => "explicit".to_owned(),
+            },
+        };
+        let force = force_n.map_or_else(String::new, |force_n| format!(", {force_n} N"));
+        format!("<Training: {count} positions, {rule}, {repeats} × each{force}>")
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let py = slf.py();
+        let rebuild = py.import("palpate._rebuild")?.getattr("training")?;
+        let arrangement::Training { arrangement, count, repeats, force_n } = &slf.get().0;
+        let (name, middle, portion, grid, positions) = match arrangement {
+            Arrangement::Even => ("even", None, None, None, None),
+            Arrangement::EvenOver { portion } => ("even", None, Some(*portion), None, None),
+            Arrangement::EdgeDense { middle, portion } => {
+                ("edge-dense", Some(*middle), Some(*portion), None, None)
+            }
+            Arrangement::Chebyshev => ("chebyshev", None, None, None, None),
+            Arrangement::Grid { columns, rows } => ("grid", None, None, Some((*columns, *rows)), None),
+            Arrangement::Explicit(positions) => {
+                let positions: Vec<(f64, f64)> =
+                    positions.iter().map(|place| (place.x_m, place.y_m)).collect();
+                ("explicit", None, None, None, Some(positions))
+            }
+        };
+        let arguments = (name, *count, middle, portion, grid, positions, *repeats, *force_n);
+        Ok((rebuild, arguments.into_pyobject(py)?))
+    }
+}
+
+/// A force of presses in newtons, greater than 0.
+pub fn checked_force(force: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let force_n = force_n(force, "force")?;
+    if force_n > 0.0 {
+        Ok(force_n)
+    } else {
+        Err(refused(format!("`force` is {force_n} N; it must be greater than 0")))
+    }
+}
+
+/// A position: a length on a line, two on a plane.
+pub fn position(value: &Bound<'_, PyAny>) -> PyResult<Position> {
+    if let Ok((x, y)) = value.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>() {
+        return Ok(Position { x_m: length_m(&x, "x")?, y_m: length_m(&y, "y")? });
+    }
+    Ok(Position::along(length_m(value, "position")?))
+}

@@ -1,0 +1,145 @@
+//! Long work: without the interpreter's lock, watched by Ctrl-C and by whatever shows progress.
+
+use std::error::Error;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError, mpsc};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use palpate::numerics::watch::{Progress, Watch};
+use pyo3::prelude::*;
+
+use crate::errors::of_work;
+
+/// Time between two looks for Ctrl-C.
+const LOOK: Duration = Duration::from_millis(20);
+/// Time after which progress is shown; shorter work shows none.
+const SHOW_AFTER: Duration = Duration::from_millis(500);
+/// Time between two shows of progress.
+const SHOW_EVERY: Duration = Duration::from_millis(200);
+/// Stack of the thread that works, that of a main thread.
+const STACK_BYTES: usize = 8 << 20;
+
+/// Latest progress of the work.
+#[derive(Clone)]
+struct Latest {
+    rounds: u64,
+    stage: Option<(&'static str, f64, Option<f64>)>,
+}
+
+/// Does work in a thread of its own while this one looks for Ctrl-C and shows the progress; `rounds` is the most that are reported, where
+/// that is known.
+///
+/// # Errors
+/// Those of the work, `KeyboardInterrupt`, and what a function for progress raises; the work is stopped before either is returned.
+pub fn run<T, E>(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    rounds: Option<u64>,
+    work: impl FnOnce(Watch<'_>) -> Result<T, E> + Send,
+) -> PyResult<T>
+where
+    T: Send,
+    E: Error + Send + 'static,
+{
+    run_with(py, progress, rounds, work)?.map_err(|error| of_work(&error))
+}
+
+/// The same, with the error of the work as it is.
+pub fn run_with<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    rounds: Option<u64>,
+    work: impl FnOnce(Watch<'_>) -> T + Send,
+) -> PyResult<T> {
+    let stop = AtomicBool::new(false);
+    let latest = Mutex::new(Latest { rounds: 0, stage: None });
+    let observe = |progress: Progress| {
+        let mut latest = latest.lock().unwrap_or_else(PoisonError::into_inner);
+        latest.stage = match progress {
+            Progress::Round => {
+                latest.rounds += 1;
+                latest.stage
+            }
+            Progress::Stage { name, share } if share.is_finite() => Some((name, share, Some(1.0))),
+            Progress::Stage { name, .. } => Some((name, 0.0, None)),
+            Progress::Counted { name, done, of, .. } => Some((name, done as f64, Some(of as f64))),
+        };
+        !stop.load(Ordering::Relaxed)
+    };
+    thread::scope(|scope| {
+        let (done, mut finished) = mpsc::channel::<()>();
+        let observe = &observe;
+        let working = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, move || {
+            // Dropped at the end of the work, also of one that panics.
+            let _done = done;
+            work(Watch::new(observe))
+        })?;
+        let mut shown = Shown::new(progress, rounds);
+        let looked = loop {
+            let ended;
+            (ended, finished) = py.detach(move || (wait(&finished), finished));
+            if ended {
+                break Ok(());
+            }
+            let now = latest.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            if let Err(error) = py.check_signals().and_then(|()| shown.show(py, &now)) {
+                stop.store(true, Ordering::Relaxed);
+                break Err(error);
+            }
+        };
+        let result = py.detach(|| working.join());
+        shown.close()?;
+        looked?;
+        result.map_err(|panic| std::panic::resume_unwind(panic))
+    })
+}
+
+/// Waits for the work a little, and says whether it has ended: then the channel is closed.
+fn wait(finished: &mpsc::Receiver<()>) -> bool {
+    finished.recv_timeout(LOOK) == Err(mpsc::RecvTimeoutError::Disconnected)
+}
+
+/// Progress as it is shown.
+struct Shown<'py> {
+    wanted: Option<Bound<'py, PyAny>>,
+    rounds: Option<u64>,
+    begun: Instant,
+    next: Duration,
+    /// What shows it, once the work has lasted a while; `None` of it where nobody sees it.
+    by: Option<Option<Bound<'py, PyAny>>>,
+}
+
+impl<'py> Shown<'py> {
+    fn new(wanted: Option<&Bound<'py, PyAny>>, rounds: Option<u64>) -> Self {
+        // A function wants to be told from the beginning.
+        let next =
+            if wanted.is_some_and(|wanted| wanted.is_callable()) { Duration::ZERO } else { SHOW_AFTER };
+        Self { wanted: wanted.cloned(), rounds, begun: Instant::now(), next, by: None }
+    }
+
+    fn show(&mut self, py: Python<'py>, latest: &Latest) -> PyResult<()> {
+        if self.begun.elapsed() < self.next {
+            return Ok(());
+        }
+        self.next = self.begun.elapsed() + SHOW_EVERY;
+        let by = match &self.by {
+            Some(by) => by,
+            None => {
+                let by = py.import("palpate._progress")?.call_method1("show", (self.wanted.as_ref(),))?;
+                self.by.insert((!by.is_none()).then_some(by))
+            }
+        };
+        let Some(by) = by else { return Ok(()) };
+        let (stage, done, total) =
+            latest.stage.unwrap_or(("rounds", latest.rounds as f64, self.rounds.map(|most| most as f64)));
+        by.call_method1("update", (stage, done, total)).map(|_| ())
+    }
+
+    fn close(&self) -> PyResult<()> {
+        match &self.by {
+            Some(Some(by)) => by.call_method0("close").map(|_| ()),
+            _ => Ok(()),
+        }
+    }
+}
