@@ -216,6 +216,14 @@ pub trait Locate {
     /// Estimates the contact from a reading: one finite value a channel, in SI units or raw.
     fn locate(&self, reading: &[f64]) -> Estimate;
 
+    /// Estimates the contact of each of many readings, which lie one after the other, `channels` values each, and writes over `estimates`, one a
+    /// reading. An estimate is the one that [`Locate::locate`] gives, to the last bit; methods that can, locate many readings at once.
+    fn locate_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate]) {
+        for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
+            *estimate = self.locate(reading);
+        }
+    }
+
     /// Offset of each channel, in its SI unit; `None` where it was not learnt.
     fn offsets(&self) -> Option<Vec<f64>> {
         None
@@ -232,6 +240,13 @@ pub trait Locate {
 pub trait CheckEstimate: Clone + Debug + PartialEq + Serialize + DeserializeOwned {
     /// An estimate of a reading on a surface as the check leaves it.
     fn checked(&self, reading: &[f64], estimate: Estimate, extent: Extent) -> Estimate;
+
+    /// Checks the estimates of many readings, which lie one after the other, `channels` values each, as [`CheckEstimate::checked`] does.
+    fn check_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate], extent: Extent) {
+        for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
+            *estimate = self.checked(reading, *estimate, extent);
+        }
+    }
 
     /// Checks what a file may have got wrong.
     ///
@@ -321,7 +336,7 @@ impl<M: Locate> Fitted<M> {
             Some(check) => check.checked(reading, estimate, extent),
             None => estimate,
         };
-        Ok(in_numbers(estimate, extent))
+        Ok(if estimate.is_in_numbers() { estimate } else { anywhere_on(extent) })
     }
 
     /// Checks what a file may have got wrong.
@@ -340,12 +355,9 @@ impl<M: Locate> Fitted<M> {
     }
 }
 
-/// An estimate as it is, or where something of it is not a number, as of readings far beyond all that a sensor reads: one that says that
-/// no contact explains the reading, and that leaves the whole surface.
-fn in_numbers(estimate: Estimate, extent: Extent) -> Estimate {
-    if estimate.is_in_numbers() {
-        return estimate;
-    }
+/// The estimate in place of one of which something is not a number, as of readings far beyond all that a sensor reads: no contact explains the
+/// reading, and the whole surface is left.
+pub(crate) fn anywhere_on(extent: Extent) -> Estimate {
     let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
     let uniform = |side_m: f64| side_m * side_m / 12.0;
     let uncertainty = Uncertainty {

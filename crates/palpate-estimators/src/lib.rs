@@ -23,6 +23,7 @@
 )]
 
 pub mod arrangement;
+pub mod batch;
 pub mod centroid;
 pub mod closed_form;
 pub mod digit;

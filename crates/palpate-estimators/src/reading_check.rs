@@ -17,7 +17,7 @@ use crate::fit::{CheckEstimate, Fit, FitTask, Locate, LocatorFault};
 use crate::influence::{Influence, InfluenceLocator, InfluenceSource};
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::status::FalseAlarmRate;
+use crate::status::{FalseAlarmRate, NO_CONTACT};
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
@@ -104,16 +104,17 @@ impl CheckEstimate for ReadingCheck {
             Self::Influence(influence) => influence.locate(reading),
             Self::Digit(digit) => digit.locate(reading),
         };
-        let widened = || {
-            let position = nearest_on(extent, estimate.contact.position);
-            let contact = ContactEstimate { position, ..estimate.contact };
-            ContactEstimate { uncertainty: uncertainty_with(&contact, &explained.contact), ..contact }
-        };
-        match explained.status {
-            Status::NoContact => explained,
-            Status::OutsideModel => Estimate { status: Status::OutsideModel, ..estimate },
-            Status::Ambiguous => Estimate { contact: widened(), ..explained },
-            Status::Located | Status::OutsideSurface => Estimate { contact: widened(), ..explained },
+        by(explained, estimate, extent)
+    }
+
+    fn check_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate], extent: Extent) {
+        let mut explained = vec![NO_CONTACT; estimates.len()];
+        match self {
+            Self::Influence(influence) => influence.locate_batch(readings, channels, &mut explained),
+            Self::Digit(digit) => digit.locate_batch(readings, channels, &mut explained),
+        }
+        for (estimate, explained) in estimates.iter_mut().zip(explained) {
+            *estimate = by(explained, *estimate, extent);
         }
     }
 
@@ -122,6 +123,21 @@ impl CheckEstimate for ReadingCheck {
             Self::Influence(influence) => influence.check(setup),
             Self::Digit(digit) => digit.check(setup),
         }
+    }
+}
+
+/// The estimate of a learnt method, as that of the forward way leaves it: `explained`.
+fn by(explained: Estimate, estimate: Estimate, extent: Extent) -> Estimate {
+    let widened = || {
+        let position = nearest_on(extent, estimate.contact.position);
+        let contact = ContactEstimate { position, ..estimate.contact };
+        ContactEstimate { uncertainty: uncertainty_with(&contact, &explained.contact), ..contact }
+    };
+    match explained.status {
+        Status::NoContact => explained,
+        Status::OutsideModel => Estimate { status: Status::OutsideModel, ..estimate },
+        Status::Ambiguous => Estimate { contact: widened(), ..explained },
+        Status::Located | Status::OutsideSurface => Estimate { contact: widened(), ..explained },
     }
 }
 

@@ -4,7 +4,8 @@
 
 use cpu_time::ThreadTime;
 use palpate_core::{Estimate, Status};
-use palpate_estimators::fit::FitTask;
+use palpate_estimators::batch::BatchOptions;
+use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::influence::{BeamLocator, Influence, InfluenceSource, Scratch};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
@@ -12,6 +13,8 @@ use palpate_estimators::simulate::clean_reading;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::median;
 use palpate_rig::Rig;
+use std::num::NonZeroUsize;
+use std::time::Instant;
 
 const ROUNDS: usize = 201;
 const READINGS: usize = 1000;
@@ -43,6 +46,31 @@ fn main() {
             single / batch
         );
     }
+    million(&rig, &recording);
+}
+
+/// Prints the time of a million readings, checked, located, and handed over block by block, with one thread and with two.
+fn million(rig: &Rig, recording: &Recording) {
+    let locator = Influence::default().fit(&rig.setup, recording).expect("the presses suit the bench");
+    let readings: Vec<f64> = clean_readings(rig).into_iter().cycle().take(1_000_000 * 8).collect();
+    for threads in [1, 2] {
+        let threads = NonZeroUsize::new(threads).expect("more than 0");
+        let options = BatchOptions { threads, ..BatchOptions::default() };
+        let times = (0..7).map(|_| {
+            let start = Instant::now();
+            let located = locator.locate_blocks(&readings, options, &|_, estimates| {
+                std::hint::black_box(estimates);
+            });
+            located.expect("the readings are finite");
+            start.elapsed().as_secs_f64()
+        });
+        let seconds = median(times.collect()).expect("rounds");
+        println!(
+            "a million readings in blocks, {threads} threads: {:.1} ms, {:.2} million readings/s",
+            1e3 * seconds,
+            1.0 / seconds
+        );
+    }
 }
 
 fn fit(config: Influence, setup: &Setup, recording: &Recording) -> BeamLocator {
@@ -56,15 +84,20 @@ struct Times {
     batch: f64,
 }
 
-/// Median times of an estimate, alone and in a batch, over readings all along the beam in no order.
-fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> Times {
+/// Readings without noise of contacts all along the beam, in no order.
+fn clean_readings(rig: &Rig) -> Vec<f64> {
     let surface = rig.setup.surface().model().expect("a beam has a model");
-    let readings: Vec<f64> = (0..READINGS)
+    (0..READINGS)
         .flat_map(|i| {
             let position = Position::along(0.02 + 0.36 * (i * 619 % READINGS) as f64 / READINGS as f64);
             clean_reading(surface, rig.setup.layout(), Contact { position, force_n: 3.0 })
         })
-        .collect();
+        .collect()
+}
+
+/// Median times of an estimate, alone and in a batch.
+fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> Times {
+    let readings = clean_readings(rig);
     let mut scratch = Scratch::default();
     let nothing = Estimate::of_position(Position::along(0.0), Status::NoContact);
     let mut estimates = vec![nothing; READINGS];
@@ -76,7 +109,7 @@ fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> Times {
         }
         single.push(start.elapsed().as_nanos() as f64 / READINGS as f64);
         let start = ThreadTime::now();
-        locator.locate_batch(&readings, &mut scratch, &mut estimates);
+        locator.locate_batch_with(&readings, &mut scratch, &mut estimates);
         std::hint::black_box(&mut estimates);
         batch.push(start.elapsed().as_nanos() as f64 / READINGS as f64);
     }

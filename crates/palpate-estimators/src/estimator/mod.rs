@@ -247,6 +247,10 @@ impl Locate for Method {
         self.as_locate().locate(reading)
     }
 
+    fn locate_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate]) {
+        self.as_locate().locate_batch(readings, channels, estimates);
+    }
+
     fn offsets(&self) -> Option<Vec<f64>> {
         self.as_locate().offsets()
     }

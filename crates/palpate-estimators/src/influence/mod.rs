@@ -209,6 +209,15 @@ impl Locate for InfluenceLocator {
         }
     }
 
+    fn locate_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate]) {
+        match self {
+            Self::Beam(beam) => beam.locate_batch(readings, channels, estimates),
+            Self::Plane(plane) => plane.locate_batch(readings, channels, estimates),
+            Self::ForceLinear(linear) => linear.locate_batch(readings, channels, estimates),
+            Self::Measured(measured) => measured.locate_batch(readings, channels, estimates),
+        }
+    }
+
     fn offsets(&self) -> Option<Vec<f64>> {
         match self {
             Self::Beam(beam) => Some(beam.offsets().to_vec()),

@@ -74,7 +74,12 @@ impl BeamLocator {
     ///
     /// An estimate is the one that [`BeamLocator::locate_with`] gives; of one that is used again, no more is written than
     /// what is read.
-    pub fn locate_batch(&self, readings: &[f64], scratch: &mut Scratch, estimates: &mut [Estimate]) -> usize {
+    pub fn locate_batch_with(
+        &self,
+        readings: &[f64],
+        scratch: &mut Scratch,
+        estimates: &mut [Estimate],
+    ) -> usize {
         let channels = self.stored.table.sensors;
         let count = (readings.len() / channels).min(estimates.len());
         if self.stored.contacts == 1 {
@@ -142,6 +147,10 @@ impl Locate for BeamLocator {
 
     fn locate(&self, reading: &[f64]) -> Estimate {
         self.locate_with(reading, &mut Scratch::default())
+    }
+
+    fn locate_batch(&self, readings: &[f64], _: usize, estimates: &mut [Estimate]) {
+        self.locate_batch_with(readings, &mut Scratch::default(), estimates);
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {

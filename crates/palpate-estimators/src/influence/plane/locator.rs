@@ -84,6 +84,13 @@ impl Locate for PlaneLocator {
         self.locate_with(reading, &mut PlaneScratch::default())
     }
 
+    fn locate_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate]) {
+        let mut scratch = PlaneScratch::default();
+        for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
+            *estimate = self.locate_with(reading, &mut scratch);
+        }
+    }
+
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         LocatorFault::check_count("channels", setup.layout().len(), self.stored.table.sensors)
     }

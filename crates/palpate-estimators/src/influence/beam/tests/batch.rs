@@ -58,7 +58,7 @@ fn a_batch_answers_as_readings_one_by_one_do() {
         let mut estimates = vec![NO_CONTACT; readings.len()];
         let mut scratch = Scratch::default();
         for order in [readings.iter().rev().flatten().copied().collect::<Vec<f64>>(), readings.concat()] {
-            assert_eq!(locator.locate_batch(&order, &mut scratch, &mut estimates), readings.len());
+            assert_eq!(locator.locate_batch_with(&order, &mut scratch, &mut estimates), readings.len());
         }
         assert_eq!(estimates, single, "{:?}", locator.force());
         seen.extend(single.iter().map(|estimate| estimate.status));
@@ -99,7 +99,7 @@ fn a_batch_locates_as_many_as_there_are() {
     assert!(matches!(locator.force(), ForceBelief::Known(_)));
     let mut estimates = vec![NO_CONTACT; 3];
     let mut scratch = Scratch::default();
-    assert_eq!(locator.locate_batch(&[0.0; 39], &mut scratch, &mut estimates), 3);
-    assert_eq!(locator.locate_batch(&[0.0; 15], &mut scratch, &mut estimates), 1);
-    assert_eq!(locator.locate_batch(&[], &mut scratch, &mut estimates), 0);
+    assert_eq!(locator.locate_batch_with(&[0.0; 39], &mut scratch, &mut estimates), 3);
+    assert_eq!(locator.locate_batch_with(&[0.0; 15], &mut scratch, &mut estimates), 1);
+    assert_eq!(locator.locate_batch_with(&[], &mut scratch, &mut estimates), 0);
 }

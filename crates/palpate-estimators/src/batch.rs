@@ -1,0 +1,187 @@
+//! Batches: many readings located at once, in memory that does not grow with their number, by as many threads as one likes.
+
+use std::num::NonZeroUsize;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use palpate_core::Estimate;
+use palpate_numerics::watch::{Cancelled, Watch};
+
+use crate::fit::{CheckEstimate, Fitted, Locate, ReadingError, anywhere_on};
+use crate::status::NO_CONTACT;
+
+/// Readings of a block: their estimates, 0.9 kB each, stay in a core's second cache.
+pub const BLOCK: usize = 256;
+
+/// Options of a batch.
+#[derive(Clone, Copy, Debug)]
+pub struct BatchOptions<'a> {
+    /// Threads that locate; the estimates do not depend on it.
+    pub threads: NonZeroUsize,
+    /// Watch over the batch, which is told of each block.
+    pub watch: Watch<'a>,
+}
+
+impl Default for BatchOptions<'_> {
+    /// One thread, and nobody watches.
+    fn default() -> Self {
+        Self { threads: NonZeroUsize::MIN, watch: Watch::NONE }
+    }
+}
+
+/// Callback for the estimates of a block, from any of the threads, and in any order: `take(first, estimates)`, with the row of the first one, from 0.
+pub type TakeBlock<'a> = dyn Fn(usize, &[Estimate]) + Sync + 'a;
+
+/// Readings that nothing can be told from.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum BatchError {
+    /// Values that do not make whole readings.
+    #[error("{values} values are no whole number of readings; the locator has {channels} channels")]
+    Uneven {
+        /// Number of values.
+        values: usize,
+        /// Channels of the locator.
+        channels: usize,
+    },
+    /// A reading with a value that is no number.
+    #[error("reading {row}: {error}")]
+    Reading {
+        /// Which reading is the first such, from 1.
+        row: usize,
+        /// What is wrong with it.
+        error: ReadingError,
+    },
+    /// The batch was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+}
+
+impl<M: Locate> Fitted<M> {
+    /// Estimates the contacts of many readings, which lie one after the other, one value a channel, in SI units or raw.
+    ///
+    /// The estimates are those of [`Fitted::locate`], to the last bit; of the influence estimator on a line, eight readings are located together.
+    ///
+    /// ```
+    /// use palpate_estimators::{arrangement::Training, fit::Fit, influence::Influence, setup::Setup};
+    /// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+    ///
+    /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+    /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+    /// let presses = setup.simulate(&Training::even(10), 0)?;
+    /// let locator = Influence::default().fit(&setup, &presses)?;
+    /// let readings: Vec<f64> = presses.rows.iter().flat_map(|row| row.reading.clone()).collect();
+    /// let estimates = locator.locate_batch(&readings)?;
+    /// assert_eq!(estimates[4], locator.locate(&readings[4 * 8..5 * 8])?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`BatchError`] for values that make no whole readings, or that are not finite.
+    pub fn locate_batch(&self, readings: &[f64]) -> Result<Vec<Estimate>, BatchError> {
+        let channels = self.channels_of(readings)?;
+        let mut estimates = vec![NO_CONTACT; readings.len() / channels];
+        let blocks = readings.chunks(BLOCK * channels).zip(estimates.chunks_mut(BLOCK));
+        for (block, (readings, estimates)) in blocks.enumerate() {
+            self.locate_block(readings, channels, block * BLOCK, estimates)?;
+        }
+        Ok(estimates)
+    }
+
+    /// Estimates the contacts of many readings, as [`Fitted::locate_batch`] does, [`BLOCK`] by [`BLOCK`], and hands each block to `take`.
+    ///
+    /// # Errors
+    /// [`BatchError`] for values that make no whole readings, or that are not finite, and when the watch stopped it; blocks that were located by then
+    /// `take` has been given.
+    pub fn locate_blocks(
+        &self,
+        readings: &[f64],
+        options: BatchOptions,
+        take: &TakeBlock,
+    ) -> Result<(), BatchError>
+    where
+        M: Sync,
+        M::Check: Sync,
+    {
+        let channels = self.channels_of(readings)?;
+        let rows = readings.len() / channels;
+        let (taken, located) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let failed: Mutex<Option<BatchError>> = Mutex::new(None);
+        let lock = || failed.lock().unwrap_or_else(PoisonError::into_inner);
+        let work = || {
+            let mut estimates = vec![NO_CONTACT; BLOCK.min(rows)];
+            // A block that is taken is gone through: those before one that fails have been, and the first bad reading is found whatever the threads.
+            while lock().is_none() {
+                let first = taken.fetch_add(BLOCK, Ordering::Relaxed);
+                if first >= rows {
+                    return;
+                }
+                let count = BLOCK.min(rows - first);
+                let readings = &readings[first * channels..][..count * channels];
+                let done =
+                    self.locate_block(readings, channels, first, &mut estimates[..count]).and_then(|()| {
+                        take(first, &estimates[..count]);
+                        let located = located.fetch_add(count, Ordering::Relaxed) + count;
+                        Ok(options.watch.counted("locating", "readings", located, rows)?)
+                    });
+                if let Err(error) = done {
+                    let mut failed = lock();
+                    *failed = failed.into_iter().chain([error]).min_by_key(BatchError::row);
+                }
+            }
+        };
+        let threads = options.threads.get().min(rows.div_ceil(BLOCK));
+        std::thread::scope(|scope| {
+            (1..threads).for_each(|_| {
+                scope.spawn(work);
+            });
+            work();
+        });
+        failed.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+    }
+
+    /// Channels of a reading; at least 1, of which the values make whole readings.
+    fn channels_of(&self, readings: &[f64]) -> Result<usize, BatchError> {
+        let (values, channels) = (readings.len(), self.layout().len().max(1));
+        if values.is_multiple_of(channels) {
+            Ok(channels)
+        } else {
+            Err(BatchError::Uneven { values, channels })
+        }
+    }
+
+    /// Locates the readings of a block, of which the first is that of the row `first`, from 0.
+    fn locate_block(
+        &self,
+        readings: &[f64],
+        channels: usize,
+        first: usize,
+        estimates: &mut [Estimate],
+    ) -> Result<(), BatchError> {
+        for (i, reading) in readings.chunks_exact(channels).enumerate() {
+            ReadingError::check(reading, self.layout().len())
+                .map_err(|error| BatchError::Reading { row: first + i + 1, error })?;
+        }
+        let extent = self.setup.surface().extent();
+        self.method.locate_batch(readings, channels, estimates);
+        if let Some(check) = &self.check {
+            check.check_batch(readings, channels, estimates, extent);
+        }
+        for estimate in estimates.iter_mut().filter(|estimate| !estimate.is_in_numbers()) {
+            *estimate = anywhere_on(extent);
+        }
+        Ok(())
+    }
+}
+
+impl BatchError {
+    /// Which reading is meant, from 1; none of them comes last.
+    fn row(&self) -> usize {
+        match self {
+            Self::Reading { row, .. } => *row,
+            Self::Uneven { .. } | Self::Cancelled(_) => usize::MAX,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,153 @@
+use super::*;
+use crate::arrangement::all_over;
+use crate::estimator::{Estimator, Locator, contenders};
+use crate::fit::Fit;
+use crate::fixtures::{digit, paper, plate, raw_setup};
+use crate::influence::Influence;
+use crate::recording::Recording;
+use crate::setup::Setup;
+use crate::simulate::simulate_contacts;
+use palpate_core::Status;
+use palpate_mechanics::contact::Contact;
+use palpate_mechanics::sensing::ChannelModel;
+use palpate_mechanics::surface::ForceDirection;
+use palpate_mechanics::units::{newtons, um};
+
+/// Locators of every method that suits a setup; networks are trained for as long as a test may take.
+fn locators(setup: &Setup, presses: &Recording) -> Vec<Locator> {
+    let all = contenders(setup, &Estimator::default(), 200 * presses.rows.len());
+    all.iter().filter_map(|estimator| estimator.fit(setup, presses).ok()).collect()
+}
+
+/// Readings of a recording; and of nothing, of three times as much, of the first and the last together, and far beyond all that is read.
+fn readings(recording: &Recording) -> Vec<f64> {
+    let rows: Vec<&[f64]> = recording.rows.iter().map(|row| row.reading.as_slice()).collect();
+    let mut readings = rows.concat();
+    for (k, row) in rows.iter().enumerate() {
+        let other = rows[rows.len() - 1 - k];
+        readings.extend(match k % 4 {
+            0 => vec![0.0; row.len()],
+            1 => row.iter().map(|r| 3.0 * r).collect(),
+            2 => row.iter().zip(other).map(|(r, s)| r + s).collect(),
+            _ => row.iter().map(|r| 1e300 * r).collect::<Vec<_>>(),
+        });
+    }
+    readings
+}
+
+/// Asserts that a batch, whichever way it is asked for, is what readings one by one give; the statuses that were seen.
+fn assert_agree(locator: &Locator, readings: &[f64]) -> Vec<Status> {
+    let kind = locator.kind();
+    let each = readings.chunks_exact(locator.layout().len());
+    let single: Vec<Estimate> = each.map(|reading| locator.locate(reading).unwrap()).collect();
+    assert_eq!(locator.locate_batch(readings).unwrap(), single, "{kind}");
+    for threads in [1, 3] {
+        let options =
+            BatchOptions { threads: NonZeroUsize::new(threads).unwrap(), ..BatchOptions::default() };
+        let blocks = Mutex::new(vec![None; single.len()]);
+        let take = |first: usize, estimates: &[Estimate]| {
+            let mut blocks = blocks.lock().unwrap();
+            for (i, estimate) in estimates.iter().enumerate() {
+                assert_eq!(blocks[first + i].replace(*estimate), None, "reading {} came twice", first + i);
+            }
+        };
+        locator.locate_blocks(readings, options, &take).unwrap();
+        let blocks: Vec<_> = blocks.into_inner().unwrap().into_iter().map(Option::unwrap).collect();
+        assert_eq!(blocks, single, "{kind}, {threads} threads");
+    }
+    single.iter().map(|estimate| estimate.status).collect()
+}
+
+#[test]
+fn a_batch_of_every_method_answers_as_readings_one_by_one_do() {
+    let measured = raw_setup(paper(0.0, 1).setup.surface().extent(), 8, None);
+    let beam = paper(um(5.0), 4);
+    let plate = plate(12, ChannelModel { noise_sd: um(20.0), ..ChannelModel::default() });
+    let digit = digit(ForceDirection::Normal, 4.0);
+    let mut presses = beam.simulate(1);
+    presses.rows.iter_mut().for_each(|row| row.force_n = None);
+    let benches = [
+        (beam.setup.clone(), beam.simulate(1)),
+        (beam.setup.clone().unknown_force(), beam.simulate(1)),
+        (measured.clone(), beam.simulate(1)),
+        (measured, presses),
+        (plate.setup.clone(), plate.simulate(1)),
+        (digit.setup.clone(), digit.simulate(1)),
+    ];
+    let (mut kinds, mut statuses) = (Vec::new(), Vec::new());
+    for (setup, presses) in benches {
+        let readings = readings(&presses);
+        for locator in locators(&setup, &presses) {
+            statuses.extend(assert_agree(&locator, &readings));
+            kinds.push(locator.kind());
+        }
+    }
+    for kind in Estimator::KINDS.iter().filter(|kind| **kind != "auto") {
+        assert!(kinds.contains(kind), "no locator of kind {kind}");
+    }
+    for status in [Status::Located, Status::NoContact, Status::Ambiguous, Status::OutsideModel] {
+        assert!(statuses.contains(&status), "{status:?}");
+    }
+}
+
+/// A locator on the paper's beam, and readings of several blocks.
+fn several_blocks() -> (Locator, Vec<f64>) {
+    let example = paper(um(5.0), 4);
+    let locator = Influence::default().fit(&example.setup, &example.simulate(1)).unwrap().into_locator();
+    let contacts = all_over(example.setup.surface().extent()).into_iter();
+    let contacts: Vec<_> = contacts.map(|position| Contact { position, force_n: newtons(3.0) }).collect();
+    let recording = simulate_contacts(&example.setup, &contacts, 1, 2).unwrap();
+    let readings = recording.rows.iter().flat_map(|row| row.reading.clone());
+    let readings: Vec<f64> = readings.cycle().take(8 * (5 * BLOCK + 3)).collect();
+    (locator, readings)
+}
+
+#[test]
+fn the_first_bad_reading_is_named_whatever_the_number_of_threads() {
+    let (locator, mut readings) = several_blocks();
+    for (row, channel) in [(BLOCK + 7, 3), (BLOCK + 9, 0), (3 * BLOCK, 1)] {
+        readings[8 * row + channel] = f64::NAN;
+    }
+    let told = "reading 264: channel 4 reads NaN; it must be a finite number";
+    assert_eq!(locator.locate_batch(&readings).unwrap_err().to_string(), told);
+    for threads in 1..=4 {
+        let options =
+            BatchOptions { threads: NonZeroUsize::new(threads).unwrap(), ..BatchOptions::default() };
+        let error = locator.locate_blocks(&readings, options, &|_, _| {}).unwrap_err();
+        assert_eq!(error.to_string(), told, "{threads} threads");
+    }
+}
+
+#[test]
+fn values_that_make_no_whole_readings_are_refused() {
+    let (locator, _) = several_blocks();
+    let error = locator.locate_batch(&[0.0; 15]).unwrap_err();
+    assert_eq!(error.to_string(), "15 values are no whole number of readings; the locator has 8 channels");
+    assert_eq!(locator.locate_batch(&[]).unwrap(), []);
+    locator.locate_blocks(&[], BatchOptions::default(), &|_, _| panic!("nothing was located")).unwrap();
+}
+
+#[test]
+fn a_watch_sees_every_block_and_stops_a_batch() {
+    let (locator, readings) = several_blocks();
+    let rows = readings.len() / 8;
+    let seen = Mutex::new(Vec::new());
+    let watch = |progress| {
+        seen.lock().unwrap().push(progress);
+        seen.lock().unwrap().len() < 3
+    };
+    let (taken, watch) = (AtomicUsize::new(0), Watch::new(&watch));
+    let take = |_: usize, estimates: &[Estimate]| {
+        taken.fetch_add(estimates.len(), Ordering::Relaxed);
+    };
+    let options = BatchOptions { watch, ..BatchOptions::default() };
+    assert_eq!(locator.locate_blocks(&readings, options, &take), Err(Cancelled.into()));
+    assert_eq!(taken.into_inner(), 3 * BLOCK);
+    let counted = |done| palpate_numerics::watch::Progress::Counted {
+        name: "locating",
+        unit: "readings",
+        done,
+        of: rows,
+    };
+    assert_eq!(seen.into_inner().unwrap(), [BLOCK, 2 * BLOCK, 3 * BLOCK].map(counted));
+}
