@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ._palpate import Estimates, Recording
+    from ._palpate import Estimates, Recording, Setup
 
 _UNITS = {"deflection": "m", "slope": "rad", "strain": "m/m", "reaction": "N", "raw": None}
 
@@ -29,9 +29,27 @@ def recording(recording: Recording) -> pd.DataFrame:
     if not np.isnan(recording.time).all():
         columns["time [s]"] = recording.time
     for name, measure, values in zip(recording.channels, setup.measures, recording.readings.T):
-        unit = _UNITS[measure]
-        columns[name if unit is None else f"{name} [{unit}]"] = values
+        columns[_heading(name, _UNITS[measure])] = values
     return pd.DataFrame(columns)
+
+
+def own_columns(frame: pd.DataFrame, setup: Setup) -> dict[str, Any] | None:
+    """The arrays of a frame that `recording` made, as `Setup.recording` takes them; `None` of another frame."""
+    channels = [_heading(name, _UNITS[measure]) for name, measure in zip(setup.channels, setup.measures)]
+    if not {"x [m]", *channels} <= set(frame.columns):
+        return None
+    arrays: dict[str, Any] = {"readings": frame[channels].to_numpy(np.float64), "x": frame["x [m]"].to_numpy()}
+    for name in ("y [m]", "force [N]", "time [s]"):
+        if name in frame.columns:
+            arrays[name[: name.index(" ")]] = frame[name].to_numpy()
+    coordinates = [name for name in frame.columns if str(name).startswith("nuisance_")]
+    if coordinates:
+        arrays["nuisance"] = frame[coordinates].to_numpy()
+    return arrays
+
+
+def _heading(name: str, unit: str | None) -> str:
+    return name if unit is None else f"{name} [{unit}]"
 
 
 def estimates(estimates: Estimates) -> pd.DataFrame:

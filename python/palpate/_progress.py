@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 from collections.abc import Callable
 from typing import Any, Protocol, Union
@@ -39,13 +40,11 @@ def _bar() -> Shown:
     except ImportError:
         return _Line()
     if _in_notebook():
-        try:
-            import ipywidgets  # noqa: F401
+        # Without ipywidgets a notebook shows the bar of a terminal.
+        if importlib.util.find_spec("ipywidgets") is not None:
             from tqdm.notebook import tqdm as notebook_bar
 
             return _Tqdm(notebook_bar)
-        except ImportError:
-            pass
     return _Tqdm(tqdm.tqdm)
 
 
@@ -64,7 +63,9 @@ class _Tqdm:
     """A bar of tqdm for each stage."""
 
     def __init__(self, make: Any) -> None:
-        self.make, self.bar, self.stage = make, None, ""
+        self.make = make
+        self.bar: Any = None
+        self.stage = ""
 
     def update(self, stage: str, done: float, total: float | None) -> None:
         if self.bar is None or stage != self.stage:

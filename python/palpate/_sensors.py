@@ -60,7 +60,7 @@ class Sensors(Section):
 
 def _sensors(measure: str, at: Any, options: dict[str, Any]) -> Sensors:
     """Sensors that are `at` a number of places, on a grid (two whole numbers), or at a list of positions."""
-    if isinstance(at, int) and not isinstance(at, bool):
+    if isinstance(at, int):
         return Sensors(measure, count=at, **options)
     if isinstance(at, tuple) and len(at) == 2 and all(isinstance(side, int) for side in at):
         return Sensors(measure, grid=at, **options)

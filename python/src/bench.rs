@@ -319,7 +319,8 @@ impl Setup {
         Ok(Recording::new(self.0.clone(), recording.map_err(|error| of_csv(&error))?))
     }
 
-    /// A recording from a data frame, whose columns are those of a CSV file: by their roles in `columns`, units in their names.
+    /// A recording from a data frame: one of `Recording.to_frame`, or one whose columns are those of a CSV file, by their roles in `columns` and
+    /// with units in their names.
     ///
     /// Parameters
     /// ----------
@@ -328,12 +329,19 @@ impl Setup {
     /// Returns
     /// -------
     /// Recording
-    fn read_frame(&self, frame: &Bound<'_, PyAny>) -> PyResult<Recording> {
-        let options = PyDict::new(frame.py());
+    fn read_frame<'py>(slf: &Bound<'py, Self>, frame: &Bound<'py, PyAny>) -> PyResult<Recording> {
+        let (py, setup) = (slf.py(), slf.get());
+        let own = py.import("palpate._frames")?.call_method1("own_columns", (frame, slf))?;
+        if let Ok(own) = own.cast::<PyDict>() {
+            let recording = slf.call_method("recording", (), Some(own))?;
+            let recording = recording.cast::<Recording>()?.get();
+            return Ok(Recording::new(setup.0.clone(), recording.inner.clone()));
+        }
+        let options = PyDict::new(py);
         options.set_item("index", false)?;
         let text: String = frame.call_method("to_csv", (), Some(&options))?.extract()?;
-        let recording = self.0.read_recording("frame", text.as_bytes()).map_err(|error| of_csv(&error))?;
-        Ok(Recording::new(self.0.clone(), recording))
+        let recording = setup.0.read_recording("frame", text.as_bytes()).map_err(|error| of_csv(&error))?;
+        Ok(Recording::new(setup.0.clone(), recording))
     }
 
     /// A recording from arrays.

@@ -150,7 +150,6 @@ fn contact_dict<'py>(
 }
 
 /// Columns of estimates, a row for each reading.
-#[derive(Default)]
 pub struct Table {
     x_m: Vec<f64>,
     y_m: Vec<f64>,
@@ -160,47 +159,50 @@ pub struct Table {
     force_95_n: Vec<[f64; 2]>,
     covariance: Vec<[f64; 6]>,
     status: Vec<u8>,
-    /// What few rows have: modes and further contacts.
+    /// What few rows have, by row: modes and further contacts.
     several: Vec<(usize, estimator::Estimate)>,
 }
 
+/// What is not known, in a column.
+const UNKNOWN: f64 = f64::NAN;
+
 impl Table {
-    /// Columns with room for so many rows.
-    pub fn with_capacity(rows: usize, extent: Extent) -> Self {
+    /// Columns of so many rows, in which nothing is known yet.
+    pub fn new(rows: usize, extent: Extent) -> Self {
         let across = extent.width_m().map_or(0, |_| rows);
         Self {
-            x_m: Vec::with_capacity(rows),
-            y_m: Vec::with_capacity(across),
-            force_n: Vec::with_capacity(rows),
-            x_95_m: Vec::with_capacity(rows),
-            y_95_m: Vec::with_capacity(across),
-            force_95_n: Vec::with_capacity(rows),
-            covariance: Vec::with_capacity(rows),
-            status: Vec::with_capacity(rows),
+            x_m: vec![UNKNOWN; rows],
+            y_m: vec![UNKNOWN; across],
+            force_n: vec![UNKNOWN; rows],
+            x_95_m: vec![[UNKNOWN; 2]; rows],
+            y_95_m: vec![[UNKNOWN; 2]; across],
+            force_95_n: vec![[UNKNOWN; 2]; rows],
+            covariance: vec![[UNKNOWN; 6]; rows],
+            status: vec![0; rows],
             several: Vec::new(),
         }
     }
 
-    /// Adds a row.
-    pub fn push(&mut self, estimate: &estimator::Estimate, extent: Extent) {
-        const UNKNOWN: f64 = f64::NAN;
+    /// Says a row.
+    pub fn set(&mut self, row: usize, estimate: &estimator::Estimate) {
         let contact = &estimate.contact;
-        let uncertainty = contact.uncertainty.as_ref();
-        let ends = |(low, high): (f64, f64)| [low, high];
-        self.x_m.push(contact.position.x_m);
-        self.force_n.push(contact.force_n.unwrap_or(UNKNOWN));
-        self.x_95_m.push(uncertainty.map_or([UNKNOWN; 2], |uncertainty| ends(uncertainty.x_95_m)));
-        let force_95_n = uncertainty.and_then(|uncertainty| uncertainty.force_95_n);
-        self.force_95_n.push(force_95_n.map_or([UNKNOWN; 2], ends));
-        self.covariance.push(uncertainty.map_or([UNKNOWN; 6], |uncertainty| uncertainty.covariance));
-        if extent.width_m().is_some() {
-            self.y_m.push(contact.position.y_m);
-            self.y_95_m.push(uncertainty.map_or([UNKNOWN; 2], |uncertainty| ends(uncertainty.y_95_m)));
+        self.x_m[row] = contact.position.x_m;
+        self.force_n[row] = contact.force_n.unwrap_or(UNKNOWN);
+        self.status[row] = code(estimate.status);
+        if let Some(y_m) = self.y_m.get_mut(row) {
+            *y_m = contact.position.y_m;
+        }
+        if let Some(uncertainty) = &contact.uncertainty {
+            self.x_95_m[row] = uncertainty.x_95_m.into();
+            self.covariance[row] = uncertainty.covariance;
+            self.force_95_n[row] = uncertainty.force_95_n.map_or([UNKNOWN; 2], Into::into);
+            if let Some(y_95_m) = self.y_95_m.get_mut(row) {
+                *y_95_m = uncertainty.y_95_m.into();
+            }
         }
         if !estimate.modes.as_slice().is_empty() || !estimate.further.as_slice().is_empty() {
-            self.several.push((self.status.len(), *estimate));
+            self.several.push((row, *estimate));
         }
-        self.status.push(code(estimate.status));
     }
 }
 
@@ -234,7 +236,8 @@ pub struct Estimates {
 impl Estimates {
     /// The estimates of a table, whose memory becomes the arrays'.
     pub fn new(py: Python<'_>, table: Table, extent: Extent) -> PyResult<Self> {
-        let Table { x_m, y_m, force_n, x_95_m, y_95_m, force_95_n, covariance, status, several } = table;
+        let Table { x_m, y_m, force_n, x_95_m, y_95_m, force_95_n, covariance, status, mut several } = table;
+        several.sort_by_key(|(row, _)| *row);
         let column = |values: Vec<f64>| PyArray1::from_vec(py, values).unbind();
         fn rows<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Py<PyArray2<f64>>> {
             let shape = [rows.len(), N];
@@ -459,8 +462,8 @@ impl Estimates {
 
     /// The estimate in a row.
     fn row(&self, py: Python<'_>, at: usize) -> PyResult<Estimate> {
-        if let Some((_, estimate)) = self.several.iter().find(|(row, _)| *row == at) {
-            return Ok(Estimate::new(*estimate, self.extent));
+        if let Ok(index) = self.several.binary_search_by_key(&at, |(row, _)| *row) {
+            return Ok(Estimate::new(self.several[index].1, self.extent));
         }
         let number = |column: &Py<PyArray1<f64>>| column.bind(py).readonly().as_array()[at];
         let ends = |column: &Py<PyArray2<f64>>| {

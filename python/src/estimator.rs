@@ -31,9 +31,6 @@ impl Estimator {
     }
 }
 
-/// Seconds that the choice of `auto` may take unless said otherwise, as in the command.
-const AUTO_SECONDS: f64 = 300.0;
-
 #[pymethods]
 impl Estimator {
     /// The method that a rig's section ``[estimator]`` says, for a setup.
@@ -77,7 +74,7 @@ impl Estimator {
     /// ------
     /// PalpateError
     ///     When the recording does not suit the setup or the method.
-    #[pyo3(signature = (recording, *, seed=0, progress=None, auto_seconds=AUTO_SECONDS))]
+    #[pyo3(signature = (recording, *, seed=0, progress=None, auto_seconds=300.0))]
     fn fit(
         &self,
         py: Python<'_>,

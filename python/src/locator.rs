@@ -1,10 +1,11 @@
 //! Locators: what fitting gives, and how readings are located.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
+use palpate::estimators::batch::{BatchError, BatchOptions};
 use palpate::estimators::estimator;
-use palpate::estimators::fit::ReadingError;
 use palpate::estimators::setup;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -34,7 +35,7 @@ impl Locator {
 }
 
 /// Readings that are located between two looks for Ctrl-C.
-const CHUNK: usize = 2048;
+const CHUNK: usize = 8192;
 
 #[pymethods]
 impl Locator {
@@ -46,6 +47,9 @@ impl Locator {
     ///     In SI units, or raw: one reading of the shape (channels), or many of the shape (readings, channels). A C-contiguous array of
     ///     64-bit floats is read as it lies in memory; of a data frame the columns of the channels are taken.
     ///
+    /// threads : int
+    ///     Threads that locate many readings; the estimates do not depend on it.
+    ///
     /// Returns
     /// -------
     /// Estimate or Estimates
@@ -55,7 +59,15 @@ impl Locator {
     /// ------
     /// PalpateError
     ///     For another number of channels, and for a value that is not finite, with its row and channel.
-    fn locate<'py>(&self, py: Python<'py>, readings: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (readings, *, threads=1))]
+    fn locate<'py>(
+        &self,
+        py: Python<'py>,
+        readings: &Bound<'py, PyAny>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let threads =
+            NonZeroUsize::new(threads).ok_or_else(|| refused("`threads` is 0; it must be at least 1"))?;
         let extent = self.setup.surface().extent();
         match arrays::readings(readings, &self.channels)? {
             Readings::One(reading) => {
@@ -63,14 +75,7 @@ impl Locator {
                 Ok(Bound::new(py, Estimate::new(estimate, extent))?.into_any())
             }
             Readings::Many(readings) => {
-                let readings = readings.as_slice()?;
-                let rows = readings.len() / self.channels.len();
-                let mut table = Table::with_capacity(rows, extent);
-                for (k, chunk) in readings.chunks(CHUNK * self.channels.len()).enumerate() {
-                    py.detach(|| self.locate_into(chunk, &mut table))
-                        .map_err(|(row, error)| refused(format!("reading {}: {error}", k * CHUNK + row)))?;
-                    py.check_signals()?;
-                }
+                let table = self.locate_many(py, readings.as_slice()?, threads)?;
                 Ok(Bound::new(py, Estimates::new(py, table, extent)?)?.into_any())
             }
         }
@@ -191,12 +196,27 @@ impl Locator {
 }
 
 impl Locator {
-    /// Adds the estimates of readings to a table; an error names the row within these readings.
-    fn locate_into(&self, readings: &[f64], table: &mut Table) -> Result<(), (usize, ReadingError)> {
-        let extent = self.setup.surface().extent();
-        for (row, reading) in readings.chunks_exact(self.channels.len()).enumerate() {
-            table.push(&self.inner.locate(reading).map_err(|error| (row, error))?, extent);
+    /// Estimates of many readings, one after the other, [`CHUNK`] by [`CHUNK`].
+    fn locate_many(&self, py: Python<'_>, readings: &[f64], threads: NonZeroUsize) -> PyResult<Table> {
+        let (channels, extent) = (self.channels.len(), self.setup.surface().extent());
+        let table = Mutex::new(Table::new(readings.len() / channels, extent));
+        let options = BatchOptions { threads, ..BatchOptions::default() };
+        for (k, chunk) in readings.chunks(CHUNK * channels).enumerate() {
+            let take = |first: usize, estimates: &[estimator::Estimate]| {
+                let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
+                for (i, estimate) in estimates.iter().enumerate() {
+                    table.set(k * CHUNK + first + i, estimate);
+                }
+            };
+            py.detach(|| self.inner.locate_blocks(chunk, options, &take)).map_err(|error| match error {
+                // Rows are counted from 0, as in the array.
+                BatchError::Reading { row, error } => {
+                    refused(format!("readings[{}]: {error}", k * CHUNK + row - 1))
+                }
+                error => refused(error),
+            })?;
+            py.check_signals()?;
         }
-        Ok(())
+        Ok(table.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 }

@@ -1,0 +1,70 @@
+"""What the tests share: the bench of the founding paper, real recordings, and the command."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import palpate as pp
+
+PROJECT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def beam() -> pp.Setup:
+    """The founding paper's beam with noise of 5 µm, touched by an unknown force."""
+    return pp.Setup(pp.Beam("400 mm", "40 mm", "1.2 mm", "200 GPa"), pp.deflection(8, noise="5 um"))
+
+
+@pytest.fixture(scope="session")
+def presses(beam: pp.Setup) -> pp.Recording:
+    return beam.simulate(pp.even(10), force="3 N", repeats=10, seed=0)
+
+
+@pytest.fixture(scope="session")
+def locator(presses: pp.Recording) -> pp.Locator:
+    return pp.Influence().fit(presses)
+
+
+@pytest.fixture(scope="session")
+def plate() -> pp.Setup:
+    surface = pp.Plate("300 mm", "200 mm", "2 mm", "70 GPa", 0.33, edges="simple", elements=24)
+    return pp.Setup(surface, pp.deflection((3, 3), noise="0.1 um"), force="5 N")
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """The folder of real recordings."""
+    folder = Path(os.environ.get("PALPATE_DATA", PROJECT.parent / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"real recordings are not there: {folder}")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def examples() -> Path:
+    return PROJECT / "examples"
+
+
+class Command:
+    """The command `palpate`, as it was built last."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __call__(self, *arguments: object, status: int = 0) -> str:
+        done = subprocess.run([self.path, *map(str, arguments)], capture_output=True, text=True, check=False)
+        assert done.returncode == status, done.stderr
+        return done.stdout
+
+
+@pytest.fixture(scope="session")
+def command() -> Command:
+    """The command, from the environment variable PALPATE, or where cargo puts it."""
+    path = Path(os.environ.get("PALPATE", PROJECT / "target" / "debug" / "palpate"))
+    if not path.is_file():
+        pytest.skip(f"the command is not there: {path}; cargo build --workspace makes it")
+    return Command(path)
