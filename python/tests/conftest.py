@@ -5,12 +5,20 @@ from __future__ import annotations
 import os
 import subprocess
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 import palpate as pp
 
 PROJECT = Path(__file__).resolve().parents[2]
+
+
+def missing(what: str) -> NoReturn:
+    """Skips a test for want of something, or fails it where nothing may be missing."""
+    if os.environ.get("PALPATE_STRICT"):
+        pytest.fail(what)
+    pytest.skip(what)
 
 
 @pytest.fixture(scope="session")
@@ -40,7 +48,7 @@ def data() -> Path:
     """The folder of real recordings."""
     folder = Path(os.environ.get("PALPATE_DATA", PROJECT.parent / "shared" / "data"))
     if not folder.is_dir():
-        pytest.skip(f"real recordings are not there: {folder}")
+        missing(f"real recordings are not there: {folder}")
     return folder
 
 
@@ -66,5 +74,5 @@ def command() -> Command:
     """The command, from the environment variable PALPATE, or where cargo puts it."""
     path = Path(os.environ.get("PALPATE", PROJECT / "target" / "debug" / "palpate"))
     if not path.is_file():
-        pytest.skip(f"the command is not there: {path}; cargo build --workspace makes it")
+        missing(f"the command is not there: {path}; cargo build --workspace makes it")
     return Command(path)

@@ -23,6 +23,11 @@ impl Counts {
         sum(nextest).or_else(|| sum(cargo_test))
     }
 
+    /// Reads pytest's closing line; `None` when there is none.
+    pub fn of_pytest(lines: &[String]) -> Option<Self> {
+        lines.iter().rev().find_map(|line| pytest(line))
+    }
+
     /// Counts tests that found a prerequisite missing, which their runner takes as passed, as skipped.
     pub fn with_skips(self, skips: usize) -> Self {
         let moved = skips.min(self.passed);
@@ -32,8 +37,8 @@ impl Counts {
     fn count(mut self, number: usize, what: &str) -> Self {
         match what {
             "passed" => self.passed += number,
-            "failed" | "timed out" | "exec failed" => self.failed += number,
-            "skipped" | "ignored" => self.skipped += number,
+            "failed" | "timed out" | "exec failed" | "error" | "errors" => self.failed += number,
+            "skipped" | "ignored" | "xfailed" | "xpassed" => self.skipped += number,
             _ => {}
         }
         self
@@ -68,6 +73,14 @@ fn nextest(line: &str) -> Option<Counts> {
 fn cargo_test(line: &str) -> Option<Counts> {
     let (_, results) = line.strip_prefix("test result: ")?.split_once(". ")?;
     Some(tally(results, ';'))
+}
+
+/// `1 failed, 45 passed, 2 skipped, 1 warning in 28.83s`
+fn pytest(line: &str) -> Option<Counts> {
+    let (results, took) = line.trim_matches(['=', ' ']).rsplit_once(" in ")?;
+    let is_closing = took.starts_with(|first: char| first.is_ascii_digit()) && took.contains('s');
+    let counts = tally(results, ',');
+    (is_closing && counts != Counts::default()).then_some(counts)
 }
 
 fn tally(results: &str, between: char) -> Counts {
@@ -131,6 +144,16 @@ mod tests {
     #[test]
     fn a_failed_build_has_no_counts() {
         assert_eq!(read("error: could not compile `palpate`\nSummary of nothing"), None);
+    }
+
+    #[test]
+    fn the_closing_line_of_pytest_is_read() {
+        let read = |line: &str| Counts::of_pytest(&["0.40s call tests/a.py".to_owned(), line.to_owned()]);
+        let counts = read("1 failed, 45 passed, 2 skipped, 1 warning in 28.83s");
+        assert_eq!(counts, Some(Counts { passed: 45, failed: 1, skipped: 2 }));
+        let counts = read("===== 316 passed, 1 error in 131.02s (0:02:11) =====");
+        assert_eq!(counts, Some(Counts { passed: 316, failed: 1, skipped: 0 }));
+        assert_eq!(read("no tests ran in 0.01s"), None);
     }
 
     #[test]

@@ -1,9 +1,10 @@
-//! The project's chores: `cargo xtask test | tidy | rig-keys | bench | fuzz`.
+//! The project's chores: `cargo xtask test | wheel | tidy | rig-keys | bench | fuzz`.
 #![forbid(unsafe_code)]
 
 mod counts;
 mod fuzz;
 mod needs;
+mod python;
 mod rig_keys;
 mod run;
 mod skipped;
@@ -26,12 +27,14 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Chore {
-    /// Run every check: formatting, clippy, tests, doc tests, docs, tidy
+    /// Run every check: formatting, clippy, tests, doc tests, docs, Python tests, tidy
     Test {
         /// A test that is skipped for want of a prerequisite fails
         #[arg(long)]
         strict: bool,
     },
+    /// Build the wheel of the Python package, and run its tests on it with the oldest and the newest of what it supports
+    Wheel,
     /// Write docs/rig-keys.md from the types that rig and study files are read into
     RigKeys,
     /// Check the rules that a program can check: dependencies, import circles, links
@@ -59,8 +62,9 @@ fn main() -> ExitCode {
     let root = root();
     let done = match Arguments::parse().chore {
         Chore::Test { strict } => {
-            test::run(&root, if strict { test::Skips::Fail } else { test::Skips::Pass })
+            test::run(&root, if strict { skipped::Skips::Fail } else { skipped::Skips::Pass })
         }
+        Chore::Wheel => python::wheel(&root),
         Chore::RigKeys => rig_keys::run(&root),
         Chore::Tidy => tidy::run(&root),
         Chore::Bench { for_cargo, for_benches } => {

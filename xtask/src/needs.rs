@@ -47,8 +47,23 @@ pub const NEXTEST: Need = Need {
     without: Without::FallsBack("cargo test runs the tests instead"),
 };
 
-const NEEDS: [Need; 3] = [
+/// Runs the tests of the Python package.
+pub const PYTHON: Need = Need {
+    name: "Python with venv",
+    variable: None,
+    found: |_, _| {
+        run::answers("python3", &["-c", "import venv, ensurepip, sys; assert sys.version_info >= (3, 10)"])
+    },
+    packages: &["python3", "python3-venv"],
+    without: Without::Skips {
+        tests: &["every test of the Python package"],
+        remedy: "install Python 3.10 or later with its modules venv and ensurepip",
+    },
+};
+
+const NEEDS: [Need; 4] = [
     NEXTEST,
+    PYTHON,
     Need {
         name: "the folder of real recordings",
         variable: Some("PALPATE_DATA"),

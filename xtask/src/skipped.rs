@@ -10,6 +10,18 @@ use anyhow::{Context, Result};
 /// Names the file to which a test that skips adds a line.
 pub const VARIABLE: &str = "PALPATE_SKIPPED";
 
+/// Tells a test that it must fail where it would skip.
+pub const STRICT: &str = "PALPATE_STRICT";
+
+/// Verdict on a test that is skipped for want of a prerequisite.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Skips {
+    /// The test is named and counted.
+    Pass,
+    /// The test fails.
+    Fail,
+}
+
 /// The file of one run.
 pub struct Skipped {
     /// Its path.

@@ -8,24 +8,13 @@ use anyhow::Result;
 
 use crate::counts::Counts;
 use crate::needs::{self, NEXTEST, Without};
+use crate::python;
 use crate::run;
-use crate::skipped::{self, Skipped};
+use crate::skipped::{self, STRICT, Skipped, Skips};
 use crate::tidy;
-
-/// Tells a test that it must fail where it would skip.
-const STRICT: &str = "PALPATE_STRICT";
 
 /// Arguments for all that is checked: every crate, with the features that are off by default.
 const EVERYTHING: [&str; 2] = ["--workspace", "--all-features"];
-
-/// Verdict on a test that is skipped for want of a prerequisite.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Skips {
-    /// The test is named and counted.
-    Pass,
-    /// The test fails.
-    Fail,
-}
 
 /// Result of one step.
 struct Step {
@@ -51,6 +40,7 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
             let mut docs = cargo(root, &[&["doc", "--no-deps"], &EVERYTHING[..]].concat());
             Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
         })?,
+        step("Python tests", || python::test(root, skips))?,
         step("tidy", || Ok((tidy::run(root)?, None)))?,
     ];
     let lines = skipped.lines()?;

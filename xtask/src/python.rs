@@ -1,0 +1,176 @@
+//! The Python package: its tests in an environment of their own, and its wheel, checked with the oldest and the newest of what it supports.
+
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+use crate::counts::Counts;
+use crate::needs::PYTHON;
+use crate::run;
+use crate::skipped::{STRICT, Skips};
+
+/// What the tests need, of any version.
+const REQUIREMENTS: &str = "python/tests/requirements.txt";
+/// The oldest versions that the package supports, of what its tests need.
+const OLDEST: &str = "python/tests/oldest.txt";
+/// Most bytes of a wheel.
+const MOST_BYTES: u64 = 6_000_000;
+/// The C library that wheels are for: that of Debian 10, Ubuntu 18.10 and all later ones.
+const MANYLINUX: &str = "manylinux_2_28";
+
+/// Compiles the package, and runs its tests in the environment `target/xtask/python`, which is made where it is not there.
+pub fn test(root: &Path, skips: Skips) -> Result<(bool, Option<Counts>)> {
+    if !PYTHON.is_there(root) {
+        println!("{}", PYTHON.describe());
+        return Ok((skips == Skips::Pass, None));
+    }
+    let mut build = Command::new("cargo");
+    build.args(["build", "--quiet", "-p", "palpate-python", "-p", "palpate-cli"]).current_dir(root);
+    if !run::shown(&mut build)? {
+        return Ok((false, None));
+    }
+    let built = root.join("target/debug").join(format!("{DLL_PREFIX}_palpate{DLL_SUFFIX}"));
+    let module = root.join("python/palpate/_palpate.abi3.so");
+    fs::copy(&built, &module).with_context(|| format!("cannot copy {}", built.display()))?;
+    let environment = Environment::at(root, "target/xtask/python", "python3", &[REQUIREMENTS])?;
+    let mut tests = environment.pytest(root);
+    tests.env("PYTHONPATH", root.join("python"));
+    if skips == Skips::Fail {
+        tests.env(STRICT, "1");
+    }
+    let watched = run::watched(&mut tests)?;
+    Ok((watched.succeeded, Counts::of_pytest(&watched.lines)))
+}
+
+/// Builds the wheel and runs the package's tests on it, in fresh environments with the newest and with the oldest of what it supports.
+pub fn wheel(root: &Path) -> Result<bool> {
+    let tools = Environment::at(root, "target/xtask/maturin", "python3", &["python/wheel.txt"])?;
+    let wheels = root.join("target/wheels");
+    remove(&wheels)?;
+    let mut build = tools.run("maturin");
+    build.args([
+        "build",
+        "--release",
+        "--zig",
+        "--compatibility",
+        MANYLINUX,
+        "--manifest-path",
+        "python/Cargo.toml",
+    ]);
+    if !run::shown(build.arg("--out").arg(&wheels).current_dir(root))? {
+        return Ok(false);
+    }
+    let wheel = only_wheel(&wheels)?;
+    let bytes = fs::metadata(&wheel)?.len();
+    let size = format!("{:.2} MB", bytes as f64 / 1e6);
+    println!("{}: {size}; at most {} MB", wheel.display(), MOST_BYTES / 1_000_000);
+    let mut succeeded = bytes <= MOST_BYTES;
+    // The oldest Python that is here stands for the oldest of all.
+    let oldest = ["python3.10", "python3.11", "python3"]
+        .into_iter()
+        .find(|python| run::answers(python, &["--version"]));
+    for (name, python, requirements) in [
+        ("newest", "python3", &[REQUIREMENTS][..]),
+        ("oldest", oldest.unwrap_or("python3"), &[REQUIREMENTS, OLDEST][..]),
+    ] {
+        println!("\n=== the wheel with the {name} of what it supports");
+        let folder = format!("target/xtask/wheel-{name}");
+        remove(&root.join(&folder))?;
+        let environment = Environment::at(root, &folder, python, requirements)?;
+        let mut install = environment.run("python");
+        install.args(["-m", "pip", "install", "--quiet", "--no-deps"]).arg(&wheel);
+        if !run::shown(&mut install)? {
+            bail!("the wheel cannot be installed");
+        }
+        let mut tests = environment.pytest(root);
+        succeeded &= run::shown(tests.env("PALPATE_OPTIMISED", "1").env_remove("PYTHONPATH"))?;
+    }
+    Ok(succeeded)
+}
+
+/// A virtual environment.
+struct Environment {
+    folder: PathBuf,
+}
+
+impl Environment {
+    /// The environment in a folder, with what these files require; made anew where it is not there, or was made from other requirements.
+    fn at(root: &Path, folder: &str, python: &str, requirements: &[&str]) -> Result<Self> {
+        let own = Self { folder: root.join(folder) };
+        let wanted: Result<Vec<String>> = requirements
+            .iter()
+            .map(|file| fs::read_to_string(root.join(file)).with_context(|| format!("cannot read {file}")))
+            .collect();
+        let wanted = wanted?.concat();
+        let stamp = own.folder.join("requirements.txt");
+        if fs::read_to_string(&stamp).is_ok_and(|made| made == wanted) {
+            return Ok(own);
+        }
+        remove(&own.folder)?;
+        println!("making {folder}");
+        let mut make = Command::new(python);
+        let mut install = own.run("python");
+        install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]).current_dir(root);
+        // The first file may be of any version: what others say of the same packages constrains it.
+        for (i, file) in requirements.iter().enumerate() {
+            install.args([if i == 0 { "-r" } else { "-c" }, file]);
+        }
+        if !run::shown(make.args(["-m", "venv"]).arg(&own.folder))? || !run::shown(&mut install)? {
+            bail!("the environment {folder} cannot be made");
+        }
+        fs::write(&stamp, wanted).with_context(|| format!("cannot write {}", stamp.display()))?;
+        Ok(own)
+    }
+
+    /// A program of the environment.
+    fn run(&self, program: &str) -> Command {
+        let programs = self.folder.join(if cfg!(windows) { "Scripts" } else { "bin" });
+        let mut command = Command::new(programs.join(program));
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let paths = std::iter::once(programs).chain(std::env::split_paths(&path));
+        if let Ok(paths) = std::env::join_paths(paths) {
+            command.env("PATH", paths);
+        }
+        command.env("VIRTUAL_ENV", &self.folder);
+        command
+    }
+
+    /// The tests of the package.
+    fn pytest(&self, root: &Path) -> Command {
+        let mut tests = self.run("python");
+        tests.args([
+            "-m",
+            "pytest",
+            "-c",
+            "../pyproject.toml",
+            "-q",
+            "--durations=10",
+            "-p",
+            "no:cacheprovider",
+        ]);
+        // Not in the folder of the package, which would be found before the one that is installed.
+        tests.current_dir(root.join("python/tests"));
+        tests
+    }
+}
+
+/// Removes a folder with what is in it, where it is there.
+fn remove(folder: &Path) -> Result<()> {
+    match fs::remove_dir_all(folder) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("cannot remove {}", folder.display()))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn only_wheel(folder: &Path) -> Result<PathBuf> {
+    let files = fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let mut wheels = files.filter_map(|file| file.ok().map(|file| file.path()));
+    wheels
+        .find(|path| path.extension().is_some_and(|extension| extension == "whl"))
+        .context("there is no wheel")
+}
