@@ -43,6 +43,27 @@ class Estimator(Section):
         """
         return self.of(recording.setup).fit(recording, seed=seed, progress=progress)
 
+    def fit_many(
+        self,
+        recording: Recording,
+        seeds: Sequence[int],
+        *,
+        threads: int | None = None,
+        progress: Progress = None,
+    ) -> list[Locator]:
+        """Fit the method once for every seed; see `palpate.Estimator.fit_many`.
+
+        Examples
+        --------
+        >>> import palpate as pp
+        >>> beam = pp.Beam("400 mm", "40 mm", "1.2 mm", "200 GPa")
+        >>> setup = pp.Setup(beam, pp.deflection(8, noise="5 um"), force="3 N")
+        >>> networks = pp.Network(max_epochs=100).fit_many(setup.simulate(pp.even(10)), seeds=range(3))
+        >>> [network.seed for network in networks]
+        [0, 1, 2]
+        """
+        return self.of(recording.setup).fit_many(recording, list(seeds), threads=threads, progress=progress)
+
     def of(self, setup: Setup) -> _palpate.Estimator:
         """The method as it is for a setup, its keys checked.
 

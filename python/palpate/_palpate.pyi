@@ -150,6 +150,14 @@ class Estimator:
         progress: Progress = None,
         auto_seconds: float = 300.0,
     ) -> Locator: ...
+    def fit_many(
+        self,
+        recording: Recording,
+        seeds: Sequence[int],
+        *,
+        threads: int | None = None,
+        progress: Progress = None,
+    ) -> list[Locator]: ...
 
 @final
 class Estimate:

@@ -1,10 +1,13 @@
 //! Estimators of a setup, and how they are fitted.
 
+use std::num::NonZeroUsize;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
 use std::time::Instant;
 
 use palpate::estimators::estimator::{self, Choice, TimeLimit, choose};
-use palpate::estimators::fit::{Fit, FitTask};
+use palpate::estimators::fit::{Fit, FitTask, SeedQueue};
 use palpate::estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate::estimators::setup;
 use pyo3::prelude::*;
@@ -113,6 +116,62 @@ impl Estimator {
         Ok(Locator::new(locator, choice))
     }
 
+    /// Fit the method once for every seed: the locators of the method alone, without the check that says what their estimates are worth.
+    ///
+    /// Networks are trained side by side, as in a study.
+    ///
+    /// Parameters
+    /// ----------
+    /// recording : Recording
+    ///     Readings with their contacts.
+    /// seeds : sequence of int
+    ///     Seeds of whatever the method draws at random.
+    /// threads : int, optional
+    ///     Threads that fit, on which the locators do not depend; as many as the machine has where nothing is said.
+    /// progress : bool or callable, optional
+    ///     As of `fit`, by seeds that are done.
+    ///
+    /// Returns
+    /// -------
+    /// list of Locator
+    ///     In the order of the seeds.
+    ///
+    /// Raises
+    /// ------
+    /// PalpateError
+    ///     When the recording does not suit the setup or the method.
+    #[pyo3(signature = (recording, seeds, *, threads=None, progress=None))]
+    fn fit_many(
+        &self,
+        py: Python<'_>,
+        recording: &Recording,
+        seeds: Vec<u64>,
+        threads: Option<NonZeroUsize>,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Vec<Locator>> {
+        let threads = threads.or_else(|| thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
+        let task = FitTask::new(&self.setup, &recording.inner);
+        let next = AtomicUsize::new(0);
+        let fitted = work::run_with(py, progress, None, |watch| {
+            let next = &next;
+            let one = || -> Result<Vec<(usize, estimator::Locator)>, estimator::FitError> {
+                let mut queue = Seeds { seeds: &seeds, next, taken: Vec::new(), done: Vec::new() };
+                self.inner.fit_many(task.watch(watch), &mut queue)?;
+                Ok(queue.done)
+            };
+            thread::scope(|scope| {
+                let running: Vec<_> = (0..threads.get().min(seeds.len())).map(|_| scope.spawn(one)).collect();
+                let ended = running
+                    .into_iter()
+                    .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+                ended.collect::<Result<Vec<_>, _>>()
+            })
+        })?;
+        let mut fitted = fitted.map_err(|error| of_work(&error))?.concat();
+        fitted.sort_by_key(|(index, _)| *index);
+        Ok(fitted.into_iter().map(|(_, locator)| Locator::new(locator, None)).collect())
+    }
+
     fn __repr__(&self) -> String {
         format!("<Estimator: {}>", self.kind())
     }
@@ -122,6 +181,31 @@ impl Estimator {
         let text =
             own.text.clone().ok_or_else(|| refused("an estimator of a rig is pickled with its rig"))?;
         Ok((slf.get_type().into_any(), (text, Setup(own.setup.clone()))))
+    }
+}
+
+/// Seeds that several threads take from one list, and what this thread has made of its own.
+struct Seeds<'a> {
+    seeds: &'a [u64],
+    /// Index of the next seed that no thread has taken.
+    next: &'a AtomicUsize,
+    /// Indices of the seeds that this thread has taken and not finished.
+    taken: Vec<usize>,
+    done: Vec<(usize, estimator::Locator)>,
+}
+
+impl SeedQueue<estimator::Locator> for Seeds<'_> {
+    fn next_seed(&mut self) -> Option<u64> {
+        let index = self.next.fetch_add(1, Ordering::Relaxed);
+        let seed = self.seeds.get(index)?;
+        self.taken.push(index);
+        Some(*seed)
+    }
+
+    fn fitted(&mut self, seed: u64, result: estimator::Locator) {
+        if let Some(at) = self.taken.iter().position(|index| self.seeds[*index] == seed) {
+            self.done.push((self.taken.swap_remove(at), result));
+        }
     }
 }
 

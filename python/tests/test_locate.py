@@ -177,3 +177,14 @@ def test_auto_says_why():
     assert choice["best"] == locator.kind
     tried = {one["kind"]: one for one in choice["tried"]}
     assert locator.kind in tried and tried[locator.kind]["mean_error"] > 0
+
+
+def test_many_seeds_are_those_of_single_fits(beam):
+    presses = beam.simulate(pp.even(10), force=3.0, seed=0)
+    network = pp.Network(max_epochs=300)
+    many = network.fit_many(presses, [4, 0, 9, 4], threads=2)
+    assert [locator.seed for locator in many] == [4, 0, 9, 4] and many[0] == many[3]
+    # A single fit has a check of its estimates, which says their status and leaves a clean one's place.
+    alone = network.fit(presses, seed=9)
+    assert np.allclose(many[2].locate(presses.readings).x, alone.locate(presses.readings).x, rtol=1e-12)
+    assert many[2].training == alone.training and network.fit_many(presses, []) == []
