@@ -94,6 +94,8 @@ CHECKERS = {
 
 @pytest.mark.parametrize("checker", CHECKERS.values(), ids=CHECKERS)
 def test_types(checker):
+    if not (PACKAGE.parent / "pyproject.toml").is_file():
+        pytest.skip("an installed package is checked where its source is")
     environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
     run = [sys.executable, "-m", *checker]
     done = subprocess.run(run, cwd=PACKAGE.parent, env=environment, capture_output=True, text=True, check=False)
