@@ -25,6 +25,7 @@ from ._estimators import (
     Neighbours,
     Network,
 )
+from ._limit import Limit, limit
 from ._palpate import (
     Estimate,
     Estimates,
@@ -57,6 +58,7 @@ __all__ = [
     "GaussianProcess",
     "Influence",
     "LevenbergMarquardt",
+    "Limit",
     "Locator",
     "Measured",
     "Neighbours",
@@ -76,6 +78,7 @@ __all__ = [
     "edge_dense",
     "even",
     "grid",
+    "limit",
     "parse_quantity",
     "raw",
     "reaction",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import html
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from ._palpate import Estimates, Locator, Recording, Setup
+    from ._results import Result
 
 _WIDTH = 560.0
 _MARGIN = 24.0
@@ -43,6 +45,19 @@ def estimates(estimates: Estimates) -> str:
     ]
     rows["status"] = [str(status) for status in estimates.status[:_ROWS]]
     return f"<div>{html.escape(repr(estimates)[1:-1])}</div>{_table(rows, len(estimates))}"
+
+
+def result(result: Result, notes: Sequence[str] = ()) -> str:
+    """A result in words, what is to be noted of it, and its first rows."""
+    listed = "".join(f"<li>{html.escape(note)}</li>" for note in notes)
+    rows = {name: [_cell(value) for value in column[:_ROWS]] for name, column in result._columns().items()}
+    return f"<div>{html.escape(repr(result)[1:-1])}</div>{f'<ul>{listed}</ul>' if listed else ''}{_table(rows, len(result))}"
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, (float, np.floating)):
+        return "" if np.isnan(value) else f"{value:.4g}"
+    return str(value)
 
 
 def _recording_rows(recording: Recording) -> dict[str, list[str]]:

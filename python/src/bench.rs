@@ -20,7 +20,7 @@ use crate::errors::{io_error, of_csv, refused};
 use crate::files::write_whole;
 use crate::quantities::force_n;
 use crate::sections;
-use crate::training::{Training, checked_force, position};
+use crate::training::{self, Training, checked_force};
 
 /// A surface with its sensors, all checked: what a reading comes from.
 ///
@@ -154,6 +154,17 @@ impl Setup {
         Ok(Self(Arc::new((*self.0).clone().with_force(force_n).map_err(refused)?)))
     }
 
+    /// The same setup with this noise of every sensor that measures in its unit.
+    ///
+    /// Parameters
+    /// ----------
+    /// noise : str
+    ///     Standard deviation of a reading's noise with its unit: "5 um".
+    fn with_noise(&self, noise: &str) -> PyResult<Self> {
+        let noise = noise.parse().map_err(|error| refused(format!("`noise`: {error}")))?;
+        Ok(Self(Arc::new((*self.0).clone().with_noise(noise).map_err(refused)?)))
+    }
+
     /// The training positions on this surface, each once.
     ///
     /// Returns
@@ -226,12 +237,12 @@ impl Setup {
     fn simulate_at(
         &self,
         py: Python<'_>,
-        positions: Vec<Bound<'_, PyAny>>,
+        positions: Bound<'_, PyAny>,
         force: Option<Bound<'_, PyAny>>,
         repeats: usize,
         seed: u64,
     ) -> PyResult<Recording> {
-        let positions: Vec<Position> = positions.iter().map(position).collect::<PyResult<_>>()?;
+        let positions = training::positions(&positions)?;
         let forces_n = self.forces(force, positions.len())?;
         let contacts: Vec<Contact> = positions
             .into_iter()
@@ -260,10 +271,10 @@ impl Setup {
     fn response<'py>(
         &self,
         py: Python<'py>,
-        positions: Vec<Bound<'py, PyAny>>,
+        positions: Bound<'py, PyAny>,
         force: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let positions: Vec<Position> = positions.iter().map(position).collect::<PyResult<_>>()?;
+        let positions = training::positions(&positions)?;
         let forces_n = match force {
             Some(force) => self.forces(Some(force), positions.len())?,
             None => vec![1.0; positions.len()],

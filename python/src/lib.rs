@@ -11,11 +11,14 @@ mod errors;
 mod estimates;
 mod estimator;
 mod files;
+mod limit;
 mod locator;
 mod quantities;
 mod rig;
 mod sections;
+mod subject;
 mod training;
+mod values;
 mod work;
 
 use pyo3::prelude::*;
@@ -29,6 +32,7 @@ mod _palpate {
         bench::{Recording, Setup},
         estimates::{Estimate, Estimates},
         estimator::Estimator,
+        limit::limit,
         locator::Locator,
         quantities::parse_quantity,
         rig::Rig,

@@ -36,6 +36,11 @@ pub fn force_n(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     si(value, name, Dimension::Force)
 }
 
+/// A share: 0.05, or "5 %".
+pub fn share(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    si(value, name, Dimension::Ratio)
+}
+
 /// The SI value of a text with a unit, and the noun of what it measures.
 ///
 /// Parameters

@@ -4,7 +4,7 @@ use palpate::estimators::arrangement::{self, Arrangement};
 use palpate::mechanics::contact::Position;
 use palpate::mechanics::units::format_length_mm;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyString, PyTuple};
 
 use crate::errors::refused;
 use crate::quantities::{force_n, length_m};
@@ -28,7 +28,7 @@ impl Training {
         middle: Option<usize>,
         portion: Option<(f64, f64)>,
         grid: Option<(usize, usize)>,
-        positions: Option<Vec<Bound<'_, PyAny>>>,
+        positions: Option<Bound<'_, PyAny>>,
         repeats: usize,
         force: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
@@ -52,8 +52,7 @@ impl Training {
                 (Arrangement::Grid { columns, rows }, columns.saturating_mul(rows))
             }
             "explicit" => {
-                let positions = positions.ok_or_else(|| needed("positions"))?;
-                let positions: Vec<Position> = positions.iter().map(position).collect::<PyResult<_>>()?;
+                let positions = self::positions(&positions.ok_or_else(|| needed("positions"))?)?;
                 let count = positions.len();
                 (Arrangement::Explicit(positions), count)
             }
@@ -142,10 +141,23 @@ pub fn checked_force(force: &Bound<'_, PyAny>) -> PyResult<f64> {
     }
 }
 
+/// Positions, one after the other: a list of them, or an array of the shape (positions) or (positions, 2).
+pub fn positions(value: &Bound<'_, PyAny>) -> PyResult<Vec<Position>> {
+    value.try_iter()?.map(|at| position(&at?)).collect()
+}
+
 /// A position: a length on a line, two on a plane.
 pub fn position(value: &Bound<'_, PyAny>) -> PyResult<Position> {
-    if let Ok((x, y)) = value.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>() {
-        return Ok(Position { x_m: length_m(&x, "x")?, y_m: length_m(&y, "y")? });
+    if let (false, Ok(coordinates)) = (value.is_instance_of::<PyString>(), value.try_iter()) {
+        let coordinates: Vec<_> = coordinates.collect::<PyResult<_>>()?;
+        return match coordinates.as_slice() {
+            [x] => Ok(Position::along(length_m(x, "x")?)),
+            [x, y] => Ok(Position { x_m: length_m(x, "x")?, y_m: length_m(y, "y")? }),
+            other => {
+                let count = other.len();
+                Err(refused(format!("a position has {count} coordinates; it must have 1, or 2 on a plane")))
+            }
+        };
     }
     Ok(Position::along(length_m(value, "position")?))
 }

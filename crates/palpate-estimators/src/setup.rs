@@ -12,6 +12,7 @@ use palpate_mechanics::sensing::{
     Layout, LayoutError, Placement, Sensor, SensorGroup, SensorKind, even_positions,
 };
 use palpate_mechanics::surface::{Extent, InsensitiveSensor, SurfaceSpec};
+use palpate_mechanics::units::Quantity;
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 
@@ -104,6 +105,12 @@ pub enum SetupError {
     /// No sensor.
     #[error("a group of 0 sensors; at least 1 is needed")]
     NoSensors,
+    /// Noise in a unit in which no sensor measures.
+    #[error("noise of {noise}: no sensor measures in this unit")]
+    NoSensorOfUnit {
+        /// The noise.
+        noise: Quantity,
+    },
     /// A sensor that cannot be.
     #[error(transparent)]
     Layout(#[from] LayoutError),
@@ -267,6 +274,33 @@ impl Setup {
         self.check_places(&layout)?;
         self.layout = layout;
         Ok(())
+    }
+
+    /// The same with this standard deviation of the noise of every sensor that measures in its unit.
+    ///
+    /// ```
+    /// use palpate_estimators::setup::Setup;
+    /// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, um}};
+    ///
+    /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+    /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+    /// let quieter = setup.with_noise("1 um".parse()?)?;
+    /// assert_eq!(quieter.layout().sensors()[7].channel.noise_sd, um(1.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`SetupError`] where no sensor measures in its unit, and for one that is less than 0.
+    pub fn with_noise(mut self, noise: Quantity) -> Result<Self, SetupError> {
+        let meant = |sensor: &Sensor| sensor.kind.dimension() == noise.dimension;
+        if !self.layout.sensors().iter().any(meant) {
+            return Err(SetupError::NoSensorOfUnit { noise });
+        }
+        self.edit_sensors(|sensors| {
+            let meant = sensors.iter_mut().filter(|sensor| meant(sensor));
+            meant.for_each(|sensor| sensor.channel.noise_sd = noise.value);
+        })?;
+        Ok(self)
     }
 
     fn check_places(&self, layout: &Layout) -> Result<(), OffSurface> {

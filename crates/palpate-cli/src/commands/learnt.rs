@@ -1,10 +1,8 @@
 //! Structure, drift, scatter and noise that a recording has told of a surface without a model, in words and as JSON.
 
 use crate::json::object;
-use palpate_estimators::estimator::{Locator, Method};
-use palpate_estimators::influence::{
-    DriftCourse, ForceLinearLocator, InfluenceLocator, Scatter, Source, Structure,
-};
+use palpate_estimators::estimator::Locator;
+use palpate_estimators::influence::{DriftCourse, ForceLinearLocator, Scatter, Source, Structure};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::units::{format_count, format_length_mm};
 use palpate_numerics::regression::Kernel;
@@ -12,12 +10,7 @@ use serde::Serialize;
 
 /// The locator of a force-linear surface, and the names of its channels; `None` of any other.
 pub fn of_locator(locator: &Locator) -> Option<(&ForceLinearLocator, Vec<String>)> {
-    match &locator.method {
-        Method::Influence(InfluenceLocator::ForceLinear(linear)) => {
-            Some((linear, locator.setup.layout().names()))
-        }
-        _ => None,
-    }
+    Some((locator.force_linear()?, locator.setup.layout().names()))
 }
 
 /// All that was learnt.

@@ -8,17 +8,16 @@ use crate::output::{self, Table, figure};
 use crate::progress::Observer;
 use crate::tables::{self, CsvTable};
 use crate::target::{Inputs, TargetFolder};
-use palpate_estimators::estimator::Method;
-use palpate_estimators::influence::{ForceLinearLocator, Influence, InfluenceLocator};
+use palpate_estimators::influence::{ForceLinearLocator, Influence};
 use palpate_estimators::lightest_touch::{LightestTouch, TouchSummary};
-use palpate_estimators::setup::Setup;
+use palpate_estimators::setup::{Setup, SetupError};
 use palpate_estimators::status::FalseAlarmRate;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{
     Bound, CramerRaoBound, Force, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
     positions_with_spacing,
 };
-use palpate_mechanics::sensing::{NoiseError, Sensor};
+use palpate_mechanics::sensing::NoiseError;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
 use palpate_numerics::watch::Watch;
@@ -121,10 +120,7 @@ fn check_cost(setup: &Setup, listed: usize, arguments: &Arguments) -> Result<(),
 /// The influence functions that a locator of a surface without a model has learnt.
 fn learnt(bench: &RigOrLocator) -> Option<&ForceLinearLocator> {
     match bench {
-        RigOrLocator::Locator(locator) => match &locator.method {
-            Method::Influence(InfluenceLocator::ForceLinear(linear)) => Some(linear),
-            _ => None,
-        },
+        RigOrLocator::Locator(locator) => locator.force_linear(),
         RigOrLocator::Rig(_) => None,
     }
 }
@@ -139,34 +135,26 @@ fn false_alarm_rate(bench: &RigOrLocator) -> FalseAlarmRate {
 
 /// The bench, with the noise of the command line, or that which a locator has learnt.
 fn setup(bench: &RigOrLocator, arguments: &Arguments) -> Result<Setup, Failure> {
-    let mut setup = bench.setup().clone();
-    if let Some(linear) = learnt(bench) {
-        if let Some(noise) = arguments.noise.first() {
-            let complaint =
-                format!("--noise {noise}: the noise of a locator of a measured surface is what it learnt");
-            return Err(Complaint::new(complaint).help("leave --noise out").into());
+    let mut setup = match bench {
+        RigOrLocator::Rig(rig) => rig.setup.clone(),
+        RigOrLocator::Locator(locator) => {
+            locator.learnt_setup().map_err(|error| Complaint::about(&arguments.rig, error))?
         }
-        let learnt = setup.edit_sensors(|sensors| {
-            sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true);
-            for (c, _, noise_sd) in linear.channels() {
-                sensors[c].channel.dead = false;
-                sensors[c].channel.noise_sd = noise_sd;
-            }
-        });
-        learnt.map_err(|error| Complaint::about(&arguments.rig, error))?;
+    };
+    if let (Some(_), Some(noise)) = (learnt(bench), arguments.noise.first()) {
+        let complaint =
+            format!("--noise {noise}: the noise of a locator of a measured surface is what it learnt");
+        return Err(Complaint::new(complaint).help("leave --noise out").into());
     }
     for noise in &arguments.noise {
-        let meant = |sensor: &Sensor| sensor.kind.dimension() == noise.dimension;
-        if !setup.layout().sensors().iter().any(meant) {
-            let complaint =
-                Complaint::new(format!("--noise {noise}: no sensor of the rig measures in this unit"));
-            return Err(complaint.help("give the noise in the unit of the readings, as in \"5 um\"").into());
-        }
-        let edited = setup.edit_sensors(|sensors| {
-            let meant = sensors.iter_mut().filter(|sensor| meant(sensor));
-            meant.for_each(|sensor| sensor.channel.noise_sd = noise.value);
-        });
-        edited.map_err(|error| Complaint::new(format!("--noise {noise}: {error}")))?;
+        setup = setup.with_noise(*noise).map_err(|error| match error {
+            SetupError::NoSensorOfUnit { .. } => {
+                let complaint =
+                    Complaint::new(format!("--noise {noise}: no sensor of the rig measures in this unit"));
+                complaint.help("give the noise in the unit of the readings, as in \"5 um\"")
+            }
+            error => Complaint::new(format!("--noise {noise}: {error}")),
+        })?;
     }
     Ok(setup)
 }

@@ -24,7 +24,9 @@ use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, Digi
 use crate::evaluation::{Evaluation, EvaluationError, Split, TimedEvaluation, evaluate_splits};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue};
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
-use crate::influence::{BeamLikelihood, Influence, InfluenceFitError, InfluenceLocator, PlateLikelihood};
+use crate::influence::{
+    BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, PlateLikelihood,
+};
 use crate::likelihood::Likelihood;
 use crate::load_profile::LoadChannel;
 use crate::neighbours::{Neighbours, NeighboursFitError, NeighboursLocator};
@@ -35,7 +37,7 @@ use crate::network::{
 use crate::offset_course::OffsetCourse;
 use crate::reading_check::ReadingCheck;
 use crate::recording::Recording;
-use crate::setup::Setup;
+use crate::setup::{Setup, SetupError};
 use crate::status::FalseAlarmRate;
 
 use palpate_mechanics::surface::SurfaceSpec;
@@ -401,6 +403,32 @@ impl Locator {
             Method::Digit(digit) => Some(digit.false_alarm_rate),
             _ => self.check.as_ref()?.false_alarm_rate(),
         }
+    }
+
+    /// The influence functions of a surface without a model that are proportional to force, or to a power of it; `None` of any other locator.
+    pub fn force_linear(&self) -> Option<&ForceLinearLocator> {
+        match &self.method {
+            Method::Influence(InfluenceLocator::ForceLinear(linear)) => Some(linear),
+            _ => None,
+        }
+    }
+
+    /// Its setup with the noise that it has learnt, where it has, and channels that it does not use dead.
+    ///
+    /// # Errors
+    /// [`SetupError`] for noise that no sensor has.
+    pub fn learnt_setup(&self) -> Result<Setup, SetupError> {
+        let mut setup = self.setup.clone();
+        if let Some(linear) = self.force_linear() {
+            setup.edit_sensors(|sensors| {
+                sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true);
+                for (channel, _, noise_sd) in linear.channels() {
+                    sensors[channel].channel.dead = false;
+                    sensors[channel].channel.noise_sd = noise_sd;
+                }
+            })?;
+        }
+        Ok(setup)
     }
 
     /// The weights of a network; nothing for another method.

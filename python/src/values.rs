@@ -1,0 +1,87 @@
+//! Results as Python's own values: columns of numbers, and small tables of names.
+
+use numpy::{PyArray1, PyArrayMethods, ToPyArray};
+use palpate::mechanics::contact::Position;
+use palpate::mechanics::surface::Extent;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use serde_json::Value;
+
+use crate::errors::refused;
+
+/// Fields of a result, by name.
+pub struct Fields<'py>(Bound<'py, PyDict>);
+
+impl<'py> Fields<'py> {
+    pub fn new(py: Python<'py>) -> Self {
+        Self(PyDict::new(py))
+    }
+
+    /// Adds a field.
+    pub fn set(&self, name: &str, value: impl IntoPyObject<'py>) -> PyResult<()> {
+        self.0.set_item(name, value)
+    }
+
+    /// Adds numbers, an element a row; NaN where there is none.
+    pub fn column(&self, name: &str, values: impl IntoIterator<Item = Option<f64>>) -> PyResult<()> {
+        let values: Vec<f64> = values.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect();
+        self.set(name, values.to_pyarray(self.0.py()))
+    }
+
+    /// Adds numbers of the shape (rows, `N`).
+    pub fn columns<const N: usize>(
+        &self,
+        name: &str,
+        rows: impl IntoIterator<Item = [f64; N]>,
+    ) -> PyResult<()> {
+        self.array(name, rows, [N])
+    }
+
+    /// Adds numbers of the shape (rows, 2, 2).
+    pub fn matrices(&self, name: &str, rows: impl IntoIterator<Item = [f64; 4]>) -> PyResult<()> {
+        self.array(name, rows, [2, 2])
+    }
+
+    fn array<const N: usize, const D: usize>(
+        &self,
+        name: &str,
+        rows: impl IntoIterator<Item = [f64; N]>,
+        shape: [usize; D],
+    ) -> PyResult<()> {
+        let rows: Vec<[f64; N]> = rows.into_iter().collect();
+        let shape: Vec<usize> = std::iter::once(rows.len()).chain(shape).collect();
+        self.set(name, PyArray1::from_vec(self.0.py(), rows.into_flattened()).reshape(shape)?)
+    }
+
+    /// Adds positions in metres, along and across: `y` is None on a line.
+    pub fn positions(&self, positions: &[Position], extent: Extent) -> PyResult<()> {
+        self.column("x", positions.iter().map(|position| Some(position.x_m)))?;
+        match extent {
+            Extent::Line { .. } => self.set("y", self.0.py().None()),
+            Extent::Plane { .. } => self.column("y", positions.iter().map(|position| Some(position.y_m))),
+        }
+    }
+
+    /// Adds names and numbers within each other: a dict, or a list of them. What is not a number is None.
+    pub fn json(&self, name: &str, value: &Value) -> PyResult<()> {
+        self.set(name, json(self.0.py(), value)?)
+    }
+
+    pub fn into_dict(self) -> Bound<'py, PyDict> {
+        self.0
+    }
+}
+
+/// Names and numbers within each other as dicts and lists.
+pub fn json<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(value).map_err(refused)?;
+    py.import("json")?.call_method1("loads", (text,))
+}
+
+/// A position as a place of a surface: a length on a line, two of them on a plane.
+pub fn place(position: Position, extent: Extent) -> Value {
+    match extent {
+        Extent::Line { .. } => Value::from(position.x_m),
+        Extent::Plane { .. } => Value::from(vec![position.x_m, position.y_m]),
+    }
+}
