@@ -34,7 +34,11 @@ pub fn test(root: &Path, skips: Skips) -> Result<(bool, Option<Counts>)> {
     }
     let built = root.join("target/debug").join(format!("{DLL_PREFIX}_palpate{DLL_SUFFIX}"));
     let module = root.join("python/palpate/_palpate.abi3.so");
-    fs::copy(&built, &module).with_context(|| format!("cannot copy {}", built.display()))?;
+    // A module that some Python has loaded is replaced, not written over.
+    let copied = module.with_extension("part");
+    fs::copy(&built, &copied)
+        .and_then(|_| fs::rename(&copied, &module))
+        .with_context(|| format!("cannot copy {}", built.display()))?;
     let environment = Environment::at(root, "target/xtask/python", "python3", &[REQUIREMENTS])?;
     let mut tests = environment.pytest(root);
     tests.env("PYTHONPATH", root.join("python"));

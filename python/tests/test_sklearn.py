@@ -1,0 +1,128 @@
+"""scikit-learn: its own checks of estimators, and that its cross-validation gives palpate's numbers."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.model_selection import GridSearchCV, cross_val_predict, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+import palpate as pp
+from palpate.sklearn import (
+    AutoRegressor,
+    CentroidRegressor,
+    ClosedFormRegressor,
+    GaussianProcessRegressor,
+    InfluenceRegressor,
+    LevenbergMarquardtRegressor,
+    NeighboursRegressor,
+    NetworkRegressor,
+    PositionKFold,
+)
+
+QUICK = [
+    InfluenceRegressor(),
+    NetworkRegressor(),
+    GaussianProcessRegressor(),
+    ClosedFormRegressor(),
+    CentroidRegressor(),
+    NeighboursRegressor(),
+]
+# These take minutes in a build that is not optimised; `cargo xtask wheel` runs them too.
+SLOW = [LevenbergMarquardtRegressor(), AutoRegressor()] if os.environ.get("PALPATE_OPTIMISED") else []
+
+
+@parametrize_with_checks(QUICK + SLOW)
+def test_scikit_learn_s_own_checks(estimator, check):
+    check(estimator)
+
+
+@pytest.fixture(scope="module")
+def board() -> pp.Recording:
+    """Presses on a beam whose force is known: 12 places, 4 times each."""
+    setup = pp.Setup(pp.Beam("400 mm", "40 mm", "1.2 mm", "200 GPa"), pp.deflection(8, noise="5 um"), force="3 N")
+    return setup.simulate(pp.even(12), repeats=4, seed=2)
+
+
+def test_cross_validation_gives_the_command_s_numbers(tmp_path, command, examples):
+    """`cross_val_score` over `PositionKFold` is `palpate evaluate`'s cross-validation of a recording."""
+    rig = pp.Rig.load(examples / "noisy-beam.toml")
+    presses = rig.simulate(seed=0)
+    presses.to_csv(tmp_path / "presses.csv")
+    for regressor in (InfluenceRegressor(setup=rig.setup), NeighboursRegressor(setup=rig.setup)):
+        kind = regressor._estimator()._kind
+        text = rig.text[: rig.text.index("[estimator]")] + f'[estimator]\nkind = "{kind}"\n'
+        (tmp_path / "rig.toml").write_text(text)
+        judged = command("evaluate", tmp_path / "rig.toml", "--data", tmp_path / "presses.csv", "--json")
+        theirs = json.loads(judged)["errors"][0]["error_mm"]
+        scores = cross_val_score(
+            regressor, presses.readings, presses.x, cv=PositionKFold(5), scoring="neg_mean_absolute_error"
+        )
+        found = cross_val_predict(regressor, presses.readings, presses.x, cv=PositionKFold(5))
+        errors_mm = 1e3 * np.abs(found - presses.x)
+        assert np.isclose(-1e3 * scores.mean(), errors_mm.mean(), rtol=1e-9)
+        assert np.isclose(errors_mm.mean(), theirs["mean"], rtol=1e-9)
+        assert np.isclose(np.median(errors_mm), theirs["median"], rtol=1e-9)
+
+
+def test_folds_are_palpate_s_own(board):
+    ours = list(PositionKFold(5).split(board.readings, board.x))
+    for (fit, held_out), (their_fit, their_held_out) in zip(ours, board.folds(5)):
+        assert fit.tolist() == their_fit.tolist() and held_out.tolist() == their_held_out.tolist()
+    with pytest.raises(ValueError, match="there are 12 distinct positions; at least 13 are needed"):
+        next(PositionKFold(13).split(board.readings, board.x))
+    with pytest.raises(ValueError, match="`n_splits` is 1"):
+        PositionKFold(1)
+
+
+def test_pipelines_searches_and_clones(board):
+    X, y = board.readings, board.x
+    regressor = InfluenceRegressor(setup=board.setup)
+    piped = make_pipeline(FunctionTransformer(), regressor).fit(X, y)
+    assert np.array_equal(piped.predict(X), clone(regressor).fit(X, y).predict(X))
+    assert np.array_equal(pickle.loads(pickle.dumps(piped)).predict(X), piped.predict(X))
+    search = GridSearchCV(regressor, {"source": ["recording", "mechanics", "corrected"]}, cv=PositionKFold(4)).fit(X, y)
+    assert search.best_score_ > 0.999
+
+
+def test_uncertainty_is_in_the_unit_of_the_targets(board):
+    X, y = board.readings, board.x
+    in_m = InfluenceRegressor(setup=board.setup).fit(X, y)
+    positions, std = in_m.predict(X, return_std=True)
+    low, high = in_m.predict_interval(X)
+    assert np.all(low <= positions) and np.all(positions <= high) and std.shape == y.shape
+    assert np.mean((low <= y) & (y <= high)) > 0.85
+    # Without a setup the targets may be in any unit, and shifted.
+    here, in_mm = GaussianProcessRegressor().fit(X, y), GaussianProcessRegressor().fit(X, 1e3 * y + 50.0)
+    assert np.allclose(in_mm.predict(X), 1e3 * here.predict(X) + 50.0, atol=1e-6)
+    assert np.allclose(in_mm.predict(X, return_std=True)[1], 1e3 * here.predict(X, return_std=True)[1], rtol=1e-6)
+
+
+def test_planes_have_two_targets(plate):
+    presses = plate.simulate(pp.grid(5, 4), repeats=2, seed=3)
+    y = np.column_stack([presses.x, presses.y])
+    found = InfluenceRegressor(setup=plate, source="mechanics").fit(presses.readings, y).predict(presses.readings)
+    assert found.shape == y.shape and np.hypot(*(found - y).T).mean() < 5e-3
+    with pytest.raises(ValueError, match=r"y has the shape \(40, 3\)"):
+        GaussianProcessRegressor().fit(presses.readings, np.column_stack([y, y[:, 0]]))
+    with pytest.raises(ValueError, match="a beam is a line"):
+        ClosedFormRegressor().fit(presses.readings, y)
+
+
+def test_forces_and_data_frames(board):
+    setup = board.setup.with_force(None)
+    frame = board.to_frame()
+    columns = [name for name in frame.columns if name.startswith("deflection")]
+    regressor = InfluenceRegressor(setup=setup).fit(frame[columns], board.x, force=board.force)
+    assert list(regressor.feature_names_in_) == columns
+    assert regressor.locate(frame[columns]).force.shape == (48,)
+    assert LevenbergMarquardtRegressor(random_state=3).get_params() == {"random_state": 3, "setup": None}
+    assert AutoRegressor()._seed() == 0 and NetworkRegressor(random_state=np.random.RandomState(1))._seed() > 0
+    assert CentroidRegressor().__sklearn_tags__().regressor_tags.poor_score
