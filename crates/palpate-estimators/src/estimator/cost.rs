@@ -59,15 +59,17 @@ impl Estimator {
         let own = match self {
             Self::GaussianProcess(process) => {
                 let cost = sizes.process(sizes.rows, sizes.channels + 1.0, 2.0, process.search_points);
-                // Of readings and of their logarithms, where they have them.
-                let twice =
-                    process.features.is_none() && FeatureKind::logarithms_for(setup, recording).is_some();
-                FitCost { seconds: if twice { 2.0 } else { 1.0 } * cost.seconds, ..cost }
+                let kinds =
+                    process.features.map_or_else(|| FeatureKind::contenders(setup, recording).len(), |_| 1);
+                FitCost { seconds: kinds as f64 * cost.seconds, ..cost }
             }
             Self::Influence(influence) => sizes.influence(influence, setup, recording),
             Self::Neighbours(_) => FitCost {
                 memory_bytes: sizes.rows * (NUMBER * sizes.channels + 80.0),
-                seconds: sizes.rows.min(neighbours::MOST_HELD_OUT as f64) * sizes.rows * sizes.channels
+                seconds: FeatureKind::contenders(setup, recording).len() as f64
+                    * sizes.rows.min(neighbours::MOST_HELD_OUT as f64)
+                    * sizes.rows
+                    * sizes.channels
                     / LOOPS,
             },
             Self::Network(network) => {

@@ -22,9 +22,18 @@ pub enum FeatureKind {
 }
 
 impl FeatureKind {
-    /// The readings where the force is known; where it is not, features that the load does not change.
-    pub fn for_presses(setup: &Setup, recording: &Recording) -> Self {
-        if setup.force_n().is_some() { Self::Readings } else { Self::load_invariant(setup, recording) }
+    /// Kinds that suit the presses of a recording; which of them tells the position best is for the method to find out.
+    ///
+    /// Of a known force the readings themselves and r/‖r‖ with ln ‖r‖: near a support all readings are next to nothing, those of one end lie beside
+    /// those of another, and only their proportions tell the ends apart. Of an unknown one features that the load does not change, and logarithms where all
+    /// readings have one.
+    pub fn contenders(setup: &Setup, recording: &Recording) -> Vec<Self> {
+        if setup.force_n().is_some() {
+            return vec![Self::Readings, Self::LoadInvariant];
+        }
+        let mut readings = recording.rows.iter().flat_map(|row| &row.reading);
+        let logarithms = readings.all(|value| *value > 0.0).then_some(Self::Logarithms);
+        std::iter::once(Self::load_invariant(setup, recording)).chain(logarithms).collect()
     }
 
     /// Features that the load does not change: with the size of a reading, unless all presses have one force and contacts may have others.
@@ -33,12 +42,6 @@ impl FeatureKind {
         let first = forces.next().flatten();
         let has_one_force = first.is_some() && forces.all(|force_n| force_n == first);
         if setup.force_n().is_none() && has_one_force { Self::Direction } else { Self::LoadInvariant }
-    }
-
-    /// Logarithms, where the force is not known and all readings of a recording have one.
-    pub fn logarithms_for(setup: &Setup, recording: &Recording) -> Option<Self> {
-        let mut readings = recording.rows.iter().flat_map(|row| &row.reading);
-        (setup.force_n().is_none() && readings.all(|value| *value > 0.0)).then_some(Self::Logarithms)
     }
 }
 

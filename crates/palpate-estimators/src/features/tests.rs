@@ -1,5 +1,13 @@
+use palpate_core::Estimate;
+
 use super::{FeatureKind, FeatureSource, Features, NoFeatures};
+use crate::arrangement::Training;
+use crate::fit::Fit;
+use crate::fixtures::{Example, paper};
+use crate::gaussian_process::GaussianProcessEstimator;
+use crate::neighbours::Neighbours;
 use crate::recording::{Provenance, Recording, Row};
+use crate::simulate::simulate_at;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 
@@ -88,5 +96,21 @@ fn a_damaged_file_is_refused() {
         let mut features = good.clone();
         damage(&mut features);
         assert!(features.check(4).is_err(), "{features:?}");
+    }
+}
+
+/// Readings beside the supports of a beam are next to nothing, at one end as at the other; only their proportions tell the ends apart.
+#[test]
+fn the_ends_of_a_beam_are_told_apart_where_the_force_is_known() {
+    let Example { setup, training } = paper(5e-6, 5);
+    let presses = setup.simulate(&Training { count: 20, ..training }, 0).unwrap();
+    let positions: Vec<Position> = (2..=38).map(|cm| Position::along(f64::from(cm) * 0.01)).collect();
+    let asked = simulate_at(&setup, &positions, 1, 1).unwrap();
+    let process = GaussianProcessEstimator::default().fit(&setup, &presses).unwrap();
+    let neighbours = Neighbours::default().fit(&setup, &presses).unwrap();
+    let error_m = |estimate: Estimate, row: &Row| (estimate.contact.position.x_m - row.position.x_m).abs();
+    for row in &asked.rows {
+        assert!(error_m(process.locate(&row.reading).unwrap(), row) < 0.01, "{}", row.position.x_m);
+        assert!(error_m(neighbours.locate(&row.reading).unwrap(), row) < 0.02, "{}", row.position.x_m);
     }
 }

@@ -33,8 +33,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussianProcessEstimator {
-    /// Features of a reading; `None` for [`FeatureKind::for_presses`], or [`FeatureKind::logarithms_for`] where the positions
-    /// are more probable under them.
+    /// Features of a reading; `None` for those of [`FeatureKind::contenders`] under which the positions are most probable.
     pub features: Option<FeatureKind>,
     /// Kernel: the smoothness of the position as a function of the features.
     pub kernel: Kernel,
@@ -80,20 +79,21 @@ impl Fit for GaussianProcessEstimator {
     fn fit_method(&self, task: FitTask) -> Result<GaussianProcessLocator, GaussianProcessError> {
         let FitTask { setup, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
-        let (usual, logarithms) = match self.features {
-            Some(kind) => (kind, None),
-            None => {
-                (FeatureKind::for_presses(setup, recording), FeatureKind::logarithms_for(setup, recording))
-            }
-        };
-        let mut best = self.with_features(usual, setup, recording, seed, watch)?;
-        if let Some(kind) = logarithms {
+        let kinds =
+            self.features.map_or_else(|| FeatureKind::contenders(setup, recording), |kind| vec![kind]);
+        let mut best: Option<GaussianProcessLocator> = None;
+        for kind in kinds {
             let fitted = self.with_features(kind, setup, recording, seed, watch)?;
-            if fitted.process.log_evidence() > best.process.log_evidence() {
-                best = fitted;
+            let evidence = |locator: &GaussianProcessLocator| locator.process.log_evidence();
+            if best.as_ref().is_none_or(|best| evidence(&fitted) > evidence(best)) {
+                best = Some(fitted);
             }
         }
-        Ok(best)
+        // Contenders are never none.
+        best.ok_or(GaussianProcessError::Features(NoFeatures {
+            channels: recording.channels.len(),
+            rows: recording.rows.len(),
+        }))
     }
 }
 

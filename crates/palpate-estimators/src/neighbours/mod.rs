@@ -30,7 +30,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Neighbours {
     /// Most neighbours to try, at least 1. Of k = 1, 2, … that which is nearest to the training rows in the root mean square
-    /// is taken, each row located by the rows at other positions.
+    /// is taken, each row located by the rows at other positions; of several kinds of features that with the nearest of all.
     pub most: usize,
 }
 
@@ -64,7 +64,28 @@ impl Fit for Neighbours {
     fn fit_method(&self, task: FitTask) -> Result<NeighboursLocator, NeighboursFitError> {
         let recording = task.recording;
         recording.check_distinct_positions(2)?;
-        let features = Features::fit(FeatureKind::for_presses(task.setup, recording), recording)?;
+        let mut best: Option<(f64, NeighboursLocator)> = None;
+        for kind in FeatureKind::contenders(task.setup, recording) {
+            let (square, fitted) = self.with_features(kind, task)?;
+            if best.as_ref().is_none_or(|(least, _)| square < *least) {
+                best = Some((square, fitted));
+            }
+        }
+        let none = NoFeatures { channels: recording.channels.len(), rows: recording.rows.len() };
+        // Contenders are never none.
+        Ok(best.ok_or(none)?.1)
+    }
+}
+
+impl Neighbours {
+    /// The locator by features of one kind, and the sum of its squared errors at held-out positions, in m².
+    fn with_features(
+        &self,
+        kind: FeatureKind,
+        task: FitTask,
+    ) -> Result<(f64, NeighboursLocator), NeighboursFitError> {
+        let recording = task.recording;
+        let features = Features::fit(kind, recording)?;
         let neighbour =
             |row: &Row| Neighbour { features: features.apply(&row.reading), position: row.position };
         let rows: Vec<Neighbour> = recording.rows.iter().map(neighbour).collect();
@@ -72,14 +93,15 @@ impl Fit for Neighbours {
         let square = |errors: &Vec<[f64; 2]>| errors.iter().flatten().map(|e| e * e).sum::<f64>();
         let best = (0..errors.len()).min_by(|a, b| square(&errors[*a]).total_cmp(&square(&errors[*b])));
         let best = best.unwrap_or(0);
-        Ok(NeighboursLocator {
+        let locator = NeighboursLocator {
             extent: task.setup.surface().extent(),
             features,
             count: best + 1,
             rows,
             force_n: task.setup.force_n(),
             spread: errors.get(best).and_then(|errors| HeldOutErrors::from_errors(errors)),
-        })
+        };
+        Ok((errors.get(best).map_or(f64::INFINITY, square), locator))
     }
 }
 
