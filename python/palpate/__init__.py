@@ -25,11 +25,13 @@ from ._estimators import (
     Neighbours,
     Network,
 )
+from ._evaluation import Comparison, ErrorsByPosition, compare, cross_validate
 from ._limit import Limit, limit
 from ._palpate import (
     Estimate,
     Estimates,
     Estimator,
+    Evaluation,
     Locator,
     Recording,
     Rig,
@@ -49,11 +51,14 @@ __all__ = [
     "Centroid",
     "ClosedForm",
     "Columns",
+    "Comparison",
     "Digit",
     "DigitEstimator",
+    "ErrorsByPosition",
     "Estimate",
     "Estimates",
     "Estimator",
+    "Evaluation",
     "FileError",
     "GaussianProcess",
     "Influence",
@@ -74,6 +79,8 @@ __all__ = [
     "__version__",
     "at",
     "chebyshev",
+    "compare",
+    "cross_validate",
     "deflection",
     "edge_dense",
     "even",

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from ._palpate import Estimates, Locator, Recording, Setup
-    from ._results import Result
 
 _WIDTH = 560.0
 _MARGIN = 24.0
@@ -47,11 +46,12 @@ def estimates(estimates: Estimates) -> str:
     return f"<div>{html.escape(repr(estimates)[1:-1])}</div>{_table(rows, len(estimates))}"
 
 
-def result(result: Result, notes: Sequence[str] = ()) -> str:
-    """A result in words, what is to be noted of it, and its first rows."""
+def rows(title: str, columns: Mapping[str, Any], notes: Sequence[str] = ()) -> str:
+    """A title, what is to be noted, and the first rows of columns."""
+    count = len(next(iter(columns.values())))
     listed = "".join(f"<li>{html.escape(note)}</li>" for note in notes)
-    rows = {name: [_cell(value) for value in column[:_ROWS]] for name, column in result._columns().items()}
-    return f"<div>{html.escape(repr(result)[1:-1])}</div>{f'<ul>{listed}</ul>' if listed else ''}{_table(rows, len(result))}"
+    cells = {name: [_cell(value) for value in column[:_ROWS]] for name, column in columns.items()}
+    return f"<div>{html.escape(title)}</div>{f'<ul>{listed}</ul>' if listed else ''}{_table(cells, count)}"
 
 
 def _cell(value: Any) -> str:

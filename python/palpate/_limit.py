@@ -114,10 +114,8 @@ class Limit(Result):
         without = f", {100 * self.not_told:.1f} % not told" if self.not_told else ""
         return f"<Limit: {len(self)} positions, {self.force:g} N, force {known}: {figures}{without}>"
 
-    def _repr_html_(self) -> str:
-        from ._html import result
-
-        return result(self, [f"{warning['message']}; would help: {warning['help']}" for warning in self.warnings])
+    def _notes(self) -> list[str]:
+        return [f"{warning['message']}; would help: {warning['help']}" for warning in self.warnings]
 
 
 def limit(

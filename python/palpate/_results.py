@@ -6,7 +6,7 @@ import csv
 import dataclasses
 import io
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
@@ -34,6 +34,10 @@ class Result:
         """What it is of, in words; the first line of its CSV."""
         return repr(self)[1:-1]
 
+    def _notes(self) -> Sequence[str]:
+        """What a notebook notes of it, beside its rows."""
+        return ()
+
     def to_numpy(self) -> np.ndarray[Any, Any]:
         """The rows as a structured array in SI units, a field for each array of the result.
 
@@ -42,15 +46,7 @@ class Result:
         ndarray
             Of the shape (rows).
         """
-        rows = len(self)
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        arrays = {
-            name: value for name, value in values.items() if isinstance(value, np.ndarray) and value.shape[:1] == (rows,)
-        }
-        structured = np.empty(rows, dtype=[(name, array.dtype, array.shape[1:]) for name, array in arrays.items()])
-        for name, array in arrays.items():
-            structured[name] = array
-        return structured
+        return structured({field.name: getattr(self, field.name) for field in dataclasses.fields(self)}, len(self))
 
     def to_frame(self) -> pd.DataFrame:
         """The rows as a data frame, with units in the names of its columns.
@@ -70,13 +66,7 @@ class Result:
         ----------
         path : str or path
         """
-        text = io.StringIO()
-        text.write(f"# palpate {__version__}, {' '.join(self._title().split())}\n")
-        writer = csv.writer(text, lineterminator="\n")
-        columns = self._columns()
-        writer.writerow(columns)
-        writer.writerows([_cell(value) for value in row] for row in zip(*columns.values()))
-        write_whole(path, text.getvalue())
+        write_csv(path, self._title(), self._columns())
 
     def __len__(self) -> int:
         return len(next(iter(self._columns().values())))
@@ -90,9 +80,31 @@ class Result:
     __hash__ = None  # type: ignore[assignment]
 
     def _repr_html_(self) -> str:
-        from ._html import result
+        from ._html import rows
 
-        return result(self)
+        return rows(self._title(), self._columns(), self._notes())
+
+
+def structured(values: Mapping[str, Any], rows: int | None = None) -> np.ndarray[Any, Any]:
+    """The arrays among some values as a structured array; all of them have as many rows."""
+    arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+    if rows is None:
+        rows = len(next(iter(arrays.values())))
+    arrays = {name: array for name, array in arrays.items() if array.shape[:1] == (rows,)}
+    result = np.empty(rows, dtype=[(name, array.dtype, array.shape[1:]) for name, array in arrays.items()])
+    for name, array in arrays.items():
+        result[name] = array
+    return result
+
+
+def write_csv(path: PathLike, title: str, columns: Mapping[str, Any]) -> None:
+    """Write columns as CSV; the first line, a comment, says what they are of."""
+    text = io.StringIO()
+    text.write(f"# palpate {__version__}, {' '.join(title.split())}\n")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_cell(value) for value in row] for row in zip(*columns.values()))
+    write_whole(path, text.getvalue())
 
 
 def write_whole(path: PathLike, text: str) -> None:

@@ -7,9 +7,11 @@
 
 mod arrays;
 mod bench;
+mod comparison;
 mod errors;
 mod estimates;
 mod estimator;
+mod evaluation;
 mod files;
 mod limit;
 mod locator;
@@ -30,8 +32,10 @@ mod _palpate {
     #[pymodule_export]
     use crate::{
         bench::{Recording, Setup},
+        comparison::{compare, cross_validate},
         estimates::{Estimate, Estimates},
         estimator::Estimator,
+        evaluation::Evaluation,
         limit::limit,
         locator::Locator,
         quantities::parse_quantity,

@@ -4,16 +4,21 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use palpate::estimators::arrangement::all_over;
 use palpate::estimators::batch::{BatchError, BatchOptions};
 use palpate::estimators::estimator;
+use palpate::estimators::evaluation;
 use palpate::estimators::setup;
+use palpate::estimators::simulate::simulate_at;
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::arrays::{self, Readings};
-use crate::bench::Setup;
+use crate::bench::{Recording, Setup};
 use crate::errors::{io_error, of_locator, refused};
 use crate::estimates::{Estimate, Estimates, Table};
+use crate::evaluation::{About, Evaluation};
 use crate::files::write_whole;
 
 /// A locator: a fitted method with its setup, so that nothing it needs is outside it.
@@ -79,6 +84,54 @@ impl Locator {
                 Ok(Bound::new(py, Estimates::new(py, table, extent)?)?.into_any())
             }
         }
+    }
+
+    /// Judge the locator: locate the contacts of a recording, and hold the estimates beside where they were.
+    ///
+    /// Parameters
+    /// ----------
+    /// recording : Recording, optional
+    ///     A recording of the same sensors; where nothing is said the surface is simulated, pressed all over.
+    /// seed : int
+    ///     Seed of the simulation.
+    ///
+    /// Returns
+    /// -------
+    /// Evaluation
+    ///
+    /// Raises
+    /// ------
+    /// PalpateError
+    ///     For a recording with another number of channels, and without one for a surface without a model or an unknown force.
+    ///
+    /// Warns
+    /// -----
+    /// UserWarning
+    ///     Where the locator was fitted to this very file: at positions that it has not seen it is worse; `cross_validate` tells how much.
+    #[pyo3(signature = (recording=None, *, seed=0))]
+    fn evaluate(&self, py: Python<'_>, recording: Option<&Recording>, seed: u64) -> PyResult<Evaluation> {
+        let extent = self.setup.surface().extent();
+        let simulated;
+        let judged = match recording {
+            Some(recording) => {
+                let digests = &recording.inner.provenance.digests;
+                if !digests.is_empty() && *digests == self.inner.provenance.recording.digests {
+                    let message = c"the locator was fitted to this very recording; at positions that it has not seen it is worse: cross_validate tells how much";
+                    PyErr::warn(py, &py.get_type::<PyUserWarning>(), message, 1)?;
+                }
+                &recording.inner
+            }
+            None => {
+                let made = py.detach(|| simulate_at(&self.setup, &all_over(extent), 1, seed));
+                simulated =
+                    made.map_err(|error| refused(format!("{error}; give a recording to judge by")))?;
+                &simulated
+            }
+        };
+        let evaluation = py.detach(|| evaluation::Evaluation::new(&self.inner, judged)).map_err(refused)?;
+        let source = judged.provenance.source.clone();
+        let about = About { kind: self.kind().to_owned(), source, how: "located".to_owned() };
+        Ok(Evaluation::new(evaluation, self.setup.clone(), about))
     }
 
     /// Kind of its estimator: "influence".

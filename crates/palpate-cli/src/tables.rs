@@ -4,7 +4,7 @@
 
 use crate::failure::Failure;
 use crate::target::TargetFolder;
-use palpate_estimators::evaluation::{Evaluation, Located};
+use palpate_estimators::evaluation::Evaluation;
 use palpate_estimators::recording::{Provenance, csv_row};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
@@ -73,15 +73,6 @@ pub fn error_cells(evaluation: &Evaluation) -> Vec<String> {
     cells.extend(figures_m.map(|error_m| cell(Some(error_m * 1e3))));
     cells.push(cell(evaluation.coverage_percent()));
     cells
-}
-
-/// The answers at each position, by x and then y.
-pub fn by_position(evaluation: &Evaluation) -> Vec<(Position, Evaluation)> {
-    let mut sorted = evaluation.located.clone();
-    sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
-    let groups = sorted.chunk_by(|a, b| a.truth == b.truth);
-    let part = |located: &[Located]| Evaluation { extent: evaluation.extent, located: located.to_vec() };
-    groups.map(|group| (group[0].truth, part(group))).collect()
 }
 
 /// The files of a recording with their digests, in words.

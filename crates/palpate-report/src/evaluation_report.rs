@@ -13,6 +13,7 @@ use palpate_estimators::evaluation::{
 };
 use palpate_estimators::recording::Provenance;
 use palpate_estimators::setup::Setup;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_rig::Rig;
 
@@ -126,7 +127,12 @@ impl EvaluationReport<'_> {
     }
 
     fn error_figure(&self) -> Figure {
-        let by_position = self.evaluation.by_position();
+        let by_position: Vec<(Position, ErrorSummary)> = self
+            .evaluation
+            .by_position()
+            .iter()
+            .filter_map(|(at, answers)| Some((*at, answers.summary(None)?)))
+            .collect();
         let several = by_position.iter().any(|(_, summary)| summary.count > 1);
         let drawn = |label, colour, marker, figure: fn(&ErrorSummary) -> f64| {
             let points: Vec<(f64, f64)> =

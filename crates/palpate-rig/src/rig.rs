@@ -114,8 +114,7 @@ impl Rig {
     /// # Errors
     /// [`RigSimulationError`] as for [`Rig::simulate`].
     pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Split>, RigSimulationError> {
-        let calibration = self.calibration()?.at_forces_of_use();
-        (0..count).map(|k| Ok(calibration.simulate(seed + k)?)).collect()
+        Ok(self.calibration()?.at_forces_of_use().trials(count, seed)?)
     }
 
     /// The training positions.

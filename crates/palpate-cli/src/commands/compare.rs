@@ -10,14 +10,15 @@ use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
 use crate::tare::{TareOption, tare_splits};
 use crate::target::{Inputs, TargetFolder};
 use crate::{input, output, progress, tables};
-use palpate_estimators::estimator::{Comparison, contenders};
-use palpate_estimators::evaluation::{Evaluation, Split, evaluate_splits, limit_ratio, percentage_error};
+use palpate_estimators::estimator::{self, CompareOptions, Compared, Comparison, contenders};
+use palpate_estimators::evaluation::{Evaluation, Split, limit_ratio, percentage_error};
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_numerics::watch::{Cancelled, Progress, Watch};
 use palpate_report::{ComparisonReport, comparison_report};
 use palpate_rig::Rig;
 use serde::Serialize;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Every estimator on the same folds of a recording (or on simulated calibrations), against what physics allows.
@@ -63,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = arguments.out.as_ref().map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
     let rig = input::read_rig(&arguments.rig)?;
     let Trials { data, source, how, trials } = trials(arguments, &rig)?;
-    let (comparisons, left_out) = compare(arguments, &rig, &trials)?;
+    let Compared { comparisons, left_out } = compare(arguments, &rig, &trials)?;
     let readings: usize = trials.iter().map(|trial| trial.judged.rows.len()).sum();
     if let Some(out) = &out {
         write_report(arguments, &rig, &how, &comparisons, &left_out, out)?;
@@ -121,7 +122,7 @@ fn errors_table(comment: &str, comparisons: &[Comparison], extent: Extent) -> Cs
     let columns = [vec!["estimator"], tables::position_columns(extent), ERROR_COLUMNS.to_vec()].concat();
     let mut table = CsvTable::new(comment, columns);
     for Comparison { estimator, tried } in comparisons {
-        for (position, evaluation) in tables::by_position(&tried.evaluation) {
+        for (position, evaluation) in tried.evaluation.by_position() {
             let position = tables::position_cells(position, extent);
             table.row(
                 [vec![estimator.kind().to_owned()], position, tables::error_cells(&evaluation)].concat(),
@@ -186,11 +187,7 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
     Ok(Trials { source, how: cross_validated(&data), data, trials })
 }
 
-fn compare(
-    arguments: &Arguments,
-    rig: &Rig,
-    trials: &[Split],
-) -> Result<(Vec<Comparison>, Vec<LeftOut>), Failure> {
+fn compare(arguments: &Arguments, rig: &Rig, trials: &[Split]) -> Result<Compared, Failure> {
     let rows = trials.first().map_or(0, |trial| trial.training.rows.len());
     let mut contenders = contenders(&rig.setup, &rig.estimator, rows);
     let known: Vec<&str> = contenders.iter().map(|contender| contender.kind()).collect();
@@ -208,31 +205,26 @@ fn compare(
     }
     let bar = progress::bar(contenders.len() as u64, "comparing");
     let start = Instant::now();
-    let (mut comparisons, mut left_out) = (Vec::new(), Vec::new());
-    for contender in contenders {
-        bar.set_prefix(contender.kind());
-        let cost = trials.first().map(|trial| contender.fit_cost(&rig.setup, &trial.training));
-        if let Some(why) = cost.and_then(|cost| arguments.memory.refusal(&contender, cost)) {
-            left_out.push((contender.kind(), why));
-            bar.inc(1);
-            continue;
+    let shown = AtomicUsize::new(usize::MAX);
+    let observe = |progress| {
+        // Said at every epoch of a network.
+        if let Progress::Counted { name, done, .. } = progress
+            && shown.swap(done, Ordering::Relaxed) != done
+        {
+            bar.set_prefix(name);
+            bar.set_position(done as u64);
         }
-        let clock = || start.elapsed().as_secs_f64();
-        let go_on = |_| !progress::interrupted();
-        match evaluate_splits(&rig.setup, &contender, trials, arguments.seed, &clock, Watch::new(&go_on)) {
-            Ok(tried) => comparisons.push(Comparison { estimator: contender, tried }),
-            Err(error) if Cancelled::caused(&error) => return Err(Failure::stopped()),
-            Err(error) => left_out.push((contender.kind(), error.to_string())),
-        }
-        bar.inc(1);
-    }
+        !progress::interrupted()
+    };
+    let options = CompareOptions {
+        seed: arguments.seed,
+        clock: &|| start.elapsed().as_secs_f64(),
+        refuse: &|contender, cost| arguments.memory.refusal(contender, cost),
+        watch: Watch::new(&observe),
+    };
+    let compared = estimator::compare(&rig.setup, contenders, trials, options);
     bar.finish_and_clear();
-    comparisons.sort_by(|a, b| mean_m(a).total_cmp(&mean_m(b)));
-    Ok((comparisons, left_out))
-}
-
-fn mean_m(comparison: &Comparison) -> f64 {
-    comparison.tried.evaluation.summary(None).map_or(f64::INFINITY, |summary| summary.average_m)
+    compared.map_err(|Cancelled| Failure::stopped())
 }
 
 fn json_row(rig: &Rig, comparison: &Comparison, arguments: &Arguments) -> Option<impl Serialize> {

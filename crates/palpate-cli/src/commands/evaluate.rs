@@ -150,7 +150,7 @@ fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
     let extent = answers.evaluation.extent;
     let mut table =
         CsvTable::new(&comment, [tables::position_columns(extent), ERROR_COLUMNS.to_vec()].concat());
-    for (position, evaluation) in tables::by_position(&answers.evaluation) {
+    for (position, evaluation) in answers.evaluation.by_position() {
         table.row([tables::position_cells(position, extent), tables::error_cells(&evaluation)].concat());
     }
     table

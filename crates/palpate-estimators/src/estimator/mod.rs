@@ -1,5 +1,6 @@
 //! Every estimator as one type: whoever evaluates, studies, reports or listens treats all alike.
 
+mod compare;
 mod cost;
 mod locator_file;
 mod settings;
@@ -10,6 +11,7 @@ pub use crate::load_profile::{
     Profiler, Resolution, patch_limits,
 };
 pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig};
+pub use compare::{CompareOptions, Compared, Comparison, compare, contenders};
 pub use cost::FitCost;
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
 pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Tare, TareError, Uncertainty};
@@ -21,7 +23,7 @@ use std::sync::Arc;
 use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
 use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
-use crate::evaluation::{Evaluation, EvaluationError, Split, TimedEvaluation, evaluate_splits};
+use crate::evaluation::{Evaluation, EvaluationError, Split, evaluate_splits};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue};
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{
@@ -446,33 +448,6 @@ impl Locator {
             _ => None,
         }
     }
-}
-
-/// Evaluation of one estimator over some splits.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Comparison {
-    /// The estimator.
-    pub estimator: Estimator,
-    /// The evaluation, with its times.
-    pub tried: TimedEvaluation,
-}
-
-/// The estimators that `auto` chooses from, and that a comparison shows: every contender, with the settings of `own`
-/// where that is of its kind. Networks trained by back-propagation stop after as many presentations as
-/// take some seconds.
-pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator> {
-    const MOST_PRESENTATIONS: usize = 20_000_000;
-    let mut contenders = Estimator::contenders(setup);
-    for contender in &mut contenders {
-        if contender.kind() == own.kind() {
-            *contender = own.clone();
-        }
-        if let Estimator::Network(config) = contender {
-            let most = u32::try_from(MOST_PRESENTATIONS / rows.max(1)).unwrap_or(u32::MAX).max(1);
-            config.training.max_epochs = config.training.max_epochs.min(most);
-        }
-    }
-    contenders
 }
 
 /// Choice of `auto`, and how each estimator did.

@@ -144,6 +144,14 @@ impl Calibration {
         Ok(Split { training, judged: recording.subset(touched), offsets: None })
     }
 
+    /// Recordings with `count` seeds from the first on, as [`Calibration::simulate`] makes them.
+    ///
+    /// # Errors
+    /// [`SimulateError`] as for [`Calibration::simulate`].
+    pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Split>, SimulateError> {
+        (0..count).map(|k| self.simulate(seed + k)).collect()
+    }
+
     /// Simulates, fits and judges the method alone.
     ///
     /// # Errors

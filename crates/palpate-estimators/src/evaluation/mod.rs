@@ -219,16 +219,13 @@ impl Evaluation {
         (1..=100).filter_map(|percent| Some((percent, percentile(&errors, f64::from(percent))?))).collect()
     }
 
-    /// Errors of each distinct position, by x and then y.
-    pub fn by_position(&self) -> Vec<(Position, ErrorSummary)> {
+    /// The answers at each distinct position, by x and then y.
+    pub fn by_position(&self) -> Vec<(Position, Self)> {
         let mut sorted = self.located.clone();
         sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
         let groups = sorted.chunk_by(|a, b| a.truth == b.truth);
-        let summaries = groups.filter_map(|group| {
-            let part = Self { extent: self.extent, located: group.to_vec() };
-            Some((group[0].truth, part.summary(None)?))
-        });
-        summaries.collect()
+        let part = |located: &[Located]| Self { extent: self.extent, located: located.to_vec() };
+        groups.map(|group| (group[0].truth, part(group))).collect()
     }
 }
 

@@ -1,0 +1,107 @@
+//! Comparison of estimators on the same trials.
+
+use super::{Estimator, FitCost};
+use crate::evaluation::{Split, TimedEvaluation, evaluate_splits};
+use crate::setup::Setup;
+use palpate_numerics::watch::{Cancelled, Watch};
+
+/// Evaluation of one estimator over some splits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// The estimator.
+    pub estimator: Estimator,
+    /// The evaluation, with its times.
+    pub tried: TimedEvaluation,
+}
+
+/// The estimators that `auto` chooses from, and that a comparison shows: every contender, with the settings of `own`
+/// where that is of its kind. Networks trained by back-propagation stop after as many presentations as
+/// take some seconds.
+pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator> {
+    const MOST_PRESENTATIONS: usize = 20_000_000;
+    let mut contenders = Estimator::contenders(setup);
+    for contender in &mut contenders {
+        if contender.kind() == own.kind() {
+            *contender = own.clone();
+        }
+        if let Estimator::Network(config) = contender {
+            let most = u32::try_from(MOST_PRESENTATIONS / rows.max(1)).unwrap_or(u32::MAX).max(1);
+            config.training.max_epochs = config.training.max_epochs.min(most);
+        }
+    }
+    contenders
+}
+
+/// How estimators are compared.
+#[derive(Clone, Copy)]
+pub struct CompareOptions<'a> {
+    /// Seed of the fits.
+    pub seed: u64,
+    /// Tells seconds since any fixed moment, for the times of fits and estimates.
+    pub clock: &'a dyn Fn() -> f64,
+    /// Reason why an estimator of this cost is not fitted; `None` where it is.
+    pub refuse: &'a dyn Fn(&Estimator, FitCost) -> Option<String>,
+    /// Watch over the comparison, which is told the kind of estimator that is tried and how many have been.
+    pub watch: Watch<'a>,
+}
+
+/// What a comparison came to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Compared {
+    /// Estimators that were tried, by rising mean error.
+    pub comparisons: Vec<Comparison>,
+    /// Kinds that were not, with the reason.
+    pub left_out: Vec<(&'static str, String)>,
+}
+
+/// Fits each estimator to the training part of every trial, and locates what that judges by; one that does not suit is left out.
+///
+/// ```
+/// use palpate_estimators::estimator::{CompareOptions, Estimator, compare, contenders};
+/// use palpate_estimators::{arrangement::Training, evaluation::Split, setup::Setup};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+/// use palpate_numerics::watch::Watch;
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let trials = Split::by_folds(&setup.simulate(&Training::even(10).repeated(3), 0)?, 5)?;
+/// let mut contenders = contenders(&setup, &Estimator::default(), 24);
+/// contenders.retain(|contender| matches!(contender.kind(), "influence" | "neighbours"));
+/// let options = CompareOptions { seed: 0, clock: &|| 0.0, refuse: &|_, _| None, watch: Watch::NONE };
+/// let compared = compare(&setup, contenders, &trials, options)?;
+/// assert_eq!(compared.comparisons[0].estimator.kind(), "influence");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`Cancelled`] when the watch stopped it.
+pub fn compare(
+    setup: &Setup,
+    contenders: Vec<Estimator>,
+    trials: &[Split],
+    options: CompareOptions,
+) -> Result<Compared, Cancelled> {
+    let mut compared = Compared::default();
+    let of = contenders.len();
+    for (done, estimator) in contenders.into_iter().enumerate() {
+        let kind = estimator.kind();
+        let observe = || options.watch.counted(kind, "estimators", done, of);
+        observe()?;
+        let cost = trials.first().map(|trial| estimator.fit_cost(setup, &trial.training));
+        if let Some(why) = cost.and_then(|cost| (options.refuse)(&estimator, cost)) {
+            compared.left_out.push((kind, why));
+            continue;
+        }
+        let go_on = |_| observe().is_ok();
+        match evaluate_splits(setup, &estimator, trials, options.seed, options.clock, Watch::new(&go_on)) {
+            Ok(tried) => compared.comparisons.push(Comparison { estimator, tried }),
+            Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
+            Err(error) => compared.left_out.push((kind, error.to_string())),
+        }
+    }
+    let mean_m = |comparison: &Comparison| {
+        comparison.tried.evaluation.summary(None).map_or(f64::INFINITY, |summary| summary.average_m)
+    };
+    compared.comparisons.sort_by(|a, b| mean_m(a).total_cmp(&mean_m(b)));
+    Ok(compared)
+}
