@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -120,6 +120,9 @@ class Comparison(Result):
         if name not in self.names:
             raise KeyError(f"{name!r} is not among {', '.join(self.names)}")
         return self.evaluations[self.names.index(name)]
+
+    def __iter__(self) -> Iterator[Evaluation]:
+        return iter(self.evaluations)
 
     def _columns(self) -> dict[str, Any]:
         return {

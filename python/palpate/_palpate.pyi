@@ -331,3 +331,39 @@ def compare(
     tare: bool,
     progress: Progress,
 ) -> dict[str, Any]: ...
+def place_sensors(
+    bench: Setup | Rig,
+    design: str | None,
+    *,
+    count: int | None,
+    add: int | None,
+    counts: tuple[int, int] | None,
+    method: str | None,
+    force: Quantity | None,
+    unknown_force: bool,
+    verify: int,
+    estimator: Estimator | None,
+    seed: int,
+    progress: Progress,
+) -> dict[str, Any]: ...
+def place_training(
+    bench: Setup | Rig,
+    design: str | None,
+    *,
+    estimator: Estimator | None,
+    training: Training | None,
+    count: int | None,
+    repeats: int | None,
+    trials: int,
+    calibrations: int,
+    verify: int,
+    seed: int,
+    progress: Progress,
+) -> dict[str, Any]: ...
+def next_press(
+    recording: Recording,
+    design: str | None,
+    *,
+    stop_below: float | str,
+    progress: Progress,
+) -> dict[str, Any]: ...

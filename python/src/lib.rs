@@ -15,6 +15,8 @@ mod evaluation;
 mod files;
 mod limit;
 mod locator;
+mod placement;
+mod positions;
 mod quantities;
 mod rig;
 mod sections;
@@ -38,6 +40,8 @@ mod _palpate {
         evaluation::Evaluation,
         limit::limit,
         locator::Locator,
+        placement::place_sensors,
+        positions::{next_press, place_training},
         quantities::parse_quantity,
         rig::Rig,
         training::Training,

@@ -36,6 +36,11 @@ pub fn force_n(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     si(value, name, Dimension::Force)
 }
 
+/// A frequency in hertz.
+pub fn frequency_hz(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    si(value, name, Dimension::Frequency)
+}
+
 /// A share: 0.05, or "5 %".
 pub fn share(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     si(value, name, Dimension::Ratio)

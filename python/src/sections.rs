@@ -1,5 +1,6 @@
 //! Sections of a rig that are held apart: a setup's, an estimator's.
 
+use palpate::design::sensors::SensorDesign;
 use palpate::estimators::estimator::Estimator;
 use palpate::estimators::setup::Setup;
 use palpate::rig::RigSections;
@@ -26,4 +27,14 @@ pub fn estimator(text: &str, setup: &Setup) -> PyResult<Estimator> {
     let estimator = sections.and_then(|sections| sections.estimator(setup));
     let estimator = estimator.map_err(|error| of_rig(&error, "estimator", text))?;
     estimator.ok_or_else(|| refused("the text has no section [estimator]"))
+}
+
+/// The sensor design that a section says, for a setup.
+///
+/// # Errors
+/// `FileError`, with the place.
+pub fn design(text: &str, setup: &Setup) -> PyResult<Option<SensorDesign>> {
+    let sections = RigSections::from_toml(text);
+    let design = sections.and_then(|sections| sections.design(setup));
+    design.map_err(|error| of_rig(&error, "design", text))
 }

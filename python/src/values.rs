@@ -17,6 +17,11 @@ impl<'py> Fields<'py> {
         Self(PyDict::new(py))
     }
 
+    /// Numbers as an array.
+    pub fn of_numbers(py: Python<'py>, values: &[f64]) -> Bound<'py, PyArray1<f64>> {
+        values.to_pyarray(py)
+    }
+
     /// Adds a field.
     pub fn set(&self, name: &str, value: impl IntoPyObject<'py>) -> PyResult<()> {
         self.0.set_item(name, value)

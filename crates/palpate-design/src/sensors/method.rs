@@ -88,6 +88,13 @@ pub fn best_design(designed: &[Designed]) -> Option<&Designed> {
     searched.min_by(|a, b| a.assessment.score.total_cmp(&b.assessment.score))
 }
 
+/// Layouts that simulated calibrations should verify: those that the design is compared with, and the best that searches by the criterion found,
+/// as several may have found the same.
+pub fn to_verify(designed: &[Designed]) -> impl Iterator<Item = &Designed> {
+    let best = best_design(designed).map(|best| best.method);
+    designed.iter().filter(move |designed| !designed.method.is_search() || Some(designed.method) == best)
+}
+
 impl SensorProblem<'_> {
     /// Every layout: even, the setup's own, by all searches that suit, by the historical methods.
     ///

@@ -48,7 +48,7 @@ pub use candidates::PlacedSensor;
 pub(crate) use design::TOLERANCE_M;
 pub use design::{DesignCriterion, DesignError, Exclusion, FixedList, KeepOut, MustHave, SensorDesign};
 pub use design::{SensorOffer, Sites, Supply, Symmetry};
-pub use method::{Designed, Method, best_design};
+pub use method::{Designed, Method, best_design, to_verify};
 pub use pivoting::{condition_number, pivoted_columns};
 pub use sensitivity::DesignCost;
 

@@ -11,7 +11,7 @@ use crate::remark::remark;
 use crate::target::{Inputs, Target, TargetFolder};
 use palpate_design::sensors::{
     Assessment, CountPoint, DesignCriterion, DesignError, Designed, Method, SensorDesign, SensorProblem,
-    Verification, best_design, enough,
+    Verification, best_design, enough, to_verify,
 };
 use palpate_estimators::estimator::FitError;
 use palpate_estimators::evaluation::EvaluationError;
@@ -183,12 +183,6 @@ fn outcome<'a>(
         }
     }
     Ok(Outcome { rig: &arguments.rig, problem, designed, verified, counts, seed: arguments.seed })
-}
-
-/// Layouts to verify: those that the design is compared with, and the design; of searches that found the same, one.
-fn to_verify(designed: &[Designed]) -> impl Iterator<Item = &Designed> {
-    let best = best_design(designed).map(|best| best.method);
-    designed.iter().filter(move |designed| !designed.method.is_search() || Some(designed.method) == best)
 }
 
 fn write_report(outcome: &Outcome, setup: &Setup, out: &TargetFolder) -> Result<(), Failure> {
