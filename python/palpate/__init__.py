@@ -41,6 +41,7 @@ from ._estimators import (
 )
 from ._evaluation import Comparison, ErrorsByPosition, compare, cross_validate
 from ._limit import Limit, limit
+from ._load_profile import LoadProfile, UniformLoad, load_profile, simulate_loads
 from ._palpate import (
     Estimate,
     Estimates,
@@ -56,6 +57,7 @@ from ._palpate import (
 )
 from ._sensors import Columns, Sensors, deflection, raw, reaction, slope, strain
 from ._surfaces import Beam, BeamSection, Digit, Measured, Plate, Support
+from ._tracking import Motion, MovingRecording, Track, TrackedContact, simulate_moving
 from ._training import at, chebyshev, edge_dense, even, grid
 
 __all__ = [
@@ -81,8 +83,11 @@ __all__ = [
     "Layout",
     "LevenbergMarquardt",
     "Limit",
+    "LoadProfile",
     "Locator",
     "Measured",
+    "Motion",
+    "MovingRecording",
     "MustHave",
     "Neighbours",
     "Network",
@@ -97,8 +102,11 @@ __all__ = [
     "Sensors",
     "Setup",
     "Support",
+    "Track",
+    "TrackedContact",
     "Training",
     "TrainingPlacement",
+    "UniformLoad",
     "__version__",
     "at",
     "chebyshev",
@@ -109,12 +117,15 @@ __all__ = [
     "even",
     "grid",
     "limit",
+    "load_profile",
     "next_press",
     "parse_quantity",
     "place_sensors",
     "place_training",
     "raw",
     "reaction",
+    "simulate_loads",
+    "simulate_moving",
     "slope",
     "strain",
 ]

@@ -14,7 +14,7 @@ from ._estimators import Estimator
 from ._evaluation import AnyEstimator
 from ._progress import Progress
 from ._results import Floats, Result, in_mm, position_columns
-from ._sections import LENGTH, Section, key, needed
+from ._sections import LENGTH, Range, Section, key, needed
 from ._sensors import _OWN_UNIT, _UNITS
 from ._surfaces import Point, Quantity
 
@@ -23,16 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class _Range(Section):
-    """A section whose ends are called `from` and `to` in a rig."""
-
-    def _keys(self) -> dict[str, str]:
-        renamed = {"start": "from", "end": "to"}
-        return {renamed.get(name, name): value for name, value in super()._keys().items()}
-
-
-@dataclass(frozen=True)
-class ContactPrior(_Range):
+class ContactPrior(Range):
     """Positions at which the surface will be touched.
 
     Parameters
@@ -53,7 +44,7 @@ class ContactPrior(_Range):
 
 
 @dataclass(frozen=True)
-class KeepOut(_Range):
+class KeepOut(Range):
     """A part of the surface where no sensor may sit.
 
     Parameters

@@ -7,9 +7,11 @@ import numpy.typing as npt
 import pandas as pd
 
 from ._evaluation import ErrorsByPosition
+from ._load_profile import UniformLoad
 from ._progress import Progress
 from ._sensors import Columns, RawChannels, Sensors
 from ._surfaces import Point, Quantity, Surface
+from ._tracking import MovingRecording, Track
 
 _Floats = npt.NDArray[np.float64]
 _Path = str | PathLike[str]
@@ -91,6 +93,13 @@ class Setup:
     def response(
         self, positions: Sequence[Point] | _Floats, *, force: Quantity | npt.ArrayLike | None = None
     ) -> _Floats: ...
+    def load_profile(
+        self,
+        readings: npt.ArrayLike,
+        *,
+        loads: UniformLoad | Sequence[UniformLoad] | None = None,
+        progress: Progress = None,
+    ) -> Any: ...
     def read_csv(self, path: _Path, contacts: _Path | None = None) -> Recording: ...
     def read_frame(self, frame: pd.DataFrame) -> Recording: ...
     def recording(
@@ -240,6 +249,23 @@ class Locator:
     @staticmethod
     def load(path: _Path) -> Locator: ...
     def evaluate(self, recording: Recording | None = None, *, seed: int = 0) -> Evaluation: ...
+    def load_profile(
+        self,
+        readings: npt.ArrayLike,
+        *,
+        loads: UniformLoad | Sequence[UniformLoad] | None = None,
+        progress: Progress = None,
+    ) -> Any: ...
+    def track(
+        self,
+        times: npt.ArrayLike | MovingRecording,
+        readings: npt.ArrayLike | None = None,
+        *,
+        smooth: bool = False,
+        frequency: Quantity | None = None,
+        damping: float | None = None,
+        progress: Progress = None,
+    ) -> Track: ...
     def to_json(self) -> str: ...
     @staticmethod
     def from_json(text: str) -> Locator: ...
@@ -367,3 +393,32 @@ def next_press(
     stop_below: float | str,
     progress: Progress,
 ) -> dict[str, Any]: ...
+def simulate_moving(
+    bench: Setup | Rig,
+    motion: str | None,
+    *,
+    density: str | None,
+    force: Quantity | None,
+    seed: int,
+) -> dict[str, Any]: ...
+def moving_csv(recording: Recording, second: tuple[Sequence[float], Sequence[float]] | None) -> bytes: ...
+def track(
+    locator: Locator,
+    times: npt.ArrayLike,
+    readings: npt.ArrayLike,
+    *,
+    truth: Recording | None,
+    second_truth: tuple[Sequence[float], Sequence[float]] | None,
+    smooth: bool,
+    frequency: Quantity | None,
+    damping: float | None,
+    progress: Progress,
+) -> dict[str, Any]: ...
+def load_profile(
+    bench: Setup | Rig | Locator,
+    readings: npt.ArrayLike,
+    loads: str | None,
+    *,
+    progress: Progress,
+) -> Any: ...
+def simulate_loads(bench: Setup | Rig, loads: str | None, *, repeats: int, seed: int) -> _Floats: ...

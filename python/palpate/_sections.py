@@ -54,6 +54,15 @@ class Section:
         return "\n".join(lines) + "\n"
 
 
+@dataclasses.dataclass(frozen=True)
+class Range(Section):
+    """A section whose `start` and `end` are called `from` and `to` in a rig; `from` is a word of Python itself."""
+
+    def _keys(self) -> dict[str, str]:
+        renamed = {"start": "from", "end": "to"}
+        return {renamed.get(name, name): value for name, value in super()._keys().items()}
+
+
 def toml_value(value: Any, unit: str | None, name: str) -> str:
     """A value in TOML; a plain number gets the unit that it is in."""
     if isinstance(value, Section):

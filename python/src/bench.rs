@@ -294,6 +294,33 @@ impl Setup {
         readings.to_pyarray(py).reshape([positions.len(), self.0.layout().len()])
     }
 
+    /// Tell how force is spread over the surface; see `load_profile`.
+    ///
+    /// Parameters
+    /// ----------
+    /// readings : array_like
+    ///     In SI units: one reading of the shape (channels), or many of the shape (readings, channels).
+    /// loads : UniformLoad or sequence of UniformLoad, optional
+    ///     True loads, to be held beside the profile.
+    /// progress : bool or callable, optional
+    ///     As of `Estimator.fit`.
+    ///
+    /// Returns
+    /// -------
+    /// LoadProfile or list of LoadProfile
+    #[pyo3(signature = (readings, *, loads=None, progress=None))]
+    fn load_profile<'py>(
+        slf: &Bound<'py, Self>,
+        readings: &Bound<'py, PyAny>,
+        loads: Option<&Bound<'py, PyAny>>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let options = PyDict::new(slf.py());
+        options.set_item("loads", loads)?;
+        options.set_item("progress", progress)?;
+        slf.py().import("palpate._load_profile")?.call_method("load_profile", (slf, readings), Some(&options))
+    }
+
     /// Read a recording from CSV of any dialect.
     ///
     /// Parameters

@@ -14,6 +14,7 @@ mod estimator;
 mod evaluation;
 mod files;
 mod limit;
+mod load_profile;
 mod locator;
 mod placement;
 mod positions;
@@ -21,6 +22,7 @@ mod quantities;
 mod rig;
 mod sections;
 mod subject;
+mod tracking;
 mod training;
 mod values;
 mod work;
@@ -39,11 +41,13 @@ mod _palpate {
         estimator::Estimator,
         evaluation::Evaluation,
         limit::limit,
+        load_profile::{load_profile, simulate_loads},
         locator::Locator,
         placement::place_sensors,
         positions::{next_press, place_training},
         quantities::parse_quantity,
         rig::Rig,
+        tracking::{moving_csv, simulate_moving, track},
         training::Training,
     };
 

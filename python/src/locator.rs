@@ -134,6 +134,74 @@ impl Locator {
         Ok(Evaluation::new(evaluation, self.setup.clone(), about))
     }
 
+    /// Follow moving contacts through readings in time: one contact, or on a line up to two, with their speed and force.
+    ///
+    /// The locator is an influence locator of a surface with a model; two contacts are followed where its estimator has ``contacts=2``.
+    ///
+    /// Parameters
+    /// ----------
+    /// times : array_like or MovingRecording
+    ///     Time of each reading, in seconds, rising: of the shape (readings). A `MovingRecording` has the readings too, and the truth.
+    /// readings : array_like, optional
+    ///     In SI units: of the shape (readings, channels).
+    /// smooth : bool
+    ///     Go back over all of them, with what came later, instead of filtering them as they come.
+    /// frequency : float or str, optional
+    ///     First natural frequency of a beam on two simple supports, in hertz or with a unit: its inertia is reckoned with.
+    /// damping : float, optional
+    ///     Share of the critical damping of its first mode; 0.01.
+    /// progress : bool or callable, optional
+    ///     As of `Estimator.fit`.
+    ///
+    /// Returns
+    /// -------
+    /// Track
+    ///
+    /// Raises
+    /// ------
+    /// PalpateError
+    ///     For a locator that cannot follow, a time that is not later than the one before, and a value that is not finite, with the reading.
+    #[pyo3(signature = (times, readings=None, *, smooth=false, frequency=None, damping=None, progress=None))]
+    fn track<'py>(
+        slf: &Bound<'py, Self>,
+        times: &Bound<'py, PyAny>,
+        readings: Option<&Bound<'py, PyAny>>,
+        smooth: bool,
+        frequency: Option<&Bound<'py, PyAny>>,
+        damping: Option<&Bound<'py, PyAny>>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let arguments = (slf, times, readings, smooth, frequency, damping, progress);
+        slf.py().import("palpate._tracking")?.call_method1("track", arguments)
+    }
+
+    /// Tell how force is spread over the surface; see `load_profile`.
+    ///
+    /// Parameters
+    /// ----------
+    /// readings : array_like
+    ///     In SI units: one reading of the shape (channels), or many of the shape (readings, channels).
+    /// loads : UniformLoad or sequence of UniformLoad, optional
+    ///     True loads, to be held beside the profile.
+    /// progress : bool or callable, optional
+    ///     As of `Estimator.fit`.
+    ///
+    /// Returns
+    /// -------
+    /// LoadProfile or list of LoadProfile
+    #[pyo3(signature = (readings, *, loads=None, progress=None))]
+    fn load_profile<'py>(
+        slf: &Bound<'py, Self>,
+        readings: &Bound<'py, PyAny>,
+        loads: Option<&Bound<'py, PyAny>>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let options = PyDict::new(slf.py());
+        options.set_item("loads", loads)?;
+        options.set_item("progress", progress)?;
+        slf.py().import("palpate._load_profile")?.call_method("load_profile", (slf, readings), Some(&options))
+    }
+
     /// Kind of its estimator: "influence".
     #[getter]
     fn kind(&self) -> &'static str {

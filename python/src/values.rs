@@ -22,6 +22,12 @@ impl<'py> Fields<'py> {
         values.to_pyarray(py)
     }
 
+    /// Rows of numbers as an array of the shape (rows, columns); at least one row.
+    pub fn of_rows(py: Python<'py>, rows: &[Vec<f64>]) -> PyResult<Bound<'py, PyAny>> {
+        let columns = rows.first().map_or(0, Vec::len);
+        Ok(PyArray1::from_vec(py, rows.concat()).reshape([rows.len(), columns])?.into_any())
+    }
+
     /// Adds a field.
     pub fn set(&self, name: &str, value: impl IntoPyObject<'py>) -> PyResult<()> {
         self.0.set_item(name, value)
