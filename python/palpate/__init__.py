@@ -40,6 +40,7 @@ from ._estimators import (
     Network,
 )
 from ._evaluation import Comparison, ErrorsByPosition, compare, cross_validate
+from ._inspect import Inspection, inspect
 from ._limit import Limit, limit
 from ._load_profile import LoadProfile, UniformLoad, load_profile, simulate_loads
 from ._palpate import (
@@ -79,6 +80,7 @@ __all__ = [
     "FileError",
     "GaussianProcess",
     "Influence",
+    "Inspection",
     "KeepOut",
     "Layout",
     "LevenbergMarquardt",
@@ -116,6 +118,7 @@ __all__ = [
     "edge_dense",
     "even",
     "grid",
+    "inspect",
     "limit",
     "load_profile",
     "next_press",

@@ -13,6 +13,7 @@ mod estimates;
 mod estimator;
 mod evaluation;
 mod files;
+mod inspect;
 mod limit;
 mod load_profile;
 mod locator;
@@ -40,6 +41,7 @@ mod _palpate {
         estimates::{Estimate, Estimates},
         estimator::Estimator,
         evaluation::Evaluation,
+        inspect::{inspect, inspect_study},
         limit::limit,
         load_profile::{load_profile, simulate_loads},
         locator::Locator,

@@ -26,6 +26,7 @@ pub mod arrangement;
 pub mod batch;
 pub mod centroid;
 pub mod closed_form;
+pub mod description;
 pub mod digit;
 pub mod estimator;
 pub mod evaluation;

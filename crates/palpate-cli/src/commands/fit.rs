@@ -10,6 +10,7 @@ use crate::remark::remark;
 use crate::tare::say_drift;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
+use palpate_estimators::description;
 use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, FitCost, TimeLimit, Tried, choose};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
@@ -89,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         recording.rows.len(),
         arguments.out.display()
     ))?;
-    let lines = learnt.map(|(linear, names)| learnt::summary(linear, &names)).unwrap_or_default();
+    let lines = learnt.map(|(linear, names)| description::learnt_summary(linear, &names)).unwrap_or_default();
     lines.iter().try_for_each(|line| output::say(format!("  {line}")))
 }
 

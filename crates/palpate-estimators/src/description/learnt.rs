@@ -1,0 +1,115 @@
+//! What a recording has told of a surface without a model: structure, drift, scatter and noise.
+
+use crate::influence::{DriftCourse, ForceLinearLocator, Scatter, Source, Structure};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::units::{format_count, format_length_mm};
+use palpate_numerics::regression::Kernel;
+
+/// All that was learnt.
+pub fn learnt(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
+    let channels =
+        linear.channels().map(|(c, offset, noise)| format!("{}: {offset:.4} ± {noise:.2}", names[c]));
+    let presses = format_count(linear.presses() as u64);
+    let mut lines = vec![
+        "reading = offset + force × influence(position), learnt from the recording".to_owned(),
+        structure(linear),
+        format!("influence functions: {}, from {presses} presses", influences(linear)),
+        format!("offset and noise of the channels in use: {}", channels.collect::<Vec<_>>().join(", ")),
+    ];
+    lines.extend(disturbances(linear, names));
+    lines
+}
+
+/// Structure, drift, scatter and what was set aside, for the summary of a fit.
+pub fn learnt_summary(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
+    let mut lines = vec![structure(linear)];
+    lines.extend(disturbances(linear, names));
+    lines
+}
+
+/// The structure, and why it was taken.
+fn structure(linear: &ForceLinearLocator) -> String {
+    let exponent = linear.response();
+    match (linear.asked_structure(), exponent == 1.0) {
+        (Structure::Auto, true) => {
+            "structure: force-linear, as the presses are not e¹⁰ times as probable with another power of the force, \
+             or with influences that change with force and position"
+                .to_owned()
+        }
+        (Structure::Auto, false) => format!(
+            "structure: force-monotone; readings follow the force to the power of {exponent:.2}, with which the \
+             presses are e¹⁰ times as probable"
+        ),
+        (_, true) => "structure: force-linear, as the rig says".to_owned(),
+        (_, false) => format!(
+            "structure: force-monotone, as the rig says; readings follow the force to the power of {exponent:.2}"
+        ),
+    }
+}
+
+/// Drift, scatter, and what was set aside.
+fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
+    let by_channel = |sizes: &[(usize, f64)]| {
+        let sizes: Vec<String> = sizes.iter().map(|(c, sd)| format!("{} by {sd:.1}", names[*c])).collect();
+        sizes.join(", ")
+    };
+    let mut lines = Vec::new();
+    if let Some(course) = linear.drift_course() {
+        let course = match course {
+            DriftCourse::Walk => "a random walk",
+            DriftCourse::Linear => "in proportion to the time",
+            DriftCourse::Smooth => "a smooth function of the time",
+        };
+        lines.push(format!(
+            "drift over the recording, {course}: {}, taken off; the offsets are those at its end",
+            by_channel(&linear.drifts())
+        ));
+    }
+    if let Some(Scatter { force_n, sd }) = linear.scatter() {
+        lines.push(format!(
+            "scatter of the presses that grows with the force, beside the noise: at {force_n:.2} N, {}; presses are weighed by it",
+            by_channel(&sd)
+        ));
+    }
+    if let Some([(least, quiet), (most, noisy)]) = linear.noise_by_place() {
+        let place = |position: Position| linear.extent().place_in_words(position);
+        lines.push(format!(
+            "noise of touches by place, over that of the untouched board: {least:.1} times at {} to {most:.1} times at {}; presses and readings are weighed by it",
+            place(quiet),
+            place(noisy)
+        ));
+    }
+    if !linear.set_aside().is_empty() {
+        lines.push(format!(
+            "set aside, as no function of the position explains them: {}",
+            rows(linear.set_aside())
+        ));
+    }
+    lines
+}
+
+/// Rows of a recording, counted from 1.
+fn rows(from_0: &[usize]) -> String {
+    let numbers: Vec<String> = from_0.iter().map(|row| (row + 1).to_string()).collect();
+    format!("{} {}", if numbers.len() == 1 { "row" } else { "rows" }, numbers.join(", "))
+}
+
+fn influences(linear: &ForceLinearLocator) -> String {
+    let smooth = linear.correlation().map(|(kernel, lengths_m)| {
+        let lengths: Vec<String> = lengths_m.iter().map(|length_m| format_length_mm(*length_m)).collect();
+        let kernel = match kernel {
+            Kernel::Matern32 => "Matérn 3/2",
+            Kernel::Matern52 => "Matérn 5/2",
+            Kernel::SquaredExponential => "squared exponential",
+        };
+        format!("Gaussian process, {kernel}, length scale {}", lengths.join(" and "))
+    });
+    let Some(source) = linear.source() else { return smooth.unwrap_or_default() };
+    let kind = match source {
+        Source::Strain => "strain",
+        Source::Slope => "slope",
+        Source::Deflection => "deflection",
+    };
+    let rest = smooth.map(|smooth| format!(", and {smooth}")).unwrap_or_default();
+    format!("those of sensors of {kind} at places that the presses tell, polynomials{rest}")
+}

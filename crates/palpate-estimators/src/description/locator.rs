@@ -1,0 +1,126 @@
+//! Locators in words.
+
+use super::learnt::learnt;
+use crate::centroid::Weighing;
+use crate::estimator::{Locator, Method};
+use crate::influence::InfluenceLocator;
+use crate::influence::measured::{MeasuredLocator, NuisanceRole};
+use crate::network::Topology;
+use palpate_mechanics::units::format_count;
+
+/// A locator: its setup, what it learnt, how its estimates are checked, and the recording that it was fitted to.
+pub fn locator(locator: &Locator) -> Vec<String> {
+    let provenance = &locator.provenance;
+    let mut lines = vec![format!(
+        "a locator, {}, fitted by palpate {}, seed {}",
+        locator.kind(),
+        provenance.palpate,
+        provenance.seed
+    )];
+    lines.extend(super::setup(&locator.setup));
+    lines.extend(method(locator));
+    if let Some(check) = &locator.check {
+        lines.push(format!("status and interval of an estimate: by {}", check.in_words()));
+    }
+    lines.push(match locator.false_alarm_rate() {
+        Some(rate) => format!("untouched readings taken for a contact: {rate}, by the noise of the channels"),
+        None => "untouched readings are not told from contacts: it does not know what the board reads then"
+            .to_owned(),
+    });
+    let recording = &provenance.recording;
+    lines.push(format!("fitted to: {}, {} rows", recording.source, recording.rows));
+    for digest in &recording.digests {
+        lines.push(format!("    sha256 {digest}"));
+    }
+    lines
+}
+
+fn method(locator: &Locator) -> Vec<String> {
+    match &locator.method {
+        Method::Network(network) => {
+            let network = network.parts();
+            let outcome = network.outcome;
+            vec![
+                format!("network: {} ({} weights)", shape(&network.topology), network.weights.len()),
+                format!(
+                    "training: {} after {} epochs, aggregate error {:.2e}",
+                    outcome.status,
+                    format_count(u64::from(outcome.epochs)),
+                    outcome.aggregate_error
+                ),
+            ]
+        }
+        Method::Influence(InfluenceLocator::Beam(beam)) => vec![format!(
+            "influence functions of {} sensors at {} nodes; {} at once",
+            beam.table().sensors,
+            beam.table().nodes(),
+            match beam.contacts() {
+                1 => "one contact".to_owned(),
+                most => format!("up to {most} contacts"),
+            }
+        )],
+        Method::Influence(InfluenceLocator::Plane(plane)) => vec![format!(
+            "influence functions of {} sensors at {} × {} nodes; one contact at once",
+            plane.table().sensors,
+            plane.table().columns,
+            plane.table().rows
+        )],
+        Method::Influence(InfluenceLocator::ForceLinear(linear)) => {
+            learnt(linear, &locator.setup.layout().names())
+        }
+        Method::Influence(InfluenceLocator::Measured(measured)) => vec![free(measured)],
+        Method::NetworkLm(networks) => networks
+            .members
+            .iter()
+            .map(|member| {
+                format!(
+                    "network: {}, {:.0} of {} weights in effect, log evidence {:.0}, {} iterations",
+                    shape(&networks.topology),
+                    member.effective_parameters,
+                    member.weights.len(),
+                    member.log_evidence,
+                    member.iterations
+                )
+            })
+            .collect(),
+        Method::GaussianProcess(gaussian) => vec![format!(
+            "Gaussian process from {} features through {} presses, log evidence {:.0}",
+            gaussian.process.coordinates(),
+            gaussian.process.points(),
+            gaussian.process.log_evidence()
+        )],
+        Method::ClosedForm(_) => vec!["the beam's own equations; nothing was learnt".to_owned()],
+        Method::Digit(_) => vec!["the bending finger's own equations; nothing was learnt".to_owned()],
+        Method::Neighbours(neighbours) => {
+            vec![format!("the {} nearest of {} presses", neighbours.count, neighbours.rows.len())]
+        }
+        Method::Centroid(centroid) => vec![match centroid.weighing {
+            Weighing::Positions(_) => "the centroid of the sensors' positions, calibrated".to_owned(),
+            Weighing::Channels => {
+                "the centroid of the channels, whose positions calibration finds".to_owned()
+            }
+        }],
+    }
+}
+
+fn free(measured: &MeasuredLocator) -> String {
+    let table = measured.table();
+    let counts = [table.x.count, table.y.count, table.nuisance.count];
+    let nodes: Vec<String> = counts.iter().filter(|count| **count > 1).map(usize::to_string).collect();
+    let (nuisance, why) = match measured.role() {
+        NuisanceRole::None => ("", "nothing else was recorded that they depend on, or the rig asks for it"),
+        NuisanceRole::Force => (
+            " and force",
+            "they are no multiple of a function of the force, as far as the presses tell, or the rig asks for it",
+        ),
+        NuisanceRole::Other => (" and the nuisance coordinate", "the rig names a nuisance column"),
+    };
+    format!(
+        "structure: free; readings learnt from the recording as functions of position{nuisance}, since {why}: {} nodes",
+        nodes.join(" × ")
+    )
+}
+
+fn shape(topology: &Topology) -> String {
+    topology.sizes.iter().map(usize::to_string).collect::<Vec<_>>().join("–")
+}
