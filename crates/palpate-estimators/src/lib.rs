@@ -49,6 +49,7 @@ pub mod setup;
 pub mod simulate;
 mod spread;
 pub mod status;
+mod thinning;
 pub mod track_errors;
 pub mod tracking;
 mod trade_off;

@@ -18,6 +18,7 @@ use crate::influence::{Influence, InfluenceLocator, InfluenceSource};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::status::{FalseAlarmRate, NO_CONTACT};
+use crate::thinning::thinned;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
@@ -69,7 +70,7 @@ impl ReadingCheck {
         if rows <= Self::MOST_ROWS {
             return Cow::Borrowed(recording);
         }
-        let picked: Vec<usize> = (0..Self::MOST_ROWS).map(|i| i * rows / Self::MOST_ROWS).collect();
+        let picked: Vec<usize> = thinned(rows, Self::MOST_ROWS).collect();
         Cow::Owned(recording.subset(&picked))
     }
 

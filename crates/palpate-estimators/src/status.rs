@@ -16,6 +16,8 @@
 //! then gives one every few seconds, and a tracker averages it away; a rate ten times lower moves both bounds by a tenth of their size
 //! and hides contacts that are that much stronger.
 
+use crate::recording::Recording;
+use crate::thinning::thinned;
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
@@ -134,15 +136,15 @@ fn detection_cost(contact_cost: f64, rate: FalseAlarmRate) -> f64 {
 /// Bounds of misfit, score of a spread or the like, from which on no contact explains a reading, of a surface that is known by its recording
 /// alone: each that for `normal` noise, and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer
 /// tails.
-pub(crate) fn learnt_bounds<'a, const N: usize>(
+pub(crate) fn learnt_bounds<const N: usize>(
     normal: [f64; N],
-    readings: impl ExactSizeIterator<Item = &'a [f64]>,
+    recording: &Recording,
     left: impl Fn(&[f64]) -> [f64; N],
 ) -> [f64; N] {
     /// Readings that are tried.
     const TRIED: usize = 400;
-    let every = readings.len().div_ceil(TRIED).max(1);
-    let tried: Vec<[f64; N]> = readings.step_by(every).map(left).collect();
+    let rows = &recording.rows;
+    let tried: Vec<[f64; N]> = thinned(rows.len(), TRIED).map(|i| left(&rows[i].reading)).collect();
     std::array::from_fn(|k| {
         let mut own: Vec<f64> = tried.iter().map(|left| left[k]).filter(|left| left.is_finite()).collect();
         own.sort_by(f64::total_cmp);

@@ -9,6 +9,7 @@ use super::config::{Influence, InfluenceFitError, InfluenceSource};
 use super::prior::{Hyperparameters, Mean, Parts, Prior, Remainders};
 use crate::fit::FitTask;
 use crate::recording::Recording;
+use crate::thinning::thinned;
 use ndarray::{Array1, Array2, ArrayView1};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -126,9 +127,9 @@ impl<'a> Learning<'a> {
             SensorPresses::new(prior.clone(), presses, s, noise, kept, &remainders.presses)
         };
         let all: Vec<usize> = (0..pressed.len()).collect();
-        let thinned: Vec<usize> = all.iter().copied().step_by(all.len().div_ceil(MOST_PRESSES)).collect();
+        let few: Vec<usize> = thinned(pressed.len(), MOST_PRESSES).collect();
         let searched: Vec<SensorPresses> =
-            priors.iter().zip(living).map(|sensor| with(sensor, &thinned)).collect();
+            priors.iter().zip(living).map(|sensor| with(sensor, &few)).collect();
         let noise_is_told = living.iter().all(|s| presses.noise_variance(layout, *s).is_some());
         // A reaction of presses of one force may be an offset as well as an influence, which no support holds at 0 everywhere.
         let has_one_force = presses.presses.windows(2).all(|pair| pair[0].force_n == pair[1].force_n);
@@ -207,8 +208,8 @@ impl Presses {
 
     /// Evenly picked, no more than `most`; the scatter of repeats stays that of all.
     fn thinned(self, most: usize) -> Self {
-        let every = self.presses.len().div_ceil(most).max(1);
-        Self { presses: self.presses.into_iter().step_by(every).collect(), ..self }
+        let presses = thinned(self.presses.len(), most).map(|i| self.presses[i].clone()).collect();
+        Self { presses, ..self }
     }
 
     /// Number of positions, whatever the force.
@@ -484,6 +485,16 @@ mod tests {
             Provenance { source: "test".into(), rows: 0, digests: vec![], dialects: vec![], seed: None };
         let kinds = vec![SensorKind::Deflection];
         Recording { channels: vec!["d".into()], kinds, rows: rows.collect(), provenance }
+    }
+
+    #[test]
+    fn few_presses_have_all_forces_and_places() {
+        let forces_n = [1.5, 3.0, 6.0];
+        let presses = (0..120).flat_map(|i| forces_n.map(|force_n| (0.003 * f64::from(i), force_n, 1.0)));
+        let few = Presses::average(&recording(&presses.collect::<Vec<_>>())).unwrap().thinned(120);
+        assert_eq!((few.presses.len(), few.distinct_positions()), (120, 120));
+        let of_force = |force_n: f64| few.presses.iter().filter(|press| press.force_n == force_n).count();
+        assert!(forces_n.iter().all(|force_n| of_force(*force_n) >= 20), "{few:?}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::held_out::HeldOutErrors;
 use crate::recording::{Row, TooFewPositions};
 use crate::setup::Setup;
 use crate::status::{NO_CONTACT, on_surface};
+use crate::thinning::thinned;
 use palpate_core::{ContactEstimate, Estimate};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
@@ -112,9 +113,9 @@ pub(crate) const MOST_HELD_OUT: usize = 4000;
 /// as every row has.
 fn held_out_errors(rows: &[Neighbour], most: usize, watch: Watch) -> Result<Vec<Vec<[f64; 2]>>, Cancelled> {
     let mut errors: Vec<Vec<[f64; 2]>> = Vec::new();
-    let every = rows.len().div_ceil(MOST_HELD_OUT).max(1);
-    for (i, row) in rows.iter().step_by(every).enumerate() {
-        watch.counted("holding presses out", "presses", i * every, rows.len())?;
+    let picked = thinned(rows.len(), MOST_HELD_OUT);
+    for (i, row) in picked.clone().map(|i| &rows[i]).enumerate() {
+        watch.counted("holding presses out", "presses", i, picked.len())?;
         let others = rows.iter().filter(|other| other.position != row.position);
         let means = means(&nearest(others, &row.features, most));
         if i == 0 {

@@ -146,6 +146,10 @@ fn checks_learn_from_few_rows_of_all_places() {
     let many = setup.simulate(&Training::even(40).repeated(100), 0).unwrap();
     let few = ReadingCheck::thinned(&many);
     assert_eq!((few.rows.len(), few.distinct_positions().len()), (ReadingCheck::MOST_ROWS, 40));
+    // One place after the other, over and over: one row in eight would be five places of the forty.
+    let in_turn: Vec<usize> = (0..many.rows.len()).map(|i| i % 40 * 100 + i / 40).collect();
+    let few = ReadingCheck::thinned(&many.subset(&in_turn)).into_owned();
+    assert_eq!((few.rows.len(), few.distinct_positions().len()), (ReadingCheck::MOST_ROWS, 40));
     let presses = presses();
     assert!(matches!(ReadingCheck::thinned(&presses), Cow::Borrowed(_)));
 }

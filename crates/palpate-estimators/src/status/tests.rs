@@ -5,8 +5,9 @@ use crate::closed_form::ClosedForm;
 use crate::digit::{DigitEstimator, DigitTheory};
 use crate::estimator::Estimator;
 use crate::fit::{Fit, Fitted};
-use crate::fixtures::{Example, beam, digit, paper, plate};
+use crate::fixtures::{Example, beam, digit, paper, plate, raw_recording};
 use crate::influence::{ForceLinearLocator, Influence, InfluenceLocator, Structure};
+use crate::recording::Row;
 use crate::setup::Setup;
 use crate::simulate::{CleanSensors, clean_reading};
 use ndarray::Array1;
@@ -24,6 +25,21 @@ fn the_bound_is_the_quantile_of_chi_squared() {
     // Of two degrees of freedom the distribution is exponential: P(χ² > b) = e^(−b/2).
     assert!((misfit_bound(2) + 2.0 * OUTSIDE_MODEL_RATE.ln()).abs() < 1e-6);
     assert_eq!(misfit_bound(0), misfit_bound(1));
+}
+
+#[test]
+fn learnt_bounds_see_every_place_of_a_recording_that_repeats_itself() {
+    // 800 presses at twenty places in turn, at one of which readings are 30 off what is learnt.
+    let off_at_one = |i: usize| if i % 20 == 7 { 30.0 } else { 1.0 };
+    let rows = (0..800).map(|i| Row {
+        position: Position::along(0.01 * (i % 20) as f64),
+        force_n: None,
+        nuisances: Vec::new(),
+        time_s: None,
+        reading: vec![off_at_one(i)],
+    });
+    let recording = raw_recording(rows.collect());
+    assert_eq!(learnt_bounds([10.0, 100.0], &recording, |reading| [reading[0]; 2]), [60.0, 100.0]);
 }
 
 /// An estimator that knows its noise, on a bench.

@@ -505,9 +505,8 @@ impl ForceLinearLocator {
     /// Sets the bound of the residual from the recording's own readings.
     pub(super) fn limit_residuals(&mut self, recording: &Recording) {
         let freedom = self.stored.live.len().saturating_sub(self.unknowns());
-        let readings = recording.rows.iter().map(|row| row.reading.as_slice());
         let normal = [misfit_bound(freedom), spread_bound(self.stored.prior.extent.dimensions())];
-        let [misfit, spread] = learnt_bounds(normal, readings, |reading| {
+        let [misfit, spread] = learnt_bounds(normal, recording, |reading| {
             let mut seen = Inversion::new(self.seen(&self.relative(reading)));
             [seen.misfit(), seen.spread()]
         });

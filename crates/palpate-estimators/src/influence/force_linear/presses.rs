@@ -2,6 +2,7 @@
 
 use crate::recording::Recording;
 use crate::setup::Setup;
+use crate::thinning::thinned;
 use ndarray::{Array2, Axis as Dimension};
 use palpate_numerics::mean;
 use std::cmp::Ordering;
@@ -192,17 +193,9 @@ impl Presses {
         }
     }
 
-    /// No more than `most`, one of every few in their order; not the same one of each, as the order may repeat itself.
+    /// No more than `most`, picked evenly in their order.
     pub fn thinned(&self, most: usize) -> Self {
-        /// Of the golden section: its multiples never come near a period.
-        const IRRATIONAL: f64 = 0.618_033_988_749_895;
-        let step = (self.len() as f64 / most as f64).max(1.0);
-        let first_of = |i: u32| (f64::from(i) * step).ceil() as usize;
-        let one_of = |i: u32| {
-            let (from, to) = (first_of(i), first_of(i + 1).min(self.len()));
-            from + ((f64::from(i) * IRRATIONAL).fract() * (to.saturating_sub(from)) as f64) as usize
-        };
-        let kept: Vec<usize> = (0..).take_while(|i| first_of(*i) < self.len()).map(one_of).collect();
+        let kept: Vec<usize> = thinned(self.len(), most).collect();
         self.select(&kept)
     }
 

@@ -11,6 +11,7 @@ use crate::influence::noise::{Noise, Whitening};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::status::{learnt_bounds, misfit_bound};
+use crate::thinning::thinned;
 use ndarray::{Array1, Array2, s};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::{GaussianProcess, Regression, Samples};
@@ -121,11 +122,10 @@ impl Presses {
         let (mut means, mut gradients) = (vec![0.0; channels], vec![0.0; channels * d]);
         let mut scratch = process.scratch();
         let mut sum = Array2::<f64>::zeros((channels, channels));
-        let every = self.coordinates.nrows().div_ceil(TRIED).max(1);
-        let mut count = 0.0;
-        for at in self.coordinates.outer_iter().step_by(every) {
+        let tried = thinned(self.coordinates.nrows(), TRIED);
+        let count = tried.len() as f64;
+        for at in tried.map(|i| self.coordinates.row(i)) {
             process.mean_and_gradient_into(&at.to_vec(), &mut means, &mut gradients, &mut scratch);
-            count += 1.0;
             for (k, further) in (self.searched()..d).zip(&self.further) {
                 let slope = |channel: usize| gradients[channel * d + k];
                 for ((i, j), sum) in sum.indexed_iter_mut() {
@@ -204,8 +204,8 @@ impl Presses {
         let mut scratch = process.scratch();
         let mut squares = [0.0; 2];
         let nodes = table.places() * nuisance.count;
-        let every = nodes.div_ceil(TRIED).max(1);
-        for node in (0..nodes).step_by(every) {
+        let tried = thinned(nodes, TRIED);
+        for node in tried.clone() {
             let (place, k) = (node / nuisance.count, node % nuisance.count);
             let (i, j) = (place / y.count, place % y.count);
             let middles = [[half(x, i), half(y, j), k as f64], [i as f64, j as f64, half(nuisance, k)]];
@@ -221,7 +221,7 @@ impl Presses {
                 *square += white.iter().map(|w| w * w).sum::<f64>();
             }
         }
-        let count = (nodes.div_ceil(every) * channels) as f64;
+        let count = (tried.len() * channels) as f64;
         squares.map(|square| (square / count).sqrt())
     }
 
@@ -261,8 +261,7 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     let table = locator.table();
     let fitted = [table.x, table.y, table.nuisance].iter().filter(|axis| axis.count > 1).count();
     let freedom = locator.whitening().channels().saturating_sub(fitted).max(1);
-    let readings = recording.rows.iter().map(|row| row.reading.as_slice());
-    let [limit] = learnt_bounds([misfit_bound(freedom)], readings, |reading| [locator.misfit(reading)]);
+    let [limit] = learnt_bounds([misfit_bound(freedom)], recording, |reading| [locator.misfit(reading)]);
     limit
 }
 
