@@ -13,13 +13,14 @@ use palpate::mechanics::contact::{Contact, OffSurface, Position};
 use palpate::mechanics::surface::{Extent, SurfaceSpec};
 use palpate::mechanics::units::format_length_mm;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
+use pyo3::types::{IntoPyDict, PyBytes, PyDict, PyList, PyTuple};
 
 use crate::arrays::{self, Readings, positions_array};
 use crate::errors::{io_error, of_csv, refused};
 use crate::files::write_whole;
 use crate::quantities::force_n;
 use crate::sections;
+use crate::surface;
 use crate::training::{self, Training, checked_force};
 
 /// A surface with its sensors, all checked: what a reading comes from.
@@ -137,6 +138,18 @@ impl Setup {
     fn supports<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let supports = self.0.surface().model().map(|model| model.force_supports()).unwrap_or_default();
         positions_array(py, &supports, self.extent())
+    }
+
+    /// Kind of each of these supports: "simple", "clamped" or "elastic".
+    #[getter]
+    fn support_kinds(&self) -> Vec<&'static str> {
+        surface::support_kinds(self.0.surface())
+    }
+
+    /// What holds the edges "left", "right", "bottom" and "top" of a plate: "simple", "clamped" or "free"; None of another surface.
+    #[getter]
+    fn edges<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        surface::edges(self.0.surface()).map(|edges| edges.into_py_dict(py)).transpose()
     }
 
     /// Standard deviations of the readings' noise, in the SI unit of each sensor: of the shape (sensors).
@@ -319,6 +332,40 @@ impl Setup {
         options.set_item("loads", loads)?;
         options.set_item("progress", progress)?;
         slf.py().import("palpate._load_profile")?.call_method("load_profile", (slf, readings), Some(&options))
+    }
+
+    /// Shape of a line that a contact bends: of a beam by beam theory, of a digit exactly.
+    ///
+    /// Parameters
+    /// ----------
+    /// position : float or str
+    ///     Position of the contact, in metres or with a unit.
+    /// force : float or str, optional
+    ///     Force of the contact in newtons or with a unit; the setup's where nothing is said.
+    /// points : int
+    ///     Points along the line, its ends included.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64
+    ///     Position and height of each point in metres, upward positive: of the shape (points, 2).
+    ///
+    /// Raises
+    /// ------
+    /// PalpateError
+    ///     On a plane, on a measured surface, without a force, and for a position off the surface.
+    #[pyo3(signature = (position, *, force=None, points=201))]
+    fn shape<'py>(
+        &self,
+        py: Python<'py>,
+        position: Bound<'py, PyAny>,
+        force: Option<Bound<'py, PyAny>>,
+        points: usize,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let position = training::position(&position)?;
+        let contact = Contact { position, force_n: self.forces(force, 1)?[0] };
+        let line = py.detach(|| surface::bent_line(self.0.surface(), contact, points))?;
+        line.concat().to_pyarray(py).reshape([line.len(), 2])
     }
 
     /// Read a recording from CSV of any dialect.

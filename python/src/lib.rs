@@ -23,6 +23,7 @@ mod quantities;
 mod rig;
 mod sections;
 mod subject;
+mod surface;
 mod tracking;
 mod training;
 mod values;
