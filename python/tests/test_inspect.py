@@ -43,7 +43,7 @@ def test_what_a_locator_has_learnt_is_told_as_the_command_tells_it(command, exam
     text = "\n".join(line for line in rig.text.splitlines() if not line.startswith("nuisance"))
     setup = pp.Setup.from_toml(text[: text.index("[estimator]")] + text[text.index("[recording]") :])
     recording = setup.read_csv(data / "tactile-fsi" / "1d-water-1.5mm.csv")
-    locator = pp.Influence(structure="force-linear").fit(recording[::4])
+    locator = pp.Influence(structure="force-linear").fit(recording[::8])
     locator.save(tmp_path / "locator.json")
     told = said(command, tmp_path / "locator.json")
     ours = pp.inspect(locator)
