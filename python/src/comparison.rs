@@ -8,7 +8,7 @@ use palpate::estimators::estimator::{
 use palpate::estimators::evaluation::{self, Calibration, ErrorSummary, Split, evaluate_splits, limit_ratio};
 use palpate::estimators::recording;
 use palpate::estimators::setup;
-use palpate::numerics::watch::Watch;
+use palpate::numerics::watch::{Cancelled, Watch};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::sync::Arc;
@@ -155,10 +155,13 @@ pub fn compare<'py>(
     }
     contenders.retain(|contender| only.is_empty() || only.iter().any(|kind| kind == contender.kind()));
     let start = Instant::now();
-    let compared = work::run(py, progress, None, |watch| {
+    let (compared, ratios) = work::run(py, progress, None, |watch| {
         let clock = || start.elapsed().as_secs_f64();
         let options = CompareOptions { seed, clock: &clock, refuse: &|_, _| None, watch };
-        compare_all(bench, contenders, &trials, options)
+        let compared = compare_all(bench, contenders, &trials, options)?;
+        let evaluations = compared.comparisons.iter().map(|one| &one.tried.evaluation);
+        let ratios: Vec<Option<f64>> = evaluations.map(|of| limit_ratio(bench, of)).collect();
+        Ok::<_, Cancelled>((compared, ratios))
     })?;
     let fields = Fields::new(py);
     fields.set("source", &source)?;
@@ -166,7 +169,8 @@ pub fn compare<'py>(
     fields.set("trials", trials.len())?;
     fields.set("tolerance", tolerance_m)?;
     let comparisons = &compared.comparisons;
-    columns(&fields, &setup.0, comparisons, tolerance_m)?;
+    columns(&fields, comparisons, tolerance_m)?;
+    fields.column("limit_ratio", ratios)?;
     let about = |kind: &str| About { kind: kind.to_owned(), source: source.clone(), how: how.clone() };
     let evaluations = comparisons.iter().map(|Comparison { estimator, tried }| {
         Evaluation::new(tried.evaluation.clone(), Arc::clone(&setup.0), about(estimator.kind()))
@@ -187,12 +191,7 @@ pub fn compare<'py>(
 }
 
 /// A column for each figure, a row for each estimator.
-fn columns(
-    fields: &Fields<'_>,
-    setup: &setup::Setup,
-    comparisons: &[Comparison],
-    tolerance_m: f64,
-) -> PyResult<()> {
+fn columns(fields: &Fields<'_>, comparisons: &[Comparison], tolerance_m: f64) -> PyResult<()> {
     let summaries: Vec<Option<ErrorSummary>> =
         comparisons.iter().map(|comparison| comparison.tried.evaluation.summary(None)).collect();
     fields
@@ -205,7 +204,6 @@ fn columns(
     fields
         .column("effective_length", evaluations().map(|of| Some(share(of.effective_percent(tolerance_m)))))?;
     fields.column("coverage", evaluations().map(|of| of.coverage_percent().map(share)))?;
-    fields.column("limit_ratio", evaluations().map(|of| limit_ratio(setup, of)))?;
     fields.column("fit_seconds", comparisons.iter().map(|comparison| Some(comparison.tried.fit_seconds)))?;
     let locate_s = |comparison: &Comparison| Some(1e-9 * comparison.tried.locate_ns);
     fields.column("locate_seconds", comparisons.iter().map(locate_s))

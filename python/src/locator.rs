@@ -20,6 +20,7 @@ use crate::errors::{io_error, of_locator, refused};
 use crate::estimates::{Estimate, Estimates, Table};
 use crate::evaluation::{About, Evaluation};
 use crate::files::write_whole;
+use crate::work;
 
 /// A locator: a fitted method with its setup, so that nothing it needs is outside it.
 ///
@@ -94,6 +95,8 @@ impl Locator {
     ///     A recording of the same sensors; where nothing is said the surface is simulated, pressed all over.
     /// seed : int
     ///     Seed of the simulation.
+    /// progress : bool or callable, optional
+    ///     As of `Estimator.fit`.
     ///
     /// Returns
     /// -------
@@ -108,8 +111,14 @@ impl Locator {
     /// -----
     /// UserWarning
     ///     Where the locator was fitted to this very file: at positions that it has not seen it is worse; `cross_validate` tells how much.
-    #[pyo3(signature = (recording=None, *, seed=0))]
-    fn evaluate(&self, py: Python<'_>, recording: Option<&Recording>, seed: u64) -> PyResult<Evaluation> {
+    #[pyo3(signature = (recording=None, *, seed=0, progress=None))]
+    fn evaluate(
+        &self,
+        py: Python<'_>,
+        recording: Option<&Recording>,
+        seed: u64,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Evaluation> {
         let extent = self.setup.surface().extent();
         let simulated;
         let judged = match recording {
@@ -128,7 +137,9 @@ impl Locator {
                 &simulated
             }
         };
-        let evaluation = py.detach(|| evaluation::Evaluation::new(&self.inner, judged)).map_err(refused)?;
+        let evaluation = work::run(py, progress, None, |watch| {
+            evaluation::Evaluation::new_watched(&self.inner, judged, watch)
+        })?;
         let source = judged.provenance.source.clone();
         let about = About { kind: self.kind().to_owned(), source, how: "located".to_owned() };
         Ok(Evaluation::new(evaluation, self.setup.clone(), about))

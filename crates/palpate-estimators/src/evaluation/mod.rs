@@ -5,18 +5,20 @@ mod calibration;
 pub use calibration::{Calibrated, Calibration};
 pub use palpate_numerics::{median, percentile};
 
+use crate::batch::{BatchError, BatchOptions};
 use crate::fit::{Fit, FitTask, Fitted, Locate, ReadingError};
 use crate::load_profile::Cells;
 use crate::offset_course::OffsetCourse;
-use crate::recording::{Fold, Recording, TooFewPositions};
+use crate::recording::{Fold, Recording, Row, TooFewPositions};
 use crate::setup::Setup;
 use crate::simulate::SimulateError;
-use palpate_core::ContactEstimate;
+use palpate_core::{ContactEstimate, Estimate};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{ELLIPSE_95, mean, root_mean_square};
+use std::sync::{Mutex, PoisonError};
 
 /// True and estimated position of one reading's contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +36,18 @@ pub struct Located {
 }
 
 impl Located {
+    /// The contact of a row beside the estimate of its reading.
+    fn new(row: &Row, contact: &ContactEstimate, extent: Extent) -> Self {
+        let truth = row.position;
+        Self {
+            truth,
+            force_n: row.force_n,
+            estimate: contact.position,
+            covered: covered(contact, truth, extent),
+            interval_score_m: interval_score_m(contact, truth, extent),
+        }
+    }
+
     /// The distance between the two, in metres.
     pub fn error_m(&self) -> f64 {
         self.truth.distance_m(self.estimate)
@@ -128,19 +142,42 @@ impl Evaluation {
     /// # Errors
     /// [`ReadingError`] when the recording's channels are not the locator's.
     pub fn new<M: Locate>(locator: &Fitted<M>, recording: &Recording) -> Result<Self, ReadingError> {
-        let locate = |row: &crate::recording::Row| {
-            let contact = locator.locate(&row.reading)?.contact;
-            Ok(Located {
-                truth: row.position,
-                force_n: row.force_n,
-                estimate: contact.position,
-                covered: covered(&contact, row.position, locator.setup.surface().extent()),
-                interval_score_m: interval_score_m(&contact, row.position, locator.setup.surface().extent()),
-            })
+        let extent = locator.setup.surface().extent();
+        let rows = recording.rows.iter().filter(|row| row.touches());
+        let located = rows.map(|row| Ok(Located::new(row, &locator.locate(&row.reading)?.contact, extent)));
+        Ok(Self { extent, located: located.collect::<Result<_, _>>()? })
+    }
+
+    /// The same in batches, watched.
+    ///
+    /// # Errors
+    /// [`BatchError`] when the recording's channels are not the locator's, or the watch stopped it.
+    pub fn new_watched<M>(
+        locator: &Fitted<M>,
+        recording: &Recording,
+        watch: Watch,
+    ) -> Result<Self, BatchError>
+    where
+        M: Locate + Sync,
+        M::Check: Sync,
+    {
+        let extent = locator.setup.surface().extent();
+        let rows: Vec<&Row> = recording.rows.iter().filter(|row| row.touches()).collect();
+        let channels = locator.layout().len();
+        if let Some(row) = rows.iter().position(|row| row.reading.len() != channels) {
+            let error = ReadingError::Channels { needed: channels, found: rows[row].reading.len() };
+            return Err(BatchError::Reading { row: row + 1, error });
+        }
+        let readings: Vec<f64> = rows.iter().flat_map(|row| row.reading.iter().copied()).collect();
+        let located = Mutex::new(Vec::with_capacity(rows.len()));
+        // One thread takes the blocks one after the other.
+        let take = |first: usize, estimates: &[Estimate]| {
+            let judged = rows[first..].iter().zip(estimates);
+            let judged = judged.map(|(row, estimate)| Located::new(row, &estimate.contact, extent));
+            located.lock().unwrap_or_else(PoisonError::into_inner).extend(judged);
         };
-        let located =
-            recording.rows.iter().filter(|row| row.touches()).map(locate).collect::<Result<_, _>>()?;
-        Ok(Self { extent: locator.setup.surface().extent(), located })
+        locator.locate_blocks(&readings, BatchOptions { watch, ..BatchOptions::default() }, &take)?;
+        Ok(Self { extent, located: located.into_inner().unwrap_or_else(PoisonError::into_inner) })
     }
 
     /// The errors within a portion, or everywhere; `None` where nothing was located.

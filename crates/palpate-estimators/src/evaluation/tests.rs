@@ -95,3 +95,22 @@ fn intervals_score_by_their_width_and_forty_times_what_they_miss() {
     // Without intervals, one width for all: the 95th percentile of the errors, 4.775 mm, misses the last by 0.225 mm.
     close(evaluation().interval_score_m().unwrap(), 2.0 * 4.775e-3 + 40.0 * 0.225e-3 / 10.0);
 }
+
+#[test]
+fn a_watched_evaluation_is_the_same_and_can_be_stopped() {
+    let example = crate::fixtures::paper(5e-6, 2);
+    let mut presses = example.simulate(1);
+    let untouched =
+        crate::recording::Row { force_n: Some(0.0), reading: vec![0.0; 8], ..presses.rows[0].clone() };
+    presses.rows.insert(7, untouched);
+    let locator = crate::influence::Influence::default().fit(&example.setup, &presses).unwrap();
+    let evaluation = Evaluation::new(&locator, &presses).unwrap();
+    assert_eq!(evaluation.located.len(), 20);
+    assert_eq!(Evaluation::new_watched(&locator, &presses, Watch::NONE), Ok(evaluation));
+    let stop = |_| false;
+    let stopped = Evaluation::new_watched(&locator, &presses, Watch::new(&stop));
+    assert_eq!(stopped, Err(Cancelled.into()));
+    presses.rows[3].reading.pop();
+    let error = Evaluation::new_watched(&locator, &presses, Watch::NONE).unwrap_err();
+    assert_eq!(error.to_string(), "reading 4: the reading has 7 channels; the locator has 8");
+}
