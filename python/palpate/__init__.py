@@ -40,6 +40,7 @@ from ._estimators import (
     Network,
 )
 from ._evaluation import Comparison, ErrorsByPosition, compare, cross_validate
+from ._influence import InfluenceFunctions
 from ._inspect import Inspection, inspect
 from ._limit import Limit, limit
 from ._load_profile import LoadProfile, UniformLoad, load_profile, simulate_loads
@@ -80,6 +81,7 @@ __all__ = [
     "FileError",
     "GaussianProcess",
     "Influence",
+    "InfluenceFunctions",
     "Inspection",
     "KeepOut",
     "Layout",

@@ -51,7 +51,8 @@ class Limit(Result):
     lightest_touch_summary : list of dict
         Of each probability "found": "median", "largest", "largest_at", "positions_without".
     warnings : list of dict
-        What cannot be told anywhere on the surface: "kind" ("blind", "mirror", "faint"), "from", "to", "value", "bound", "message", "help".
+        What cannot be told anywhere on the surface: "kind" ("blind", "mirror", "faint"), "from", "to", "value", "bound", "message", "help"; of
+        "mirror" also "twins", the stretch ("from", "to") of the contacts that read alike.
     """
 
     force: float

@@ -13,6 +13,7 @@ mod estimates;
 mod estimator;
 mod evaluation;
 mod files;
+mod influence;
 mod inspect;
 mod limit;
 mod load_profile;

@@ -209,10 +209,17 @@ fn of_touch(touch: &TouchSummary, extent: Extent) -> Value {
 
 fn of_warning(warning: &LimitWarning, extent: Extent) -> Value {
     let ((value, bound), zone) = (warning.value_and_bound(), warning.zone());
+    let twins = match warning {
+        LimitWarning::Mirror { twins, .. } => {
+            Some(json!({ "from": place(twins.from, extent), "to": place(twins.to, extent) }))
+        }
+        LimitWarning::Blind { .. } | LimitWarning::Faint { .. } => None,
+    };
     json!({
         "kind": warning.kind(),
         "from": place(zone.from, extent),
         "to": place(zone.to, extent),
+        "twins": twins,
         "value": value,
         "bound": bound,
         "message": warning.to_string(),

@@ -20,6 +20,7 @@ use crate::errors::{io_error, of_locator, refused};
 use crate::estimates::{Estimate, Estimates, Table};
 use crate::evaluation::{About, Evaluation};
 use crate::files::write_whole;
+use crate::influence;
 use crate::work;
 
 /// A locator: a fitted method with its setup, so that nothing it needs is outside it.
@@ -252,6 +253,27 @@ impl Locator {
         let Some(outcome) = self.inner.training_outcome() else { return Ok(None) };
         let json = serde_json::to_string(&outcome).map_err(refused)?;
         Ok(Some(py.import("json")?.call_method1("loads", (json,))?))
+    }
+
+    /// The influence functions that it has learnt, with their uncertainty.
+    ///
+    /// Returns
+    /// -------
+    /// InfluenceFunctions
+    ///
+    /// Raises
+    /// ------
+    /// PalpateError
+    ///     For a method without any, such as a network, and for readings that are no multiple of the force.
+    fn influence_functions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let learnt = self.inner.influences_at_nodes().ok_or_else(|| {
+            refused(format!(
+                "a locator of the kind {} has learnt no influence functions here; fit `Influence`",
+                self.kind()
+            ))
+        })?;
+        let fields = influence::fields(py, &learnt, &self.setup)?;
+        py.import("palpate._influence")?.getattr("InfluenceFunctions")?.call((), Some(&fields))
     }
 
     /// Write the locator to a file, which the command reads too.

@@ -11,6 +11,7 @@ import pytest
 
 import palpate as pp
 
+os.environ.setdefault("MPLBACKEND", "Agg")
 PROJECT = Path(__file__).resolve().parents[2]
 
 

@@ -27,7 +27,8 @@ use crate::evaluation::{Evaluation, EvaluationError, Split, evaluate_splits};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue};
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{
-    BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, PlateLikelihood,
+    BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, InfluencesAtNodes,
+    PlateLikelihood,
 };
 use crate::likelihood::Likelihood;
 use crate::load_profile::LoadChannel;
@@ -411,6 +412,14 @@ impl Locator {
     pub fn force_linear(&self) -> Option<&ForceLinearLocator> {
         match &self.method {
             Method::Influence(InfluenceLocator::ForceLinear(linear)) => Some(linear),
+            _ => None,
+        }
+    }
+
+    /// The influence functions that it has learnt, with their uncertainty; `None` of a method without any.
+    pub fn influences_at_nodes(&self) -> Option<InfluencesAtNodes> {
+        match &self.method {
+            Method::Influence(influence) => influence.influences_at_nodes(),
             _ => None,
         }
     }

@@ -1,6 +1,7 @@
 //! Influence functions, and their inversion: learn what each sensor reads as a function of where the contact is, a
 //! smooth curve, and find the contact whose curve values are the most likely cause of a reading.
 
+mod at_nodes;
 mod beam;
 mod channels;
 mod config;
@@ -16,6 +17,7 @@ mod noise;
 mod plane;
 mod prior;
 
+pub use at_nodes::InfluencesAtNodes;
 pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scratch};
 pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource, Structure};
 pub use force_linear::{DriftCourse, ForceLinearLocator, Scatter, Source};
@@ -186,6 +188,16 @@ impl InfluenceLocator {
 }
 
 impl InfluenceLocator {
+    /// The influence functions with their uncertainty; `None` of readings that are learnt as no multiple of the force.
+    pub fn influences_at_nodes(&self) -> Option<InfluencesAtNodes> {
+        match self {
+            Self::Beam(beam) => Some(beam.influences_at_nodes()),
+            Self::Plane(plane) => Some(plane.influences_at_nodes()),
+            Self::ForceLinear(linear) => Some(linear.influences_at_nodes()),
+            Self::Measured(_) => None,
+        }
+    }
+
     /// Share of untouched readings that may be taken for a contact; `None` of one that tells no untouched reading.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         match self {

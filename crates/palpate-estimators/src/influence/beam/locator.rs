@@ -17,11 +17,13 @@ use super::posterior::{Read, conclude};
 use super::search::{ForEight, NEGLIGIBLE, Scratch, Search};
 use super::table::{FittedInfluence, InfluenceTable};
 use crate::fit::{Locate, LocatorFault, NoCheck};
+use crate::influence::at_nodes::InfluencesAtNodes;
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::setup::Setup;
 use crate::status::{FalseAlarmRate, NO_CONTACT};
 use palpate_core::{Estimate, Status};
+use palpate_mechanics::contact::Position;
 use palpate_numerics::simd::{Array, Eight, InstructionSet, Kernel, Simd};
 use serde::{Deserialize, Serialize};
 
@@ -106,6 +108,19 @@ impl BeamLocator {
     pub fn influences(&self) -> impl Iterator<Item = Option<(FittedInfluence<'_>, f64, f64)>> {
         let Stored { table, channels: Channels { offsets, noise_sd, dead, .. }, .. } = &self.stored;
         (0..table.sensors).map(move |i| (!dead[i]).then(|| (table.function(i), offsets[i], noise_sd[i])))
+    }
+
+    /// The influence functions with their uncertainty, at the nodes of the table.
+    pub fn influences_at_nodes(&self) -> InfluencesAtNodes {
+        let Stored { table, channels, .. } = &self.stored;
+        let positions = (0..table.nodes()).map(|node| Position::along(table.node_m(node))).collect();
+        let of_channels = [channels.offsets.as_slice(), &channels.noise_sd];
+        InfluencesAtNodes::of_table(
+            positions,
+            channels.live(),
+            of_channels,
+            [&table.values, &table.variances],
+        )
     }
 
     /// Knowledge of the force.

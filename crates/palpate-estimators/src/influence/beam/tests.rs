@@ -12,7 +12,7 @@ use ndarray::Array2;
 use palpate_core::{ContactEstimate, Status};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
-use palpate_mechanics::surface::Surface;
+use palpate_mechanics::surface::{InfluenceFunction, Surface};
 use palpate_numerics::Cholesky;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -280,4 +280,22 @@ fn presses_that_say_too_little_are_refused() {
     recording.rows[1].force_n = None;
     let error = refuse(Influence::default(), &rig.setup, &recording);
     assert_eq!(error, InfluenceFitError::NoForce { row: 2 });
+}
+
+#[test]
+fn influences_at_the_nodes_leave_out_dead_channels() {
+    let mut bench = paper(5e-6, 3);
+    bench.setup.edit_sensors(|sensors| sensors[2].channel.dead = true).unwrap();
+    let locator = fit(Influence::default(), &bench.setup, &bench.simulate(1));
+    let learnt = locator.influences_at_nodes();
+    assert_eq!(learnt.channels, [0, 1, 3, 4, 5, 6, 7]);
+    let of_channels: Vec<_> = locator.influences().flatten().collect();
+    for (i, position) in learnt.positions.iter().enumerate() {
+        for (k, (function, offset, noise_sd)) in of_channels.iter().enumerate() {
+            let (value, same) = (learnt.values[7 * i + k], function.at(*position));
+            assert!((value - same).abs() < 1e-15, "{i}, {k}: {value} and {same}");
+            assert_eq!((learnt.offsets[k], learnt.noise_sd[k]), (*offset, *noise_sd));
+        }
+    }
+    assert!(learnt.sd.iter().all(|sd| *sd >= 0.0) && learnt.sd.iter().any(|sd| *sd > 0.0));
 }

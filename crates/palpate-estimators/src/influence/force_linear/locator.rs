@@ -15,6 +15,7 @@ use super::posterior::Functions;
 use super::prior::{Prior, Source};
 use super::scan::Scan;
 use crate::fit::{Locate, LocatorFault, NoCheck};
+use crate::influence::at_nodes::InfluencesAtNodes;
 use crate::influence::config::Structure;
 use crate::influence::grid::{Axis, check_axes, greatest_distances};
 use crate::influence::inversion::{
@@ -347,6 +348,26 @@ impl ForceLinearLocator {
     pub fn channels(&self) -> impl Iterator<Item = (usize, f64, f64)> {
         let Tables { offsets, noise_sd, .. } = &self.stored.functions;
         self.stored.live.iter().zip(offsets).zip(noise_sd).map(|((c, offset), noise)| (*c, *offset, *noise))
+    }
+
+    /// The influence functions with their uncertainty, at the nodes of the grid. Where the response to the force is not linear, they are
+    /// per newton of the [`response`](Self::response).
+    pub fn influences_at_nodes(&self) -> InfluencesAtNodes {
+        let Tables { offsets, noise_sd, values, variances, .. } = &self.stored.functions;
+        let [x, y] = self.axes();
+        let position = |place: usize| {
+            let [i, j] = self.node(place);
+            Position { x_m: x.value(i), y_m: y.value(j) }
+        };
+        let per_noise = |(i, value): (usize, f64)| value * noise_sd[i % noise_sd.len()];
+        InfluencesAtNodes {
+            positions: (0..self.places()).map(position).collect(),
+            channels: self.stored.live.clone(),
+            offsets: offsets.clone(),
+            noise_sd: noise_sd.clone(),
+            values: values.iter().copied().enumerate().map(per_noise).collect(),
+            sd: variances.iter().map(|variance| variance.sqrt()).enumerate().map(per_noise).collect(),
+        }
     }
 
     /// The Cramér–Rao bound of its surface, by the influences and the noise that the recording told; beyond the places that were pressed the

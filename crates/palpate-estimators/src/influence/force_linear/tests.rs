@@ -722,3 +722,22 @@ fn presses_that_nothing_explains_are_set_aside_among_many() {
         assert!(mended < 1.05 * clean, "{mended} mm, {clean} mm without outliers");
     }
 }
+
+#[test]
+fn influences_at_the_nodes_are_those_of_the_strip_within_their_deviations() {
+    let bench = Bench::strip(3, 25, 9);
+    let InfluenceLocator::ForceLinear(linear) = bench.fit_as(Structure::ForceLinear) else { panic!() };
+    let learnt = linear.influences_at_nodes();
+    assert_eq!(learnt.channels, (0..GAUGES).collect::<Vec<_>>());
+    let pressed = MARGIN_M..STRIP_M - MARGIN_M;
+    let nodes = learnt.positions.iter().enumerate().filter(|(_, at)| pressed.contains(&at.x_m));
+    let off = nodes.flat_map(|(node, at)| {
+        let row = node * GAUGES..(node + 1) * GAUGES;
+        let learnt = learnt.values[row.clone()].iter().zip(&learnt.sd[row]);
+        learnt.zip((bench.influences)(*at)).map(|((value, sd), truth)| (value - truth) / sd)
+    });
+    let off: Vec<f64> = off.collect();
+    let within = off.iter().filter(|off| off.abs() < 1.96).count() as f64 / off.len() as f64;
+    assert!((0.85..=1.0).contains(&within), "{within} of {}", off.len());
+    assert!(off.iter().any(|off| off.abs() > 0.5), "deviations are far too large");
+}

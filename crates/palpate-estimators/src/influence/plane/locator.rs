@@ -4,6 +4,7 @@ use super::posterior::{Scratch, locate};
 use super::search::Search;
 use super::table::PlaneTable;
 use crate::fit::{Locate, LocatorFault, NoCheck};
+use crate::influence::at_nodes::InfluencesAtNodes;
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::setup::Setup;
@@ -41,6 +42,19 @@ impl PlaneLocator {
     /// The influence functions.
     pub fn table(&self) -> &PlaneTable {
         &self.stored.table
+    }
+
+    /// The influence functions with their uncertainty, at the nodes of the table.
+    pub fn influences_at_nodes(&self) -> InfluencesAtNodes {
+        let Stored { table, channels, .. } = &self.stored;
+        let positions = (0..table.nodes()).map(|node| table.node(node)).collect();
+        let of_channels = [channels.offsets.as_slice(), &channels.noise_sd];
+        InfluencesAtNodes::of_table(
+            positions,
+            channels.live(),
+            of_channels,
+            [&table.values, &table.variances],
+        )
     }
 
     /// Knowledge of the force.

@@ -369,3 +369,18 @@ fn what_a_plane_cannot_do_is_refused_in_words() {
     let few = refuse(Influence { source, ..Influence::default() }, &recording);
     assert_eq!(few, InfluenceFitError::TooFewPositions { needed: 6, found: 5 });
 }
+
+#[test]
+fn influences_at_the_nodes_are_those_of_the_plate() {
+    let rig = plate(16, NOISE);
+    let learnt = fit(Influence::default(), &rig.setup, &rig.simulate(1)).influences_at_nodes();
+    let sensors = sensors(&rig.setup);
+    let full_scale = learnt.values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    for (node, position) in learnt.positions.iter().enumerate().step_by(101) {
+        let clean = sensors.reading(Contact { position: *position, force_n: 1.0 });
+        for (k, truth) in clean.iter().enumerate() {
+            let off = learnt.values[9 * node + k] - truth;
+            assert!(off.abs() < 5.0 * learnt.sd[9 * node + k] + 1e-3 * full_scale, "{node}, {k}: {off}");
+        }
+    }
+}
