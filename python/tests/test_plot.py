@@ -89,6 +89,8 @@ every_picture = pytest.mark.parametrize("picture", PICTURES.values(), ids=PICTUR
 
 @pytest.fixture(autouse=True)
 def closed_figures():
+    # Those that the examples of docstrings left open.
+    plt.close("all")
     yield
     plt.close("all")
 
