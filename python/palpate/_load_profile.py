@@ -57,6 +57,10 @@ class LoadProfile(Result):
         Centre of pressure: "x", "x_sd", "x_95", and on a plane "y", "y_sd", "y_95", in metres; None without load.
     resolution : float or None
         Median width of the averaging kernels, in metres: what is nearer together is told as one.
+    kernel_widths : ndarray of float64 or None
+        Width of the averaging kernel of each cell at half of its height, in metres: of the shape (cells).
+    kernels : ndarray of float64 or None
+        Averaging kernels: row by row, what share of the force in each cell the profile has in one: of the shape (cells, cells).
     patches : list of dict
         Parts that carry load, along x: "from", "to", "centre", "force", "force_sd", "force_95", and "limit", the least standard deviations of
         evenly loaded patches like these: "x", "y", "force".
@@ -88,6 +92,8 @@ class LoadProfile(Result):
     seen_95: tuple[float, float]
     centre: Mapping[str, Any] | None
     resolution: float | None
+    kernel_widths: Floats | None
+    kernels: Floats | None
     patches: list[dict[str, Any]]
     loads: list[dict[str, Any]]
     x: Floats

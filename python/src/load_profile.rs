@@ -1,5 +1,6 @@
 //! Load profiles: how force is spread over a surface, by a reading.
 
+use numpy::ToPyArray;
 use palpate::estimators::estimator::{
     CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, Resolution,
     patch_limits,
@@ -154,6 +155,10 @@ impl Told {
         let centre = centre.map(|(centre, x_95_m)| of_centre(&centre, x_95_m, extent));
         fields.json("centre", &json!(centre))?;
         fields.set("resolution", self.resolution.as_ref().map(Resolution::median_width_m))?;
+        let widths = self.resolution.as_ref().map(|resolution| resolution.widths_m.to_pyarray(py));
+        fields.set("kernel_widths", widths)?;
+        fields
+            .set("kernels", self.resolution.as_ref().map(|resolution| resolution.kernels.to_pyarray(py)))?;
         let limit = |limits: &Option<Vec<PatchLimit>>, i: usize| {
             limits.as_ref().and_then(|limits| limits.get(i).copied())
         };

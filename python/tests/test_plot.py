@@ -47,6 +47,28 @@ class Bench:
         self.plane_asked = self.plane.simulate(pp.grid(4, 3), seed=5)
         self.limits = {name: pp.limit(getattr(self, name)) for name in ("line", "plane", "one_sensor")}
         self.digit_limit = pp.limit(self.digit, force="1 N")
+        several = self.line.simulate(pp.even(20), repeats=5, seed=2)
+        self.held_out = pp.cross_validate(pp.Influence(), several)
+        self.plane_held_out = pp.cross_validate(pp.Influence(), self.plane_presses)
+        self.compared = pp.compare(several, only=["influence", "closed-form", "neighbours"])
+        self.placed = pp.place_sensors(self.line, counts=(2, 6), sites="20 mm", method="refined", unknown_force=True)
+        self.plane_placed = pp.place_sensors(self.plane, sites="50 mm", method="greedy-exchange")
+        self.trained = pp.place_training(self.line, count=6, trials=2, calibrations=2, verify=2)
+        self.plane_trained = pp.place_training(self.plane, count=6, trials=1, calibrations=1, verify=1, estimator=pp.Neighbours())
+        self.advice = pp.next_press(self.line.simulate(pp.even(6, repeats=2)))
+        motion = pp.Motion("50 mm", "350 mm", speed="1 m/s", passes=2, lifted="0.1 s")
+        self.moving = pp.simulate_moving(self.unknown, motion, rate="100 Hz", density="7850 kg/m3", force="3 N")
+        self.track = self.locator.track(self.moving)
+        both = pp.Motion("50 mm", "150 mm", speed="0.3 m/s"), pp.Motion("350 mm", "250 mm", speed="0.3 m/s", lifted="0.1 s", passes=2)
+        self.two = pp.simulate_moving(self.unknown, *both, rate="100 Hz", density="7850 kg/m3", force="3 N")
+        self.two_tracked = pp.Influence(contacts=2).fit(self.presses).track(self.two)
+        self.plane_moving = pp.simulate_moving(self.plane, pp.Motion(("50 mm", "40 mm"), ("250 mm", "160 mm"), speed="0.5 m/s"), rate="50 Hz")
+        self.plane_track = self.plane_locator.track(self.plane_moving)
+        self.loads = [pp.UniformLoad("100 mm", "160 mm", "4 N"), pp.UniformLoad("260 mm", "300 mm", "2 N")]
+        self.profile = pp.load_profile(self.unknown, pp.simulate_loads(self.unknown, self.loads)[0])
+        self.plane_load = pp.UniformLoad(("100 mm", "60 mm"), ("180 mm", "120 mm"), "20 N")
+        self.plane_profile = pp.load_profile(self.plane, pp.simulate_loads(self.plane, self.plane_load)[0])
+        self.networks = pp.Network(aggregate_error=0.01).of(self.line).fit_many(self.line.simulate(pp.even(10)), range(8))
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +105,42 @@ PICTURES = {
     "lightest_touch: plane": lambda b, ax: plot.lightest_touch(b.limits["plane"], setup=b.plane, ax=ax),
     "force_limit: digit": lambda b, ax: plot.force_limit(b.digit_limit, setup=b.digit, ax=ax),
     "force_limit: plane": lambda b, ax: plot.force_limit(b.limits["plane"], ax=ax),
+    "layouts: placement": lambda b, ax: plot.layouts(b.placed, ax=ax),
+    "arrangements: placement": lambda b, ax: plot.arrangements(b.line, b.trained, ax=ax),
+    "errors: line": lambda b, ax: plot.errors(b.held_out, limit=b.limits["line"], ax=ax),
+    "errors: plane": lambda b, ax: plot.errors(b.plane_held_out, setup=b.plane, ax=ax),
+    "predicted: line": lambda b, ax: plot.predicted(b.held_out, ax=ax),
+    "predicted: plane": lambda b, ax: plot.predicted(b.plane_held_out, ax=ax),
+    "error_histogram": lambda b, ax: plot.error_histogram({"ours": b.held_out, "neighbours": b.compared["neighbours"]}, ax=ax),
+    "shares": lambda b, ax: plot.shares(b.compared, ax=ax),
+    "comparison": lambda b, ax: plot.comparison(b.compared, ax=ax),
+    "errors_along": lambda b, ax: plot.errors_along(b.compared, limit=b.limits["line"], ax=ax),
+    "calibration: line": lambda b, ax: plot.calibration(b.locator.locate(b.asked.readings), b.asked, ax=ax),
+    "calibration: plane": lambda b, ax: plot.calibration(b.plane_locator.locate(b.plane_asked.readings), b.plane_asked, ax=ax),
+    "placement_curve": lambda b, ax: plot.placement_curve(b.placed, ax=ax),
+    "placement_limit: line": lambda b, ax: plot.placement_limit(b.placed, ax=ax),
+    "placement_limit: plane": lambda b, ax: plot.placement_limit(b.plane_placed, ax=ax),
+    "training_errors: line": lambda b, ax: plot.training_errors(b.trained, method="optimal", ax=ax),
+    "training_errors: plane": lambda b, ax: plot.training_errors(b.plane_trained, setup=b.plane, ax=ax),
+    "next_press": lambda b, ax: plot.next_press(b.advice, ax=ax),
+    "track: line": lambda b, ax: plot.track(b.track, truth=b.moving, ax=ax),
+    "track: two contacts": lambda b, ax: plot.track(b.two_tracked, truth=b.two, ax=ax),
+    "track: plane": lambda b, ax: plot.track(b.plane_track, truth=b.plane_moving, ax=ax),
+    "track_errors: line": lambda b, ax: plot.track_errors(b.track, truth=b.moving, ax=ax),
+    "track_errors: two contacts": lambda b, ax: plot.track_errors(b.two_tracked, truth=b.two, ax=ax),
+    "track_errors: plane": lambda b, ax: plot.track_errors(b.plane_track, ax=ax),
+    "speeds": lambda b, ax: plot.speeds({1.0: b.track, 0.3: b.two_tracked}, ax=ax),
+    "load_profile: line": lambda b, ax: plot.load_profile(b.profile, loads=b.loads, setup=b.line, ax=ax),
+    "load_profile: plane": lambda b, ax: plot.load_profile(b.plane_profile, loads=b.plane_load, setup=b.plane, ax=ax),
+    "kernels": lambda b, ax: plot.kernels(b.profile, ax=ax),
+    "kernel_widths: line": lambda b, ax: plot.kernel_widths(b.profile, setup=b.line, ax=ax),
+    "kernel_widths: plane": lambda b, ax: plot.kernel_widths(b.plane_profile, ax=ax),
+    "residuals: line": lambda b, ax: plot.residuals(b.profile, b.line, ax=ax),
+    "residuals: plane": lambda b, ax: plot.residuals(b.plane_profile, b.plane, ax=ax),
+    "convergence": lambda b, ax: plot.convergence({"eight": b.networks, "one": b.networks[0]}, ax=ax),
 }
+# Labels of what is counted, or has no unit.
+WITHOUT_UNIT = {"contacts", "sensors", "sensor", "presses to come", "epochs", "reading", "share of a cell's load"}
 every_picture = pytest.mark.parametrize("picture", PICTURES.values(), ids=PICTURES.keys())
 
 
@@ -127,8 +184,8 @@ def test_own_axes_are_of_a_figure_of_their_own(picture, bench):
     ax = picture(bench, None)
     assert len(plt.get_fignums()) == 2
     ax.figure.draw_without_rendering()
-    labels = [axes.get_xlabel() + axes.get_ylabel() for axes in ax.figure.findobj(Axes)]
-    assert ", mm" in " ".join(labels)
+    labels = [label for axes in ax.figure.findobj(Axes) for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
+    assert labels and all(label in WITHOUT_UNIT or ", " in label for label in labels)
 
 
 @every_picture
@@ -225,6 +282,27 @@ REFUSED = [
     (lambda b: plot.contacts(b.line, b.locator.locate(b.asked.readings), truth=b.presses), "30 rows and there are 7 estimates"),
     (lambda b: plot.contacts(b.plane, b.locator.locate(b.asked.readings)), "different surfaces"),
     (lambda b: plot.limit(b.limits["line"], setup=b.plane), "different surfaces"),
+    (lambda b: plot.errors(b.held_out, limit=b.limits["plane"]), "limit and evaluation are of different surfaces"),
+    (lambda b: plot.errors(b.held_out, tolerance="2 N"), "a force; it must be a length"),
+    (lambda b: plot.errors(b.plane_held_out, setup=b.line), "evaluation and setup are of different surfaces"),
+    (lambda b: plot.errors_along(b.plane_held_out), "`plot.errors` draws a map"),
+    (lambda b: plot.shares({}), "0 evaluations"),
+    (lambda b: plot.error_histogram(b.held_out, bins=0), "`bins` is 0; it must be at least 1"),
+    (lambda b: plot.calibration(b.locator.locate(b.asked.readings), b.presses), "30 rows and there are 7 estimates"),
+    (lambda b: plot.placement_curve(b.plane_placed), r"`place_sensors` with `counts=\(2, 12\)`"),
+    (lambda b: plot.placement_limit(b.placed, method="best"), "no layout 'best'; the layouts are"),
+    (lambda b: plot.training_errors(b.trained, method="best"), "no positions 'best'; there are"),
+    (lambda b: plot.track(b.track, truth=b.two), "they must be of the same readings"),
+    (lambda b: plot.track(b.track, setup=b.plane), "track and setup are of different surfaces"),
+    (lambda b: plot.speeds({}), "0 tracks"),
+    (lambda b: plot.speeds({1.0: b.locator.track(b.moving.time, b.moving.readings)}), "track a MovingRecording"),
+    (lambda b: plot.load_profile(b.profile, loads=b.plane_load), "is of a plane, and the profile of a line"),
+    (lambda b: plot.load_profile(b.plane_profile, loads=b.loads), "is of a line, and the profile of a plane"),
+    (lambda b: plot.kernels(b.plane_profile), "`plot.kernel_widths`"),
+    (lambda b: plot.kernels(b.profile, at=[2]), "from 0 to 1"),
+    (lambda b: plot.residuals(b.profile, b.one_sensor), "8 channels and the setup has 1"),
+    (lambda b: plot.convergence([]), "0 networks"),
+    (lambda b: plot.convergence([b.locator]), "not trained by epochs"),
     (lambda b: plot.limit(b.limits["line"], force="maybe"), "'maybe'; it must be \"known\" or \"unknown\""),
 ]
 
@@ -246,6 +324,17 @@ def test_bad_input_is_refused_in_words(draw, words, bench):
         lambda b: plot.contacts(b.line, b.presses),
         lambda b: plot.limit(b.line),
         lambda b: plot.limit(b.limits["line"], setup=b.presses),
+        lambda b: plot.errors(b.presses),
+        lambda b: plot.shares({"one": b.presses}),
+        lambda b: plot.comparison(b.held_out),
+        lambda b: plot.placement_curve(b.line),
+        lambda b: plot.training_errors(b.placed),
+        lambda b: plot.next_press(b.trained),
+        lambda b: plot.track(b.moving),
+        lambda b: plot.track_errors(b.track, truth=b.presses),
+        lambda b: plot.load_profile([b.profile]),
+        lambda b: plot.load_profile(b.profile, loads=[1]),
+        lambda b: plot.convergence([b.line]),
     ],
 )
 def test_what_is_of_another_type_is_refused_with_both_types(draw, bench):
@@ -275,3 +364,70 @@ def test_matplotlib_is_imported_with_the_pictures_alone():
     code = "import sys; sys.modules['matplotlib'] = None\ntry: import palpate.plot\nexcept ImportError as error: print(error)"
     said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
     assert said == "palpate.plot needs Matplotlib: pip install matplotlib\n"
+
+
+def test_errors_are_those_of_the_evaluation_and_the_limit_its_mean_error(bench):
+    by_position = bench.held_out.by_position()
+    ax = plot.errors(bench.held_out, limit=bench.limits["line"])
+    mean, largest, limit = ax.get_lines()[:3]
+    assert np.array_equal(mean.get_ydata(), 1e3 * by_position.mean) and np.array_equal(largest.get_ydata(), 1e3 * by_position.max)
+    summary = bench.limits["line"].summary["known_force"]
+    assert np.mean(limit.get_ydata()) == pytest.approx(1e3 * summary["mean_error"], rel=1e-9)
+
+
+def test_histograms_count_every_contact(bench):
+    ax = plot.error_histogram(bench.held_out, bins=7, tolerance=None)
+    outline = ax.patches[0].get_xy()
+    heights, edges = np.histogram(1e3 * bench.held_out.error, 7)
+    assert outline[:, 1].max() == heights.max() and outline[:, 0].max() == pytest.approx(edges[-1])
+
+
+def test_shares_end_at_all_contacts(bench):
+    error, share = plot.shares(bench.held_out).get_lines()[0].get_data()
+    assert share[-1] == 100 and error[-1] == 1e3 * bench.held_out.summary()["max"]
+    within = bench.held_out.effective_length(f"{error[40]} mm")
+    assert share[40] == pytest.approx(100 * within, abs=1e-9)
+
+
+@pytest.mark.parametrize("where", ["line", "plane"])
+def test_regions_hold_as_many_contacts_as_they_say(bench, where):
+    setup = bench.unknown if where == "line" else bench.plane
+    locator = pp.Influence(source="mechanics").fit(
+        setup.simulate(pp.even(10), force="3 N") if where == "line" else bench.plane_presses
+    )
+    asked = setup.simulate_at(np.linspace(0.1, 0.3, 400), force="3 N") if where == "line" else setup.simulate(pp.grid(20, 20))
+    x, y = plot.calibration(locator.locate(asked.readings), asked).get_lines()[1].get_data()
+    # Kolmogorov and Smirnov's bound of 400 values at 0.1 %, and room for what is not normal beside the edges of a plate.
+    assert np.max(np.abs(np.asarray(y) - np.asarray(x))) < 100 * 1.95 / np.sqrt(400) + (0 if where == "line" else 15)
+
+
+def test_tracks_are_held_beside_the_contact_that_they_are_of(bench):
+    ax = plot.track_errors(bench.two_tracked, truth=bench.two)
+    first, second = (line.get_ydata() for line in ax.get_lines()[1:3])
+    settled = bench.two.time > 0.2
+    assert np.nanmedian(np.abs(first[settled])) < 10 and np.nanmedian(np.abs(second[settled])) < 10
+    crossed = importlib.import_module("palpate.plot._tracks")._is_crossed
+    nan = np.nan
+    tracked, truths = np.array([[1.0, 3.0, nan, 1.0], [2.0, 1.0, 2.0, nan]]), np.array([[1.1, 1.1, 1.9, nan], [2.1, 3.1, nan, 1.1]])
+    assert crossed(tracked, truths).tolist() == [False, True, True, True]
+
+
+def test_true_loads_hold_their_force(bench):
+    x, density = plot.load_profile(bench.profile, loads=bench.loads).get_lines()[1].get_data()
+    assert np.trapezoid(density, x) == pytest.approx(6) if hasattr(np, "trapezoid") else np.trapz(density, x) == pytest.approx(6)
+
+
+def test_kernels_are_shares_about_their_place(bench):
+    profile = bench.profile
+    assert profile.kernels.shape == (len(profile), len(profile)) and profile.kernel_widths.shape == (len(profile),)
+    assert np.median(profile.kernel_widths) == pytest.approx(profile.resolution)
+    middle = len(profile) // 2
+    assert abs(profile.x[np.argmax(profile.kernels[middle])] - profile.x[middle]) < 0.05
+    ax = plot.kernels(profile, at=[0.5])
+    assert np.array_equal(ax.get_lines()[0].get_ydata(), profile.kernels[middle])
+
+
+def test_curves_of_convergence_end_at_the_share_that_converged(bench):
+    few = pp.Network(aggregate_error=1e-9, max_epochs=20).of(bench.line).fit_many(bench.line.simulate(pp.even(10)), range(2))
+    ax = plot.convergence({"all": bench.networks, "none": few})
+    assert [line.get_ydata()[-1] for line in ax.get_lines()] == [100, 0]

@@ -18,18 +18,42 @@ except ImportError as error:
     raise ImportError("palpate.plot needs Matplotlib: pip install matplotlib") from error
 
 from ._bench import arrangements, layouts, setup
+from ._design import next_press, placement_curve, placement_limit, training_errors
+from ._errors import calibration, comparison, error_histogram, errors, errors_along, predicted, shares
 from ._estimates import contacts
 from ._limit import force_limit, lightest_touch, limit
+from ._loads import kernel_widths, kernels, load_profile, residuals
 from ._readings import influence, recording
+from ._tracks import speeds, track, track_errors
+from ._training import convergence
 
 __all__ = [
     "arrangements",
+    "calibration",
+    "comparison",
     "contacts",
+    "convergence",
+    "error_histogram",
+    "errors",
+    "errors_along",
     "force_limit",
     "influence",
+    "kernel_widths",
+    "kernels",
     "layouts",
     "lightest_touch",
     "limit",
+    "load_profile",
+    "next_press",
+    "placement_curve",
+    "placement_limit",
+    "predicted",
     "recording",
+    "residuals",
     "setup",
+    "shares",
+    "speeds",
+    "track",
+    "track_errors",
+    "training_errors",
 ]

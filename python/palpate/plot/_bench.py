@@ -11,12 +11,14 @@ from matplotlib.patches import Rectangle
 from matplotlib.path import Path
 from matplotlib.transforms import ScaledTranslation
 
+from .._design import SensorPlacement, TrainingPlacement
 from .._errors import PalpateError
 from .._palpate import Setup, Training
 from .._quantities import length_m
 from .._results import Floats
 from .._surfaces import Quantity
 from ._canvas import Canvas
+from ._checks import check_type
 
 _MARKERS = {"deflection": "o", "raw": "o", "slope": "^", "strain": "s", "reaction": "x"}
 _COLOURS = {"deflection": 2, "raw": 2, "slope": 3, "strain": 4, "reaction": 5}
@@ -55,7 +57,7 @@ def setup(setup: Setup, *, force: Quantity | None = None, at: Quantity | None = 
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('position, mm', 'deflection, mm')
     """
-    _check(setup)
+    check_type(setup, Setup)
     if setup.width is not None:
         if at is not None or force is not None:
             raise PalpateError("`force` and `at` bend a line; a plane is drawn unbent")
@@ -69,13 +71,13 @@ def setup(setup: Setup, *, force: Quantity | None = None, at: Quantity | None = 
     return canvas.ax
 
 
-def layouts(layouts: Mapping[str, Setup], *, ax: Axes | None = None) -> Axes:
+def layouts(layouts: Mapping[str, Setup] | SensorPlacement, *, ax: Axes | None = None) -> Axes:
     """The sensors of several layouts of one surface: on a line a row each, on a plane a marker each.
 
     Parameters
     ----------
-    layouts : mapping of str to Setup
-        The layouts by their names.
+    layouts : mapping of str to Setup, or SensorPlacement
+        The layouts by their names, or those that `palpate.place_sensors` found.
     ax : matplotlib.axes.Axes, optional
         Where to draw; new axes where nothing is said.
 
@@ -92,11 +94,13 @@ def layouts(layouts: Mapping[str, Setup], *, ax: Axes | None = None) -> Axes:
     >>> [label.get_text() for label in ax.get_yticklabels()]
     ['even', 'near the ends']
     """
+    if isinstance(layouts, SensorPlacement):
+        layouts = {layout.method: layout.setup for layout in layouts}
     setups = list(layouts.values())
     if not setups:
         raise PalpateError("0 layouts; at least one is needed")
     for one in setups:
-        _check(one)
+        check_type(one, Setup)
     first = setups[0]
     if any((one.length, one.width) != (first.length, first.width) for one in setups):
         raise PalpateError("the layouts are of surfaces of different sizes; they must be of one")
@@ -128,15 +132,16 @@ def layouts(layouts: Mapping[str, Setup], *, ax: Axes | None = None) -> Axes:
     return canvas.ax
 
 
-def arrangements(setup: Setup, arrangements: Mapping[str, Any], *, ax: Axes | None = None) -> Axes:
+def arrangements(setup: Setup, arrangements: Mapping[str, Any] | TrainingPlacement, *, ax: Axes | None = None) -> Axes:
     """Where several arrangements press a surface: on a line a row each, on a plane a marker each.
 
     Parameters
     ----------
     setup : Setup
         The bench.
-    arrangements : mapping of str to Training or array_like
-        The arrangements by their names: training positions, or positions in metres of the shape (positions), or (positions, 2) on a plane.
+    arrangements : mapping of str to Training or array_like, or TrainingPlacement
+        The arrangements by their names: training positions, or positions in metres of the shape (positions), or (positions, 2) on a plane. Or
+        those that `palpate.place_training` found.
     ax : matplotlib.axes.Axes, optional
         Where to draw; new axes where nothing is said.
 
@@ -152,7 +157,9 @@ def arrangements(setup: Setup, arrangements: Mapping[str, Any], *, ax: Axes | No
     >>> ax.get_xlabel()
     'training position, mm'
     """
-    _check(setup)
+    check_type(setup, Setup)
+    if isinstance(arrangements, TrainingPlacement):
+        arrangements = dict(zip(arrangements.methods, arrangements.trainings))
     if not arrangements:
         raise PalpateError("0 arrangements; at least one is needed")
     places = {name: _positions(setup, name, one) for name, one in arrangements.items()}
@@ -214,11 +221,6 @@ def sensor_dots(canvas: Canvas, setup: Setup) -> None:
     if placed:
         x, y = 1e3 * np.array(placed).T
         canvas.markers(x, y, 0, "sensors", color=canvas.ink, markerfacecolor=canvas.ground, zorder=3)
-
-
-def _check(value: Any) -> None:
-    if not isinstance(value, Setup):
-        raise TypeError(f"a Setup is needed, and this is of the type {type(value).__name__}")
 
 
 def _positions(setup: Setup, name: str, arrangement: Any) -> Floats:

@@ -87,8 +87,7 @@ class Canvas:
         name = axis.axis_name
         (self.ax.set_xscale if name == "x" else self.ax.set_yscale)("log")
         low, high = sorted(self.ax.get_xlim() if name == "x" else self.ax.get_ylim())
-        decades = np.log10(high / low) if low > 0 else 3.0
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2 else (1.0,)))
+        axis.set_major_locator(_plain_ticks(low, high))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())
 
@@ -144,6 +143,9 @@ class Canvas:
                 most -= 1
                 legend = self._legend(handles, labels, most)
             legend.set_in_layout(True)
+        if self.ax.get_aspect() != "auto" and self._figure.get_layout_engine() is not None:
+            # Axes that are drawn to scale are where they belong after the second layout alone; the next drawing makes it.
+            self._figure.draw_without_rendering()
 
     def _legend(self, handles: Any, labels: Any, columns: int) -> Legend:
         return self.ax.legend(
@@ -164,10 +166,14 @@ class Canvas:
 
     def _lay_out(self, legend: Legend) -> None:
         """Puts the axes where they will be, so that it is known what fits beside them."""
-        figure = self.ax.figure.figure
-        if figure.get_layout_engine() is not None:
+        if self._figure.get_layout_engine() is not None:
             legend.set_in_layout(False)
-            figure.draw_without_rendering()
+            self._figure.draw_without_rendering()
+
+    @property
+    def _figure(self) -> Any:
+        """The figure of the axes, beneath all subfigures."""
+        return self.ax.figure.figure
 
     def _room(self) -> float:
         """Width from the left of the axes to the right of the figure, in pixels."""
@@ -197,12 +203,19 @@ class Canvas:
         bar = self.ax.figure.colorbar(drawn, cax=place, extend=extend)
         if logarithmic:
             bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            decades = np.log10(drawn.norm.vmax / drawn.norm.vmin)
-            bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2 else (1.0,)))
+            bar.ax.yaxis.set_major_locator(_plain_ticks(drawn.norm.vmin, drawn.norm.vmax))
             bar.ax.yaxis.set_minor_formatter(NullFormatter())
         bar.set_label(label, color=self.ink)
         bar.ax.tick_params(which="both", colors=self.ink)
         bar.outline.set_edgecolor(self.quiet)
+
+
+def _plain_ticks(low: float, high: float) -> LogLocator:
+    """Ticks of a logarithmic axis at round numbers, as many as its decades leave room for."""
+    decades = np.log10(high / low) if low > 0 else np.inf
+    if decades > 2:
+        return LogLocator(subs=(1.0,))
+    return LogLocator(subs=(1.0, 2.0, 5.0) if decades > 0.9 else (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0))
 
 
 def _new_axes(size: tuple[float, float]) -> Axes:

@@ -15,6 +15,7 @@ from .._palpate import Estimate, Estimates, Locator, Recording, Setup
 from .._results import Floats
 from ._bench import sensors
 from ._canvas import Canvas
+from ._checks import check_surface, check_type
 
 # √χ² of two coordinates that holds 95 % of a normal distribution.
 _OF_95_OF_TWO = 2.447747
@@ -54,16 +55,13 @@ def contacts(setup: Setup | Locator, estimates: Estimates, *, truth: Recording |
     """
     if isinstance(setup, Locator):
         setup = setup.setup
-    if not isinstance(setup, Setup):
-        raise TypeError(f"a Setup or a Locator is needed, and this is of the type {type(setup).__name__}")
+    check_type(setup, Setup)
     if isinstance(estimates, Estimate):
         raise TypeError("this is one Estimate; Estimates are needed: locate readings of the shape (readings, channels)")
-    if not isinstance(estimates, Estimates):
-        raise TypeError(f"Estimates are needed, and this is of the type {type(estimates).__name__}")
+    check_type(estimates, Estimates)
     if truth is not None and len(truth) != len(estimates):
         raise PalpateError(f"the truth has {len(truth)} rows and there are {len(estimates)} estimates; they must be of the same readings")
-    if (estimates.y is None) != (setup.width is None):
-        raise PalpateError("estimates and setup are of different surfaces: one is a line, the other a plane")
+    check_surface(estimates.y is not None, setup, "estimates")
     if setup.width is not None:
         canvas = Canvas.of_plane(ax, setup.length, setup.width)
         canvas.to_scale(setup.length, setup.width)

@@ -13,6 +13,7 @@ from .._palpate import Setup
 from .._results import Floats
 from ._bench import sensor_dots
 from ._canvas import Canvas
+from ._checks import check_surface, check_type
 from ._units import labelled, unit_of
 
 # Errors end where the surface does: limits beyond this many lengths are cut off.
@@ -139,12 +140,10 @@ def force_limit(limit: Limit, *, setup: Setup | None = None, ax: Axes | None = N
 
 
 def _check(limit: Any, setup: Any) -> None:
-    if not isinstance(limit, Limit):
-        raise TypeError(f"a Limit is needed, as palpate.limit tells it, and this is of the type {type(limit).__name__}")
-    if setup is not None and not isinstance(setup, Setup):
-        raise TypeError(f"`setup` is of the type {type(setup).__name__}; it must be a Setup")
-    if setup is not None and (setup.width is None) != (limit.y is None):
-        raise PalpateError("limit and setup are of different surfaces: one is a line, the other a plane")
+    check_type(limit, Limit)
+    if setup is not None:
+        check_type(setup, Setup)
+        check_surface(limit.y is not None, setup, "limit")
 
 
 def _size(limit: Limit, setup: Setup | None) -> tuple[float, float]:

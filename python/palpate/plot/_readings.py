@@ -13,6 +13,7 @@ from .._palpate import Locator, Recording, Setup
 from .._results import Floats
 from ._bench import sensor_dots
 from ._canvas import Canvas
+from ._checks import check_type
 from ._units import chosen_channels, labelled, unit_of
 
 _POINTS = 201
@@ -46,8 +47,7 @@ def recording(recording: Recording, *, channels: Channels = None, ax: Axes | Non
     >>> ax.get_ylabel()
     'deflection, mm'
     """
-    if not isinstance(recording, Recording):
-        raise TypeError(f"a Recording is needed, and this is of the type {type(recording).__name__}")
+    check_type(recording, Recording)
     setup, touches = recording.setup, recording.touches
     if not touches.any():
         raise PalpateError("no row of the recording has a contact; there is nothing to draw")
@@ -101,17 +101,16 @@ def influence(bench: Setup | Locator, *, channels: Channels = None, recording: R
     >>> ax.get_ylabel()
     'deflection, mm/N'
     """
+    check_type(bench, Setup, Locator)
     if isinstance(bench, Locator):
         setup, learnt = bench.setup, bench.influence_functions()
         x, y, values, sd, offsets = learnt.x, learnt.y, learnt.values, learnt.sd, learnt.offsets
-    elif isinstance(bench, Setup):
+    else:
         setup = bench
         x, y = _places(setup)
         at: Any = x if y is None else np.column_stack([x, y])
         values, offsets = setup.response(at), np.zeros(len(setup.channels))
         sd = np.zeros_like(values)
-    else:
-        raise TypeError(f"a Setup or a Locator is needed, and this is of the type {type(bench).__name__}")
     chosen = _of_one_picture(setup, channels)
     values, sd = values[:, chosen], sd[:, chosen]
     factor, symbol = unit_of(setup.measures[chosen[0]], values)
