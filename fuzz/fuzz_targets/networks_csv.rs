@@ -3,7 +3,7 @@
 
 use palpate_numerics::watch::Watch;
 use libfuzzer_sys::fuzz_target;
-use palpate_studies::{NetworksCsv, PreparedStudy, Study};
+use palpate_studies::{FitRows, PreparedStudy, Study, StudyTables};
 use std::sync::LazyLock;
 
 static STUDY: LazyLock<PreparedStudy> = LazyLock::new(|| {
@@ -12,7 +12,8 @@ static STUDY: LazyLock<PreparedStudy> = LazyLock::new(|| {
 });
 
 fuzz_target!(|text: &str| {
-    let table = NetworksCsv::new(&STUDY);
-    let _ = table.resume(text);
-    let _ = table.resume(&(table.heading() + text));
+    let tables = StudyTables::new(&STUDY);
+    let alone = |networks: String| FitRows { networks, evaluations: String::new() };
+    let _ = tables.read(&alone(text.to_owned()));
+    let _ = tables.read(&alone(tables.headings().networks + text));
 });

@@ -10,6 +10,14 @@ use std::path::{Path, PathBuf};
 pub const RESULTS_JSON: &str = "results.json";
 /// Fits of a study, which keep its networks.
 pub const NETWORKS_CSV: &str = "networks.csv";
+/// What a study's fits located that are no networks.
+pub const EVALUATIONS_CSV: &str = "evaluations.csv";
+/// Facts of a study's shard, which is finished once they are there.
+pub const SHARD_JSON: &str = "shard.json";
+/// Page of a report.
+pub const REPORT_HTML: &str = "report.html";
+/// Files of which each says that a folder is a study's.
+pub const OF_A_STUDY: [&str; 4] = [RESULTS_JSON, SHARD_JSON, NETWORKS_CSV, EVALUATIONS_CSV];
 
 /// The files that a command reads and those that its own words go to, none of which it may write over.
 #[derive(Clone, Debug)]
@@ -184,7 +192,7 @@ impl TargetFolder {
     /// A folder for the report of a command; one that holds the results of a study is left alone.
     pub fn for_report(path: &Path, inputs: &Inputs) -> Result<Self, Failure> {
         let folder = Self::for_study(path, inputs)?;
-        match [RESULTS_JSON, NETWORKS_CSV].into_iter().find(|name| path.join(name).exists()) {
+        match OF_A_STUDY.into_iter().find(|name| path.join(name).exists()) {
             None => Ok(folder),
             Some(name) => {
                 let found = path.join(name);
@@ -226,6 +234,15 @@ impl TargetFolder {
         fs::create_dir_all(&self.path).map_err(|error| cannot("make the folder", &self.path, &error))
     }
 
+    /// Takes a file away, where it is there.
+    pub fn remove(&self, name: &str) -> Result<(), Failure> {
+        let path = self.path.join(name);
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(cannot("remove", &path, &error)),
+            _ => Ok(()),
+        }
+    }
+
     /// Writes one file of the report.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
         self.make()?;
@@ -246,9 +263,9 @@ impl TargetFolder {
 
 /// True for names that files of a report have.
 fn is_of_a_report(name: &str) -> bool {
-    let tables = ["errors.csv", "trials.csv", "limit.csv", NETWORKS_CSV];
+    let tables = ["errors.csv", "trials.csv", "limit.csv"];
     let is_figure = name.starts_with("figure-") && [".svg", ".png"].iter().any(|end| name.ends_with(end));
-    is_figure || name == "report.html" || name == RESULTS_JSON || tables.contains(&name)
+    is_figure || name == REPORT_HTML || OF_A_STUDY.contains(&name) || tables.contains(&name)
 }
 
 /// An error where a folder does not take a file: it is better known before an hour of work than after it.

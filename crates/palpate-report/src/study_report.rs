@@ -473,6 +473,9 @@ pub(crate) fn run_table(report: &StudyReport) -> Table {
         ("arithmetic", run.arithmetic.clone()),
         ("time of the fits", format!("{} s", number(run.seconds))),
     ];
+    if let Some(shards) = run.shards {
+        facts.insert(3, ("shards", format!("{}; threads are of each, times are sums", whole(shards as f64))));
+    }
     if run.presentations > 0 {
         facts.push(("patterns presented in this run", whole(run.presentations as f64)));
         facts.push(("patterns presented per second", whole(run.presentations_per_second)));

@@ -50,6 +50,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! A study splits into tasks, blocks of seeds of an arm, which may run in other processes or on other machines, or into shards of
+//! them: [`PreparedStudy::tasks`], [`PreparedStudy::run_task`], [`PreparedStudy::assemble`] and [`PreparedStudy::merge`]. What comes out
+//! does not depend on the split.
+//!
 //! Beside studies from files there are three built in: [`paper`], the founding paper's; [`dead_areas`], what lies between sensors;
 //! and [`elliott`], components of a plate's readings and a network.
 #![forbid(unsafe_code)]
@@ -58,19 +62,23 @@
     deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::print_stderr, clippy::print_stdout)
 )]
 
+mod assembly;
 pub mod dead_areas;
 pub mod elliott;
-mod networks_csv;
 pub mod paper;
 mod results;
 mod run;
+mod tables;
+mod task;
 
-pub use networks_csv::{Checkpoint, CheckpointError, FitRow, NetworksCsv};
+pub use assembly::{AssemblyError, MergedStudy, ShardTables};
 pub use palpate_rig::{Arm, AskedLayout, Judging, Study};
 pub use results::{
     ArmResults, LimitResults, PortionResults, RunFacts, SensorPlace, SetUp, StudyResults, TrainingSpanResults,
 };
 pub use run::{ArmOutcome, OnTrained, PreparedStudy, RunOptions, StudyRunError, Trained, TrainedSeed};
+pub use tables::{Checkpoint, CheckpointError, FitRows, RowProblem, StudyTables, TableKind};
+pub use task::{Shard, ShardError, Task};
 
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_2_PI;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Arm, ArmOutcome, Judging, PreparedStudy, RunOptions, TrainedSeed};
 use palpate_estimators::evaluation::{
@@ -22,17 +22,20 @@ pub struct StudyResults {
 }
 
 /// Facts of a study's run, as every file that it writes says.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunFacts {
     /// Version of palpate.
-    pub palpate: &'static str,
+    pub palpate: String,
     /// The study's name.
     pub study: String,
     /// SHA-256 of the study file, in hexadecimal.
     pub study_sha256: String,
     /// Seeds 0 to this less 1, of every arm.
     pub seeds: u64,
-    /// Threads that fitted.
+    /// Shards that were joined, where the study ran in shards.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shards: Option<usize>,
+    /// Threads that fitted; of shards the most that one had.
     pub threads: usize,
     /// Width of the numbers in training.
     pub precision: Precision,
@@ -40,7 +43,7 @@ pub struct RunFacts {
     pub arithmetic: String,
     /// Patterns presented to networks in this run; what an earlier run left is not counted.
     pub presentations: u64,
-    /// Wall-clock time of the fits, in seconds.
+    /// Wall-clock time of the fits, in seconds; the sum over shards.
     pub seconds: f64,
     /// Their ratio.
     pub presentations_per_second: f64,
@@ -56,10 +59,11 @@ impl RunFacts {
         seconds: f64,
     ) -> Self {
         Self {
-            palpate: env!("CARGO_PKG_VERSION"),
+            palpate: env!("CARGO_PKG_VERSION").to_owned(),
             study: study.study.name.clone(),
             study_sha256: study.study.digest.clone(),
             seeds: options.seeds,
+            shards: None,
             threads: options.threads,
             precision: study.study.precision,
             arithmetic,
@@ -67,6 +71,25 @@ impl RunFacts {
             seconds,
             presentations_per_second: presentations as f64 / seconds,
         }
+    }
+
+    /// Facts of a study that was joined from shards, from the facts of each; `None` of no shard.
+    pub fn of_shards(shards: &[Self]) -> Option<Self> {
+        let first = shards.first()?;
+        let presentations = shards.iter().fold(0u64, |sum, shard| sum.saturating_add(shard.presentations));
+        let seconds = shards.iter().map(|shard| shard.seconds).sum();
+        let mut arithmetic: Vec<&str> = shards.iter().map(|shard| shard.arithmetic.as_str()).collect();
+        arithmetic.sort_unstable();
+        arithmetic.dedup();
+        Some(Self {
+            shards: Some(shards.len()),
+            threads: shards.iter().map(|shard| shard.threads).max()?,
+            arithmetic: arithmetic.join("; "),
+            presentations,
+            seconds,
+            presentations_per_second: presentations as f64 / seconds,
+            ..first.clone()
+        })
     }
 }
 
@@ -236,12 +259,12 @@ impl ArmResults {
                     .and_then(|allowed| Some(percentage_error(mean(allowed, Some(*portion))?, length_m))),
             })
         });
-        let outcomes = || outcome.fits.iter().filter_map(|fit| fit.locator.training_outcome());
+        let outcomes = || outcome.fits.iter().filter_map(|fit| fit.training);
         let converged = outcomes().filter(|o| o.status == TrainingStatus::Converged).count();
         let limit = allowed.as_ref().and_then(|allowed| {
             Some(LimitResults {
                 limit_error_percent: percentage_error(mean(allowed, None)?, length_m),
-                error_over_limit: spread(&|fit| limit_ratio(&fit.locator.setup, &fit.evaluation)),
+                error_over_limit: spread(&|fit| limit_ratio(&arm.rig.setup, &fit.evaluation)),
             })
         });
         Some(Self {

@@ -1,5 +1,6 @@
 //! A study made ready and run: its layouts found, its recordings made, and every arm's seeds fitted, in lanes and threads.
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -13,9 +14,12 @@ use palpate_estimators::fit::{Fit, FitTask, SeedQueue};
 use palpate_estimators::network::{Network, TrainingOutcome};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulateError;
+use palpate_mechanics::contact::Contact;
 use palpate_mechanics::sensing::{ChannelModel, Layout};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::{Arm, AskedLayout, Judging, RigSimulationError, Study};
+
+use super::task::Task;
 
 /// Error of running a study.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -46,6 +50,14 @@ pub enum StudyRunError {
         /// Why.
         error: EvaluationError<FitError>,
     },
+    /// A task of an arm that the study does not have.
+    #[error("the study has no arm `{arm}`; it has {}", .known.join(", "))]
+    NoArm {
+        /// The arm.
+        arm: String,
+        /// The study's arms.
+        known: Vec<String>,
+    },
     /// The run was stopped; what was finished has been observed.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
@@ -67,6 +79,8 @@ enum PreparedArm {
     /// Anything else: a calibration that is simulated anew for each seed.
     SeedBySeed {
         calibration: Box<Calibration>,
+        /// Contacts that every seed is judged by, one a reading.
+        contacts: Vec<Contact>,
         /// Patterns of an epoch; 0 for an estimator that is not trained by epochs.
         patterns: usize,
     },
@@ -99,8 +113,9 @@ impl PreparedStudy {
         Ok(Self { study, arms })
     }
 
-    /// Whether an arm's fits are networks, whose weights `networks.csv` keeps; others are fitted again when a run is resumed.
-    pub fn is_kept(&self, arm: usize) -> bool {
+    /// Whether an arm's fits are networks, which are restored from the weights in `networks.csv`; of others `evaluations.csv` keeps what
+    /// they located.
+    pub fn keeps_weights(&self, arm: usize) -> bool {
         matches!(self.study.arms[arm].rig.estimator, Estimator::Network(_))
     }
 
@@ -117,11 +132,35 @@ impl PreparedStudy {
         }
     }
 
+    /// Patterns that were presented to a fit's network; 0 for an estimator that is not trained by epochs.
+    pub fn presentations(&self, Trained { arm, fit }: &Trained) -> u64 {
+        fit.training.map_or(0, |training| u64::from(training.epochs) * self.patterns(*arm) as u64)
+    }
+
     /// Judges a network that was trained in lanes as its arm is judged; `None` for another arm or other channels.
     fn judge(&self, arm: usize, seed: u64, locator: Locator) -> Option<Trained> {
         let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
         let evaluation = Evaluation::new(&locator, &prepared.trial.judged).ok()?;
-        Some(Trained { arm, fit: TrainedSeed { seed, locator, evaluation } })
+        Some(Trained { arm, fit: Calibrated { seed, locator, evaluation }.into() })
+    }
+
+    /// The place of the arm called `name` in the study.
+    ///
+    /// # Errors
+    /// [`StudyRunError::NoArm`], with the names that there are.
+    pub fn arm(&self, name: &str) -> Result<usize, StudyRunError> {
+        self.study.arms.iter().position(|arm| arm.name == name).ok_or_else(|| StudyRunError::NoArm {
+            arm: name.to_owned(),
+            known: self.study.arms.iter().map(|arm| arm.name.clone()).collect(),
+        })
+    }
+
+    /// Contacts that every seed of an arm is judged by, one a reading; nothing of an arm whose networks are trained in lanes.
+    pub(crate) fn contacts(&self, arm: usize) -> &[Contact] {
+        match &self.arms[arm] {
+            PreparedArm::InLanes(_) => &[],
+            PreparedArm::SeedBySeed { contacts, .. } => contacts,
+        }
     }
 
     /// A network of this study, from its weights and outcome, and judged; `None` when their number is not the network's, or for an arm
@@ -148,7 +187,7 @@ impl PreparedStudy {
                     Ok(None) | Err(_) => Err(Cancelled),
                 };
                 let fit = calibration.run_with(seed, Watch::NONE, restored).ok()?;
-                Some(Trained { arm, fit })
+                Some(Trained { arm, fit: fit.into() })
             }
         }
     }
@@ -181,7 +220,8 @@ impl PreparedArm {
                 let calibration = calibration.judged_at(&judging.positions, readings);
                 let is_network = matches!(estimator, Estimator::Network(_));
                 let patterns = if is_network { calibration.presses().len() } else { 0 };
-                Ok(Self::SeedBySeed { calibration: Box::new(calibration), patterns })
+                let contacts = calibration.contacts().map_err(|error| simulated(error.into()))?;
+                Ok(Self::SeedBySeed { calibration: Box::new(calibration), contacts, patterns })
             }
         }
     }
@@ -240,8 +280,25 @@ fn request(arm: &Arm) -> Option<(AskedLayout, LayoutRequest)> {
     Some((asked, LayoutRequest { method, setup, design }))
 }
 
-/// One fitted seed of an arm.
-pub type TrainedSeed = Calibrated<Method>;
+/// One fitted seed of an arm: what results and files need of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainedSeed {
+    /// The seed.
+    pub seed: u64,
+    /// Outcome of its training; `None` of an estimator that is not trained by epochs.
+    pub training: Option<TrainingOutcome>,
+    /// Weights of a network; nothing of another estimator.
+    pub weights: Vec<f64>,
+    /// What it located.
+    pub evaluation: Evaluation,
+}
+
+impl From<Calibrated<Method>> for TrainedSeed {
+    fn from(Calibrated { seed, locator, evaluation }: Calibrated<Method>) -> Self {
+        let training = locator.training_outcome();
+        Self { seed, training, weights: locator.weights().to_vec(), evaluation }
+    }
+}
 
 /// A fitted seed with the place of its arm in the study.
 #[derive(Clone, Debug, PartialEq)]
@@ -291,8 +348,19 @@ pub struct RunOptions {
 pub type OnTrained<'a> = dyn Fn(&Trained) + Sync + 'a;
 
 impl PreparedStudy {
-    /// Fits every seed of every arm but those in `done`, which may hold networks only, and answers with all
-    /// of them. A seed gives the same locator whatever the number of threads and whatever was done before.
+    /// Number of networks that train side by side: a block of seeds that is a multiple of it fills the lanes.
+    pub fn lanes(&self) -> u64 {
+        self.study.precision.lanes() as u64
+    }
+
+    /// The tasks of so many seeds of every arm, costliest arms first, in blocks of `block` seeds, at least 1.
+    pub fn tasks(&self, seeds: u64, block: u64) -> Vec<Task> {
+        let arms = self.arms_by_cost().into_iter();
+        arms.flat_map(|arm| Task::blocks(&self.study.arms[arm].name, seeds, block)).collect()
+    }
+
+    /// Fits every seed of every arm but those in `done`, and answers with all of them. A seed gives the same fit whatever the number of
+    /// threads and whatever was done before.
     ///
     /// # Errors
     /// [`StudyRunError`] when an estimator cannot be fitted to what its arm's sensors read, or when `watch` stopped the run; what
@@ -300,48 +368,69 @@ impl PreparedStudy {
     pub fn run(
         &self,
         options: RunOptions,
-        done: Vec<Trained>,
+        mut done: Vec<Trained>,
         on_trained: &OnTrained,
         watch: Watch,
     ) -> Result<Vec<ArmOutcome>, StudyRunError> {
-        let is_done = |arm: usize, seed: u64| done.iter().any(|t| t.arm == arm && t.fit.seed == seed);
-        let work: Vec<ArmWork> = (0..self.arms.len())
-            .map(|arm| {
-                let seeds = (0..options.seeds).filter(|seed| !is_done(arm, *seed)).collect();
-                ArmWork { seeds, taken: AtomicU64::new(0) }
-            })
-            .collect();
-        let finished = Mutex::new(done);
+        let tasks = self.tasks(options.seeds, self.lanes());
+        done.extend(self.fit_tasks(&tasks, &done, options.threads, on_trained, watch)?);
+        Ok(self.by_arm(done, options.seeds))
+    }
+
+    /// Fits the seeds of some tasks but those in `done`, by `threads` threads, in no particular order. A seed gives the same fit whatever
+    /// the tasks, the threads and what was done before.
+    ///
+    /// # Errors
+    /// [`StudyRunError`] as for [`PreparedStudy::run`], and for an arm that the study does not have.
+    pub fn fit_tasks(
+        &self,
+        tasks: &[Task],
+        done: &[Trained],
+        threads: usize,
+        on_trained: &OnTrained,
+        watch: Watch,
+    ) -> Result<Vec<Trained>, StudyRunError> {
+        let work = self.work(tasks, done)?;
+        let finished = Mutex::new(Vec::new());
         let failed = Mutex::new(None);
         // A failure of one thread stops the others.
         let go_on = |progress| lock(&failed).is_none() && watch.report(progress).is_ok();
         let watch = Watch::new(&go_on);
+        let fit = || {
+            let mut queue = Queue { study: self, arm: 0, work: &work, on_trained, finished: &finished };
+            for arm in self.arms_by_cost() {
+                queue.arm = arm;
+                let fitted = match &self.arms[arm] {
+                    PreparedArm::InLanes(prepared) => queue.fit_in_lanes(prepared, watch),
+                    PreparedArm::SeedBySeed { calibration, .. } => queue.fit_each(calibration, watch),
+                };
+                if let Err(error) = fitted {
+                    // The first error is the cause; a cancellation by it comes later.
+                    lock(&failed).get_or_insert(error);
+                    return;
+                }
+            }
+        };
         std::thread::scope(|scope| {
-            for _ in 0..options.threads.max(1) {
-                scope.spawn(|| {
-                    let mut queue =
-                        Queue { study: self, arm: 0, work: &work, on_trained, finished: &finished };
-                    for arm in self.arms_by_cost() {
-                        queue.arm = arm;
-                        let fitted = match &self.arms[arm] {
-                            PreparedArm::InLanes(prepared) => queue.fit_in_lanes(prepared, watch),
-                            PreparedArm::SeedBySeed { calibration, .. } => queue.fit_each(calibration, watch),
-                        };
-                        if let Err(error) = fitted {
-                            // The first error is the cause; a cancellation by it comes later.
-                            lock(&failed).get_or_insert(error);
-                            return;
-                        }
-                    }
-                });
+            for _ in 0..threads.max(1) {
+                scope.spawn(fit);
             }
         });
         match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
             Some(error) => Err(error),
-            None => {
-                Ok(self.by_arm(finished.into_inner().unwrap_or_else(PoisonError::into_inner), options.seeds))
-            }
+            None => Ok(finished.into_inner().unwrap_or_else(PoisonError::into_inner)),
         }
+    }
+
+    /// The seeds of every arm that are to be fitted.
+    fn work(&self, tasks: &[Task], done: &[Trained]) -> Result<Vec<ArmWork>, StudyRunError> {
+        let mut taken: HashSet<(usize, u64)> = done.iter().map(|t| (t.arm, t.fit.seed)).collect();
+        let mut seeds = vec![Vec::new(); self.arms.len()];
+        for task in tasks {
+            let arm = self.arm(&task.arm)?;
+            seeds[arm].extend(task.seeds.clone().filter(|seed| taken.insert((arm, *seed))));
+        }
+        Ok(seeds.into_iter().map(|seeds| ArmWork { seeds, taken: AtomicU64::new(0) }).collect())
     }
 
     /// Arms in lanes first, the costliest of them first; the seeds of others fill the ends of the threads.
@@ -351,7 +440,8 @@ impl PreparedStudy {
         arms
     }
 
-    fn by_arm(&self, finished: Vec<Trained>, seeds: u64) -> Vec<ArmOutcome> {
+    /// Fits sorted into an outcome an arm, of seeds 0 to `seeds` less 1.
+    pub fn by_arm(&self, finished: Vec<Trained>, seeds: u64) -> Vec<ArmOutcome> {
         let mut outcomes: Vec<ArmOutcome> = self
             .study
             .arms
@@ -402,7 +492,7 @@ impl Queue<'_> {
             watch.round()?;
             let fit = calibration.run(&arm.rig.estimator, seed, watch);
             let fit = fit.map_err(|error| unfitted(&arm.name, error))?;
-            self.finish(Trained { arm: self.arm, fit });
+            self.finish(Trained { arm: self.arm, fit: fit.into() });
         }
         Ok(())
     }

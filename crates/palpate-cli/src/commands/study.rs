@@ -3,7 +3,7 @@
 use crate::failure::{Complaint, Failure};
 use crate::output::Table;
 use crate::progress::Observer;
-use crate::target::{Inputs, NETWORKS_CSV, RESULTS_JSON, TargetFolder};
+use crate::target::{Inputs, NETWORKS_CSV, OF_A_STUDY, REPORT_HTML, RESULTS_JSON, SHARD_JSON, TargetFolder};
 use crate::{input, output, progress};
 use palpate_estimators::evaluation::Quantiles;
 use palpate_mechanics::units::format_count;
@@ -12,16 +12,17 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{StudyReport, paper_report, study_report};
 use palpate_studies::paper::{Agreement, Claim, PublishedFigure, STUDY_TOML, claims, published_figures};
 use palpate_studies::{
-    ArmOutcome, ArmResults, Checkpoint, NetworksCsv, PreparedStudy, RunFacts, RunOptions, StudyResults,
-    StudyRunError,
+    ArmResults, Checkpoint, PreparedStudy, RunFacts, RunOptions, Shard, Study, StudyResults, StudyRunError,
+    StudyTables, Task, Trained,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 mod built_in;
 mod fits;
+mod shards;
 
-use fits::{CheckpointFile, Tally};
+use fits::{FitFiles, Tally};
 
 /// Run a set of experiments: arms by seeds; `paper` is the founding paper's study.
 #[derive(clap::Args)]
@@ -37,7 +38,13 @@ pub struct Arguments {
     /// Folder for results and report [default: palpate-out/<study>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Go on from an earlier run, stopped or finished: networks are kept, what else there is is fitted again
+    /// Run the K-th of N shares of the study alone, as a job of many; --merge joins them [default DIR: palpate-out/<study>/shard-K-of-N]
+    #[arg(long, value_name = "K/N")]
+    shard: Option<Shard>,
+    /// Join the shards in these folders into the results and the report of the whole study
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "seeds", "threads", "resume"])]
+    merge: Vec<PathBuf>,
+    /// Go on from an earlier run, stopped or finished: what is finished is kept
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
     /// Throw an earlier run away, finished or not
@@ -67,18 +74,34 @@ impl Arguments {
 
     /// The folder for results and report of a study; it may hold no earlier run unless the command line says what is to become of it.
     fn folder(&self, study: &str) -> Result<TargetFolder, Failure> {
-        let out = self.out.clone().unwrap_or_else(|| Path::new("palpate-out").join(study));
-        let folder = TargetFolder::for_study(&out, &Inputs::new([self.study.as_path()]))?;
-        let finished = out.join(RESULTS_JSON).exists();
-        let begun = finished || out.join(NETWORKS_CSV).exists();
-        if begun && self.earlier_run() == EarlierRun::Leave {
-            let complaint = match finished {
-                true => format!("{} holds the results of a run that was finished", out.display()),
-                false => format!("{} is of a run that was not finished", out.join(NETWORKS_CSV).display()),
+        let whole = || Path::new("palpate-out").join(study);
+        let out = self.out.clone().unwrap_or_else(|| match self.shard {
+            Some(shard) => whole().join(format!("shard-{}-of-{}", shard.number(), shard.of())),
+            None => whole(),
+        });
+        let tables = self.merge.iter().flat_map(|shard| OF_A_STUDY.map(|name| shard.join(name)));
+        let read: Vec<PathBuf> = tables.chain([self.study.clone()]).collect();
+        let folder = TargetFolder::for_study(&out, &Inputs::new(read.iter().map(PathBuf::as_path)))?;
+        if let Some(found) = OF_A_STUDY.into_iter().find(|name| out.join(name).exists())
+            && self.earlier_run() == EarlierRun::Leave
+        {
+            let complaint = match found {
+                RESULTS_JSON => format!("{} holds the results of a run that was finished", out.display()),
+                SHARD_JSON => format!("{} holds a shard that was finished", out.display()),
+                table => format!("{} is of a run that was not finished", out.join(table).display()),
             };
-            return Err(Complaint::new(complaint)
-                .help("--resume goes on from its networks, --overwrite throws it away, --out names another folder")
-                .into());
+            let complaint = Complaint::new(complaint);
+            return Err(match self.merge.is_empty() {
+                true => complaint.help(
+                    "--resume goes on from what is finished, --overwrite throws it away, --out names another folder",
+                ),
+                false => complaint.help("--overwrite throws it away, --out names another folder"),
+            }
+            .into());
+        }
+        if self.shard.is_some() && out.join(REPORT_HTML).exists() {
+            let complaint = Complaint::new(format!("{} holds a report, and a shard has none", out.display()));
+            return Err(complaint.help("--out names another folder").into());
         }
         Ok(folder)
     }
@@ -97,6 +120,15 @@ struct ResultsFile<'a> {
     claims: Option<Vec<Claim>>,
 }
 
+/// A study as it was asked for.
+struct Asked<'a> {
+    arguments: &'a Arguments,
+    is_paper: bool,
+    /// Name of the file, and its text.
+    name: String,
+    text: String,
+}
+
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match arguments.study.to_str() {
         Some("dead-areas") => return built_in::dead_areas(arguments),
@@ -110,30 +142,57 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         (arguments.study.display().to_string(), input::read_text(&arguments.study)?)
     };
     let study = input::parse_study(&name, &text)?;
+    let asked = Asked { arguments, is_paper, name, text };
+    if !arguments.merge.is_empty() {
+        return shards::merge(&asked, study);
+    }
     let options = RunOptions {
         seeds: arguments.seeds.unwrap_or(study.seeds),
         threads: arguments.threads.map_or_else(cores, usize::from),
     };
     let out = arguments.folder(&study.name)?;
-    let prepared = Observer::of_stages()
-        .watch(|watch| PreparedStudy::new(study, watch))
-        .map_err(|error| complaint(&error, &name, &text))?;
-    let (outcomes, facts) = train(&prepared, options, &out, arguments)?;
-
-    let results = StudyResults::new(&outcomes, &prepared);
-    let file = ResultsFile {
-        run: &facts,
-        results: &results,
-        published: is_paper.then(|| published_figures(&results)),
-        claims: is_paper.then(|| claims(&outcomes, prepared.judging())),
+    let prepared = asked.prepare(study)?;
+    let tables = match arguments.shard {
+        Some(shard) => StudyTables::of_shard(&prepared, shard, options.seeds),
+        None => StudyTables::new(&prepared),
     };
-    let report = StudyReport { study: &prepared, outcomes: &outcomes, results: &results, run: &facts };
-    out.write_report(if is_paper { paper_report(&report) } else { study_report(&report) })?;
-    out.write(RESULTS_JSON, (output::to_json(&file)? + "\n").as_bytes())?;
-    if arguments.json {
-        return output::say_json(&file);
+    let (fits, facts) = train(&prepared, options, &tables, (&out, arguments))?;
+    match arguments.shard {
+        Some(shard) => shards::finish(shard, fits.len(), facts, (&out, arguments)),
+        None => asked.finish(&prepared, fits, &facts, &out),
     }
-    print_tables(&file, out.path())
+}
+
+impl Asked<'_> {
+    fn prepare(&self, study: Study) -> Result<PreparedStudy, Failure> {
+        let prepared = Observer::of_stages().watch(|watch| PreparedStudy::new(study, watch));
+        prepared.map_err(|error| complaint(&error, &self.name, &self.text))
+    }
+
+    /// Writes report and results of a whole study, and prints them.
+    fn finish(
+        &self,
+        prepared: &PreparedStudy,
+        fits: Vec<Trained>,
+        facts: &RunFacts,
+        out: &TargetFolder,
+    ) -> Result<(), Failure> {
+        let outcomes = prepared.by_arm(fits, facts.seeds);
+        let results = StudyResults::new(&outcomes, prepared);
+        let file = ResultsFile {
+            run: facts,
+            results: &results,
+            published: self.is_paper.then(|| published_figures(&results)),
+            claims: self.is_paper.then(|| claims(&outcomes, prepared.judging())),
+        };
+        let report = StudyReport { study: prepared, outcomes: &outcomes, results: &results, run: facts };
+        out.write_report(if self.is_paper { paper_report(&report) } else { study_report(&report) })?;
+        out.write(RESULTS_JSON, (output::to_json(&file)? + "\n").as_bytes())?;
+        if self.arguments.json {
+            return output::say_json(&file);
+        }
+        print_tables(&file, out.path())
+    }
 }
 
 /// Complaint about a study, with a caret where its file asks for what cannot be had.
@@ -152,68 +211,44 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Fits what an earlier run has not, keeping `networks.csv` up to date where there are networks; leaves it sorted, with a row for every fit.
+/// Fits what an earlier run has not, keeping the tables up to date; leaves them sorted, with a row for every fit. All fits, and the facts of
+/// those of this run.
 fn train(
     prepared: &PreparedStudy,
     options: RunOptions,
-    out: &TargetFolder,
-    arguments: &Arguments,
-) -> Result<(Vec<ArmOutcome>, RunFacts), Failure> {
-    let table = NetworksCsv::new(prepared);
+    tables: &StudyTables,
+    (out, arguments): (&TargetFolder, &Arguments),
+) -> Result<(Vec<Trained>, RunFacts), Failure> {
     out.make()?;
     let earlier = match arguments.earlier_run() {
-        EarlierRun::Resume => fits::read(out, &table)?,
+        EarlierRun::Resume => fits::read(out, tables)?,
         EarlierRun::Leave | EarlierRun::Overwrite => Checkpoint::default(),
     };
-    let surplus = fits::surplus(&earlier.rows, options);
-    let keeps = (0..prepared.study.arms.len()).any(|arm| prepared.is_kept(arm));
-    let file = match keeps {
-        true => Some(CheckpointFile::begin(out, &table, &earlier.done, &surplus)?),
-        false => None,
-    };
-    let done = earlier.done;
-    let resumed: Vec<(usize, u64)> = done.iter().map(|trained| (trained.arm, trained.fit.seed)).collect();
-    let tally = Tally::new(prepared, options, &table, file, &done);
+    fits::say_surplus(&earlier.done, options);
+    let mut fits = earlier.done;
+    let files = FitFiles::begin(out, tables, &fits)?;
+    let tasks = tables.tasks(options.seeds);
+    let tally = Tally::new(prepared, tables, files, (&tasks, &fits));
     let start = Instant::now();
     let go_on = |_| !progress::interrupted() && !tally.failed();
-    let outcomes = prepared.run(options, done, &|trained| tally.note(trained), Watch::new(&go_on));
+    let threads = options.threads;
+    let fitted = prepared.fit_tasks(&tasks, &fits, threads, &|fit| tally.note(fit), Watch::new(&go_on));
     let seconds = start.elapsed().as_secs_f64();
     let finished = tally.finish()?;
-    if matches!(outcomes, Err(StudyRunError::Cancelled(Cancelled))) {
-        let wanted = prepared.study.arms.len() as u64 * options.seeds;
-        return Err(Failure::Interrupted(if keeps {
-            let kept = finished.iter().enumerate().filter(|(arm, _)| prepared.is_kept(*arm));
-            let kept: u64 = kept.map(|(_, fits)| fits).sum();
-            let path = out.path().join(NETWORKS_CSV);
-            format!(
-                "stopped; {kept} of {wanted} networks are in {}; --resume goes on from them",
-                path.display()
-            )
-        } else {
-            let finished: u64 = finished.iter().sum();
-            format!("stopped after {finished} of {wanted} fits; nothing was written")
-        }));
+    if matches!(fitted, Err(StudyRunError::Cancelled(Cancelled))) {
+        let wanted: u64 = tasks.iter().map(Task::fits).sum();
+        let path = out.path().join(NETWORKS_CSV);
+        return Err(Failure::Interrupted(format!(
+            "stopped; {finished} of {wanted} fits are in {}; --resume goes on from them",
+            path.display()
+        )));
     }
-    let outcomes = outcomes.map_err(Complaint::new)?;
-    fits::write_sorted(out, &table, &outcomes, &surplus)?;
-    Ok((outcomes.clone(), facts(prepared, options, &outcomes, &resumed, seconds)))
-}
-
-fn facts(
-    prepared: &PreparedStudy,
-    options: RunOptions,
-    outcomes: &[ArmOutcome],
-    resumed: &[(usize, u64)],
-    seconds: f64,
-) -> RunFacts {
-    let mut presentations = 0;
-    for (arm, outcome) in outcomes.iter().enumerate() {
-        for fit in outcome.fits.iter().filter(|fit| !resumed.contains(&(arm, fit.seed))) {
-            presentations += fits::presentations(prepared, arm, fit);
-        }
-    }
-    let arithmetic = format!("{}, {} lanes", InstructionSet::best(), prepared.study.precision.lanes());
-    RunFacts::new(prepared, options, arithmetic, presentations, seconds)
+    let fitted = fitted.map_err(Complaint::new)?;
+    let presentations = fitted.iter().map(|fit| prepared.presentations(fit)).sum();
+    let arithmetic = format!("{}, {} lanes", InstructionSet::best(), prepared.lanes());
+    fits.extend(fitted);
+    fits::write(out, &tables.whole(&fits))?;
+    Ok((fits, RunFacts::new(prepared, options, arithmetic, presentations, seconds)))
 }
 
 fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
@@ -249,15 +284,24 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
                 .column("seeds", |claim| format!("{:.0} %", 100.0 * claim.share_of_seeds)),
         )?;
     }
-    let run = file.run;
-    let seconds = progress::duration(run.seconds);
-    output::say(if run.presentations > 0 {
-        let rate = run.presentations_per_second / 1e6;
-        format!("\n{seconds} on {} threads, {rate:.1} M presentations/s ({})", run.threads, run.arithmetic)
-    } else {
-        format!("\n{seconds} on {} threads", run.threads)
-    })?;
+    output::say(time_in_words(file.run))?;
     output::say_report("", Some(out))
+}
+
+/// "40 s on 2 threads, 12.3 M presentations/s (AVX2, 8 lanes)", on a line of its own.
+fn time_in_words(run: &RunFacts) -> String {
+    let seconds = progress::duration(run.seconds);
+    let threads = match run.shards {
+        Some(shards) => format!("in {shards} shards of {} threads", run.threads),
+        None => format!("on {} threads", run.threads),
+    };
+    match run.presentations {
+        0 => format!("\n{seconds} {threads}"),
+        _ => {
+            let rate = run.presentations_per_second / 1e6;
+            format!("\n{seconds} {threads}, {rate:.1} M presentations/s ({})", run.arithmetic)
+        }
+    }
 }
 
 fn yes_or_no(holds: bool) -> String {

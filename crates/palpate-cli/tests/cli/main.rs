@@ -17,6 +17,7 @@ mod positions;
 mod profile;
 mod recordings;
 mod report_page;
+mod shards;
 mod signals;
 mod streams;
 mod study;

@@ -120,6 +120,17 @@ impl Calibration {
         &self.presses
     }
 
+    /// The contacts to judge by, each as often as it is read, with their forces: the same whatever the seed.
+    ///
+    /// # Errors
+    /// [`SimulateError::NoForce`] where neither presses nor contacts have a force.
+    pub fn contacts(&self) -> Result<Vec<Contact>, SimulateError> {
+        let force_n = self.touched.force_n().ok_or(SimulateError::NoForce)?;
+        let with_force =
+            |(position, share): (&Position, &f64)| Contact { position: *position, force_n: share * force_n };
+        Ok(self.contacts.iter().zip(self.force_shares.iter().cycle()).map(with_force).collect())
+    }
+
     /// Recordings of the presses to fit and of the contacts to judge. Both are read by the same faulty channels: their gains and offsets are the first
     /// draws of a seed. A reading's noise depends on the seed and on how many come before it alone.
     ///
@@ -128,11 +139,7 @@ impl Calibration {
     pub fn simulate(&self, seed: u64) -> Result<Split, SimulateError> {
         let force_n = self.touched.force_n().ok_or(SimulateError::NoForce)?;
         let presses = self.presses.iter().map(|position| Contact { position: *position, force_n });
-        let shares = self.force_shares.iter().cycle();
-        let contacts = self.contacts.iter().zip(shares);
-        let contacts =
-            contacts.map(|(position, share)| Contact { position: *position, force_n: share * force_n });
-        let all: Vec<Contact> = presses.chain(contacts).collect();
+        let all: Vec<Contact> = presses.chain(self.contacts()?).collect();
         let rows: Vec<usize> = (0..all.len()).collect();
         let (pressed, touched) = rows.split_at(self.presses.len());
         let recording = simulate_contacts(&self.touched, &all, 1, seed)?;

@@ -277,7 +277,7 @@ impl Table<'_> {
                 let positions = evaluation.located.iter().map(|located| located.estimate.x_m);
                 positions.fold(f64::NEG_INFINITY, f64::max) / evaluation.extent.length_m() * 100.0
             }
-            Figure::Epochs => f64::from(fit.locator.training_outcome().unwrap_or_default().epochs),
+            Figure::Epochs => f64::from(fit.training.unwrap_or_default().epochs),
             Figure::Effective => evaluation.effective_percent(self.judging.tolerance_m),
         }
     }

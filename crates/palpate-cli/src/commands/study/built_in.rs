@@ -61,6 +61,11 @@ pub fn elliott(arguments: &Arguments) -> Result<(), Failure> {
 
 /// The folder of a study that fits in minutes, and keeps nothing that another run could go on from.
 fn folder(arguments: &Arguments, study: &str) -> Result<TargetFolder, Failure> {
+    let in_shards = [(arguments.shard.is_some(), "--shard"), (!arguments.merge.is_empty(), "--merge")];
+    if let Some((_, option)) = in_shards.into_iter().find(|(asked, _)| *asked) {
+        let complaint = Complaint::new(format!("{option}: the study `{study}` is not run in shards"));
+        return Err(complaint.help("run it whole: it takes minutes").into());
+    }
     if arguments.earlier_run() == EarlierRun::Resume {
         let complaint =
             Complaint::new(format!("--resume: the study `{study}` keeps no networks to go on from"));

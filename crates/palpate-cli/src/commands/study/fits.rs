@@ -1,133 +1,128 @@
-//! The fits of a study as they are finished: a row of `networks.csv` for each, and a step of the bar.
+//! The fits of a study as they are finished: a row of each table for each, and a step of the bar.
 //!
-//! The file grows as fits are finished, survives Ctrl-C, and is sorted at the end.
+//! The tables grow as fits are finished, survive Ctrl-C, and are sorted at the end.
 
 use crate::failure::{Complaint, Failure};
 use crate::remark::remark;
-use crate::target::{NETWORKS_CSV, RESULTS_JSON, TargetFolder};
+use crate::target::{EVALUATIONS_CSV, NETWORKS_CSV, RESULTS_JSON, SHARD_JSON, TargetFolder};
 use crate::{input, progress, target};
 use indicatif::ProgressBar;
 use palpate_mechanics::units::format_count;
 use palpate_studies::{
-    ArmOutcome, Checkpoint, CheckpointError, FitRow, NetworksCsv, PreparedStudy, RunOptions, Trained,
-    TrainedSeed,
+    Checkpoint, CheckpointError, FitRows, PreparedStudy, RunOptions, StudyTables, Task, Trained,
 };
 use std::fs::File;
 use std::io::Write;
+use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// The file, open for more rows.
-pub struct CheckpointFile {
-    file: File,
+/// The tables, open for more rows.
+pub struct FitFiles {
+    networks: File,
+    /// `None` where all fits are networks.
+    evaluations: Option<File>,
 }
 
-impl CheckpointFile {
-    /// Begins the file of a run with the rows that it keeps of an earlier one. From here until its end the run counts as unfinished.
-    pub fn begin(
-        out: &TargetFolder,
-        table: &NetworksCsv,
-        done: &[Trained],
-        surplus: &[&FitRow],
-    ) -> Result<Self, Failure> {
-        let results = out.path().join(RESULTS_JSON);
-        match std::fs::remove_file(&results) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                return Err(target::cannot("remove", &results, &error));
-            }
-            _ => {}
-        }
-        let is_surplus =
-            |row: &Trained| surplus.iter().any(|kept| (kept.arm, kept.seed) == (row.arm, row.fit.seed));
-        let mut rows = table.heading();
-        done.iter().filter(|row| !is_surplus(row)).for_each(|trained| rows.push_str(&table.row(trained)));
-        surplus.iter().for_each(|row| rows.push_str(&row.text));
-        out.write(NETWORKS_CSV, rows.as_bytes())?;
-        let path = out.path().join(NETWORKS_CSV);
-        let file = File::options().append(true).open(&path);
-        let file = file.map_err(|error| target::cannot("write", &path, &error))?;
-        Ok(Self { file })
+impl FitFiles {
+    /// Begins the tables of a run with the fits that it keeps of an earlier one. From here until its end the run counts as unfinished.
+    pub fn begin(out: &TargetFolder, tables: &StudyTables, done: &[Trained]) -> Result<Self, Failure> {
+        out.remove(RESULTS_JSON)?;
+        out.remove(SHARD_JSON)?;
+        write(out, &tables.whole(done))?;
+        let open = |name| {
+            let path = out.path().join(name);
+            let file = File::options().append(true).open(&path);
+            file.map_err(|error| target::cannot("write", &path, &error))
+        };
+        let evaluations = tables.has_evaluations().then(|| open(EVALUATIONS_CSV)).transpose()?;
+        Ok(Self { networks: open(NETWORKS_CSV)?, evaluations })
     }
 
-    /// Adds a row, in one write, so that no other row comes between.
-    pub fn add(&mut self, row: &str) -> std::io::Result<()> {
-        self.file.write_all(row.as_bytes())
+    /// Adds the rows of a fit, each in one write, so that no other row comes between. The fit is finished with the second.
+    fn add(&mut self, rows: &FitRows) -> std::io::Result<()> {
+        if let Some(evaluations) = &mut self.evaluations {
+            evaluations.write_all(rows.evaluations.as_bytes())?;
+        }
+        self.networks.write_all(rows.networks.as_bytes())
     }
+}
+
+/// Writes whole tables; `evaluations.csv` only where there is one.
+pub fn write(out: &TargetFolder, whole: &FitRows) -> Result<(), Failure> {
+    match whole.evaluations.is_empty() {
+        true => out.remove(EVALUATIONS_CSV)?,
+        false => out.write(EVALUATIONS_CSV, whole.evaluations.as_bytes())?,
+    }
+    out.write(NETWORKS_CSV, whole.networks.as_bytes())
+}
+
+/// The texts of the tables in a folder; nothing of one that is not there.
+pub fn read_texts(folder: &Path) -> Result<FitRows, Failure> {
+    let text = |name| {
+        let path = folder.join(name);
+        if path.exists() { input::read_text(&path) } else { Ok(String::new()) }
+    };
+    Ok(FitRows { networks: text(NETWORKS_CSV)?, evaluations: text(EVALUATIONS_CSV)? })
 }
 
 /// The fits that an earlier run left in a folder.
-pub fn read(out: &TargetFolder, table: &NetworksCsv) -> Result<Checkpoint, Failure> {
-    let path = &out.path().join(NETWORKS_CSV);
-    if !path.exists() {
-        return Ok(Checkpoint::default());
-    }
-    let text = input::read_text(path)?;
-    let checkpoint = table.resume(&text).map_err(|error| {
-        let name = path.display().to_string();
+pub fn read(out: &TargetFolder, tables: &StudyTables) -> Result<Checkpoint, Failure> {
+    let texts = read_texts(out.path())?;
+    let checkpoint = tables.read(&texts).map_err(|error| {
+        let name = out.path().join(error.table().file_name()).display().to_string();
         let complaint = Complaint::new(format!("{name}: {error}"));
         match &error {
             CheckpointError::Heading { .. } => {
                 complaint.help("--overwrite starts anew, --out names another folder")
             }
-            CheckpointError::Row { line, .. } => {
-                let row = text.lines().nth(line - 1).unwrap_or_default();
-                complaint.at_line(&name, *line, row, 0..row.find(',').unwrap_or(row.len()))
-            }
+            CheckpointError::Row { .. } => at_row(complaint, &name, &texts, &error),
         }
     })?;
-    if checkpoint.cut_off {
-        remark!("warning: the last line of {} is cut off; its network is trained again", path.display());
+    for table in &checkpoint.cut_off {
+        let path = out.path().join(table.file_name());
+        remark!("warning: the last line of {} is cut off; its fit is made again", path.display());
+    }
+    if checkpoint.without_evaluation > 0 {
+        remark!(
+            "warning: {} fits of {NETWORKS_CSV} are not in {EVALUATIONS_CSV}; they are made again",
+            format_count(checkpoint.without_evaluation as u64)
+        );
     }
     Ok(checkpoint)
 }
 
-/// Rows of an earlier run with more seeds: they stay in the file, and the results are without them.
-pub fn surplus(earlier: &[FitRow], options: RunOptions) -> Vec<&FitRow> {
-    let surplus: Vec<&FitRow> = earlier.iter().filter(|row| row.seed >= options.seeds).collect();
-    if !surplus.is_empty() {
+/// Adds the place of a row that cannot be read to a complaint about it.
+pub fn at_row(complaint: Complaint, name: &str, texts: &FitRows, error: &CheckpointError) -> Complaint {
+    let CheckpointError::Row { table, line, .. } = error else { return complaint };
+    let text = table.text(texts);
+    let row = text.lines().nth(line - 1).unwrap_or_default();
+    complaint.at_line(name, *line, row, 0..row.find(',').unwrap_or(row.len()))
+}
+
+/// Says that fits of an earlier run with more seeds stay in the tables, and that the results are without them.
+pub fn say_surplus(earlier: &[Trained], options: RunOptions) {
+    let surplus = earlier.iter().filter(|trained| trained.fit.seed >= options.seeds).count();
+    if surplus > 0 {
         remark!(
             "palpate: {} fits of further seeds stay in {NETWORKS_CSV}; the results are of the first {} seeds",
-            format_count(surplus.len() as u64),
+            format_count(surplus as u64),
             options.seeds
         );
     }
-    surplus
-}
-
-/// Replaces the file by one whose rows are in the order of the arms and seeds, whatever the threads did.
-pub fn write_sorted(
-    out: &TargetFolder,
-    table: &NetworksCsv,
-    outcomes: &[ArmOutcome],
-    surplus: &[&FitRow],
-) -> Result<(), Failure> {
-    let mut rows = table.heading();
-    for (arm, outcome) in outcomes.iter().enumerate() {
-        for fit in &outcome.fits {
-            rows.push_str(&table.row(&Trained { arm, fit: fit.clone() }));
-        }
-        surplus.iter().filter(|row| row.arm == arm).for_each(|row| rows.push_str(&row.text));
-    }
-    out.write(NETWORKS_CSV, rows.as_bytes())
-}
-
-/// Patterns that were presented to a network.
-pub fn presentations(prepared: &PreparedStudy, arm: usize, fit: &TrainedSeed) -> u64 {
-    u64::from(fit.locator.training_outcome().unwrap_or_default().epochs) * prepared.patterns(arm) as u64
 }
 
 /// Progress of a run, which every training thread notes its fits in.
 pub struct Tally<'a> {
     prepared: &'a PreparedStudy,
-    table: &'a NetworksCsv<'a>,
+    tables: &'a StudyTables<'a>,
     bar: ProgressBar,
     start: Instant,
     state: Mutex<State>,
 }
 
 struct State {
-    /// `None` where there is no network to go on from.
-    file: Option<CheckpointFile>,
+    files: FitFiles,
     error: Option<std::io::Error>,
     arms: Vec<ArmTally>,
     /// Presentations of this run.
@@ -146,38 +141,40 @@ struct ArmTally {
 }
 
 impl<'a> Tally<'a> {
-    /// Watches a run that has `done` behind it.
+    /// Watches a run of some tasks that has `done` behind it.
     pub fn new(
         prepared: &'a PreparedStudy,
-        options: RunOptions,
-        table: &'a NetworksCsv<'a>,
-        file: Option<CheckpointFile>,
-        done: &[Trained],
+        tables: &'a StudyTables<'a>,
+        files: FitFiles,
+        (tasks, done): (&[Task], &[Trained]),
     ) -> Self {
-        let mut arms: Vec<ArmTally> = (0..prepared.study.arms.len())
-            .map(|arm| ArmTally {
-                patterns: prepared.patterns(arm) as f64,
-                left: options.seeds as f64,
-                ..ArmTally::default()
-            })
-            .collect();
-        for trained in done.iter().filter(|trained| trained.fit.seed < options.seeds) {
-            arms[trained.arm].count(presentations(prepared, trained.arm, &trained.fit) as f64);
+        let arm = |arm| ArmTally { patterns: prepared.patterns(arm) as f64, ..ArmTally::default() };
+        let mut arms: Vec<ArmTally> = (0..prepared.study.arms.len()).map(arm).collect();
+        for task in tasks {
+            // A study's own tasks have its arms.
+            if let Ok(arm) = prepared.arm(&task.arm) {
+                arms[arm].left += task.fits() as f64;
+            }
         }
-        let bar = progress::bar(arms.len() as u64 * options.seeds, "fitting");
+        let bar = progress::bar(tasks.iter().map(Task::fits).sum(), "fitting");
+        let is_wanted = |trained: &&Trained| {
+            let name = &prepared.study.arms[trained.arm].name;
+            tasks.iter().any(|task| task.arm == *name && task.seeds.contains(&trained.fit.seed))
+        };
+        for trained in done.iter().filter(is_wanted) {
+            arms[trained.arm].count(prepared.presentations(trained) as f64);
+        }
         bar.set_position(arms.iter().map(|arm| arm.finished as u64).sum());
-        let state = Mutex::new(State { file, error: None, arms, presented: 0, fitted: 0 });
-        Self { prepared, table, bar, start: Instant::now(), state }
+        let state = Mutex::new(State { files, error: None, arms, presented: 0, fitted: 0 });
+        Self { prepared, tables, bar, start: Instant::now(), state }
     }
 
-    /// A fit is finished: its row goes to the file, and the bar goes on.
+    /// A fit is finished: its rows go to the tables, and the bar goes on.
     pub fn note(&self, trained: &Trained) {
-        let row = self.table.row(trained);
-        let presented = presentations(self.prepared, trained.arm, &trained.fit);
+        let rows = self.tables.rows(trained);
+        let presented = self.prepared.presentations(trained);
         let mut state = self.state();
-        if let Some(file) = &mut state.file
-            && let Err(error) = file.add(&row)
-        {
+        if let Err(error) = state.files.add(&rows) {
             state.error.get_or_insert(error);
         }
         state.presented += presented;
@@ -188,18 +185,18 @@ impl<'a> Tally<'a> {
         self.bar.inc(1);
     }
 
-    /// Whether the file could not be written.
+    /// Whether the tables could not be written.
     pub fn failed(&self) -> bool {
         self.state().error.is_some()
     }
 
-    /// Takes the bar away, and tells how many fits of each arm are finished.
-    pub fn finish(&self) -> Result<Vec<u64>, Failure> {
+    /// Takes the bar away, and tells how many fits are finished.
+    pub fn finish(&self) -> Result<u64, Failure> {
         self.bar.finish_and_clear();
         let mut state = self.state();
         match state.error.take() {
-            Some(error) => Err(Complaint::new(format!("cannot write networks.csv: {error}")).into()),
-            None => Ok(state.arms.iter().map(|arm| arm.finished as u64).collect()),
+            Some(error) => Err(Complaint::new(format!("cannot write the study's tables: {error}")).into()),
+            None => Ok(state.arms.iter().map(|arm| arm.finished as u64).sum()),
         }
     }
 

@@ -1,0 +1,262 @@
+//! A study put together from parts: rows of tasks that ran anywhere, or the tables of shards.
+
+use std::collections::{HashMap, HashSet};
+
+use palpate_numerics::watch::Watch;
+
+use super::run::{ArmOutcome, PreparedStudy, StudyRunError, Trained};
+use super::tables::{CheckpointError, FitRows, StudyTables, TableKind, shard_in};
+use super::task::{Shard, Task};
+
+/// Error of putting a study together.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum AssemblyError {
+    /// A table that is not of this study, or holds a row that it does not write.
+    #[error("{place}: {}: {error}", error.table().file_name())]
+    Table {
+        /// Where the table was found.
+        place: String,
+        /// Why.
+        error: CheckpointError,
+    },
+    /// A table of a whole study.
+    #[error("{place}: {} is of a whole study, not of a shard", TableKind::Networks.file_name())]
+    Whole {
+        /// Where it was found.
+        place: String,
+    },
+    /// Shards of different numbers of shards or of seeds.
+    #[error("{place} is shard {found}, and {first_place} is shard {first}: all must be of one split")]
+    Split {
+        /// Where the second was found.
+        place: String,
+        /// The second, with its seeds.
+        found: String,
+        /// Where the first was found.
+        first_place: String,
+        /// The first, with its seeds.
+        first: String,
+    },
+    /// The same shard in two places.
+    #[error("shard {shard} is there twice: {first_place} and {place}")]
+    TwoOfAShard {
+        /// The shard.
+        shard: String,
+        /// The first place.
+        first_place: String,
+        /// The second place.
+        place: String,
+    },
+    /// A shard that was stopped before its end.
+    #[error("{place}: shard {shard} is not finished: {found} of its {wanted} fits are there")]
+    Unfinished {
+        /// Where it was found.
+        place: String,
+        /// The shard.
+        shard: String,
+        /// Its fits that are there.
+        found: u64,
+        /// All of its fits.
+        wanted: u64,
+    },
+    /// Shards that are not there.
+    #[error("{} of {of} shards {} missing: {}", .missing.len(), if .missing.len() == 1 { "is" } else { "are" }, listed(.missing))]
+    MissingShards {
+        /// Their numbers.
+        missing: Vec<u64>,
+        /// Number of shards.
+        of: u64,
+    },
+    /// The same fit twice.
+    #[error("the fit of arm `{arm}` from seed {seed} is there twice")]
+    TwoOfAFit {
+        /// The arm.
+        arm: String,
+        /// The seed.
+        seed: u64,
+    },
+    /// Fits that are not there.
+    #[error(
+        "{found} of {wanted} fits are there; the first that is missing is of arm `{arm}` from seed {seed}"
+    )]
+    MissingFits {
+        /// Number of the fits that are there.
+        found: usize,
+        /// Number of all fits.
+        wanted: usize,
+        /// Arm of the first that is missing.
+        arm: String,
+        /// Its seed.
+        seed: u64,
+    },
+    /// No part at all.
+    #[error("there are no shards: there must be at least 1")]
+    Nothing,
+}
+
+/// Numbers, of which many are told as the first few.
+fn listed(numbers: &[u64]) -> String {
+    const MOST: usize = 10;
+    let mut shown: Vec<String> = numbers.iter().take(MOST).map(u64::to_string).collect();
+    if numbers.len() > MOST {
+        shown.push("…".to_owned());
+    }
+    shown.join(", ")
+}
+
+/// The tables that a shard left, and where they were found.
+#[derive(Clone, Debug)]
+pub struct ShardTables {
+    /// Name of the place, for messages.
+    pub place: String,
+    /// The whole texts, with their headings.
+    pub texts: FitRows,
+}
+
+/// A study put together from shards.
+#[derive(Clone, Debug)]
+pub struct MergedStudy {
+    /// All fits.
+    pub fits: Vec<Trained>,
+    /// Seeds 0 to this less 1 of every arm.
+    pub seeds: u64,
+}
+
+/// A shard whose tables were read.
+struct ReadShard<'t> {
+    place: &'t str,
+    shard: Shard,
+    seeds: u64,
+    fits: Vec<Trained>,
+}
+
+impl ReadShard<'_> {
+    fn split_in_words(&self) -> String {
+        format!("{} of {} seeds", self.shard, self.seeds)
+    }
+}
+
+impl PreparedStudy {
+    /// Runs a task; rows of its fits, by rising seed. They are the same whatever process runs it and by however many threads.
+    ///
+    /// ```
+    /// use palpate_numerics::watch::Watch;
+    /// use palpate_studies::{FitRows, PreparedStudy, Study, StudyResults, paper};
+    ///
+    /// let quick = paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 20");
+    /// let study = PreparedStudy::new(Study::from_toml(&quick)?, Watch::NONE)?;
+    /// let mut rows = FitRows::default();
+    /// // Each task may run on another machine, in any order.
+    /// for task in study.tasks(2, study.lanes()).iter().rev() {
+    ///     rows.push(&study.run_task(task, 1, Watch::NONE)?);
+    /// }
+    /// let results = StudyResults::new(&study.assemble(2, &rows)?, &study);
+    /// assert_eq!(results.arms.len(), 12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`StudyRunError`], also when `watch` stopped it.
+    pub fn run_task(&self, task: &Task, threads: usize, watch: Watch) -> Result<FitRows, StudyRunError> {
+        let mut fits = self.fit_tasks(std::slice::from_ref(task), &[], threads, &|_| {}, watch)?;
+        fits.sort_by_key(|trained| trained.fit.seed);
+        let tables = StudyTables::new(self);
+        let mut rows = FitRows::default();
+        fits.iter().for_each(|trained| rows.push(&tables.rows(trained)));
+        Ok(rows)
+    }
+
+    /// The outcomes of a study of `seeds` seeds, from the rows of all its tasks, in any order and without headings.
+    ///
+    /// # Errors
+    /// [`AssemblyError`] for rows that are not of this study, and for fits that are missing or there twice.
+    pub fn assemble(&self, seeds: u64, rows: &FitRows) -> Result<Vec<ArmOutcome>, AssemblyError> {
+        let tables = StudyTables::new(self);
+        let mut texts = tables.headings();
+        texts.push(rows);
+        let checkpoint = tables.read(&texts);
+        let checkpoint =
+            checkpoint.map_err(|error| AssemblyError::Table { place: "rows".to_owned(), error })?;
+        self.check_complete(&checkpoint.done, seeds)?;
+        Ok(self.by_arm(checkpoint.done, seeds))
+    }
+
+    /// The fits of a study, from the tables of all its shards.
+    ///
+    /// # Errors
+    /// [`AssemblyError`] for shards of another study or another split, one that is missing, unfinished, or there twice.
+    pub fn merge(&self, shards: &[ShardTables]) -> Result<MergedStudy, AssemblyError> {
+        let read = shards.iter().map(|tables| self.read_shard(tables)).collect::<Result<Vec<_>, _>>()?;
+        let first = read.first().ok_or(AssemblyError::Nothing)?;
+        let (of, seeds) = (first.shard.of(), first.seeds);
+        let mut places: HashMap<u64, &str> = HashMap::new();
+        for shard in &read {
+            if (shard.shard.of(), shard.seeds) != (of, seeds) {
+                return Err(AssemblyError::Split {
+                    place: shard.place.to_owned(),
+                    found: shard.split_in_words(),
+                    first_place: first.place.to_owned(),
+                    first: first.split_in_words(),
+                });
+            }
+            if let Some(first_place) = places.insert(shard.shard.number(), shard.place) {
+                return Err(AssemblyError::TwoOfAShard {
+                    shard: shard.shard.to_string(),
+                    first_place: first_place.to_owned(),
+                    place: shard.place.to_owned(),
+                });
+            }
+        }
+        let missing: Vec<u64> = (1..=of).filter(|number| !places.contains_key(number)).collect();
+        if !missing.is_empty() {
+            return Err(AssemblyError::MissingShards { missing, of });
+        }
+        Ok(MergedStudy { fits: read.into_iter().flat_map(|shard| shard.fits).collect(), seeds })
+    }
+
+    /// The fits of a shard that is finished.
+    fn read_shard<'t>(
+        &self,
+        ShardTables { place, texts }: &'t ShardTables,
+    ) -> Result<ReadShard<'t>, AssemblyError> {
+        let table = |error| AssemblyError::Table { place: place.clone(), error };
+        let Some((shard, seeds)) = shard_in(&texts.networks) else {
+            // What the first line has in place of a shard's comment.
+            StudyTables::new(self).read(texts).map_err(table)?;
+            return Err(AssemblyError::Whole { place: place.clone() });
+        };
+        let tables = StudyTables::of_shard(self, shard, seeds);
+        let fits = tables.read(texts).map_err(table)?.done;
+        let wanted = tables.tasks(seeds).iter().map(Task::fits).sum();
+        let found = fits.len() as u64;
+        if found < wanted {
+            let shard = shard.to_string();
+            return Err(AssemblyError::Unfinished { place: place.clone(), shard, found, wanted });
+        }
+        Ok(ReadShard { place, shard, seeds, fits })
+    }
+
+    /// Checks that every fit of so many seeds is there once.
+    fn check_complete(&self, fits: &[Trained], seeds: u64) -> Result<(), AssemblyError> {
+        let name = |arm: usize| self.study.arms[arm].name.clone();
+        let mut there = HashSet::new();
+        for Trained { arm, fit } in fits.iter().filter(|trained| trained.fit.seed < seeds) {
+            if !there.insert((*arm, fit.seed)) {
+                return Err(AssemblyError::TwoOfAFit { arm: name(*arm), seed: fit.seed });
+            }
+        }
+        let mut all = (0..self.study.arms.len()).flat_map(|arm| (0..seeds).map(move |seed| (arm, seed)));
+        match all.find(|fit| !there.contains(fit)) {
+            None => Ok(()),
+            Some((arm, seed)) => Err(AssemblyError::MissingFits {
+                found: there.len(),
+                wanted: self.study.arms.len() * seeds as usize,
+                arm: name(arm),
+                seed,
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,113 @@
+//! Rows of `evaluations.csv`, one a fit that is no network: what it located, by reading.
+//!
+//! Columns are the arm, the seed, and three of as many values as the fit was judged by readings, in the order of the study's positions with
+//! all readings at one after the other: `estimates_m`, the located positions in metres; `held`, a character a reading, 1 where the 95 % interval
+//! holds the contact, 0 where it does not and - where there is no interval; and `interval_scores_m`, the interval scores in metres, or -.
+//! Floats are written so that they read back to the last bit.
+
+use super::super::run::{PreparedStudy, Trained, TrainedSeed};
+use super::{RowProblem, fit_of, read_cell};
+use palpate_estimators::evaluation::{Evaluation, Located};
+use palpate_estimators::recording::csv_row;
+use palpate_mechanics::contact::Position;
+
+const COLUMNS: [&str; 5] = ["arm", "seed", ESTIMATES, HELD, SCORES];
+const ESTIMATES: &str = "estimates_m";
+const HELD: &str = "held";
+const SCORES: &str = "interval_scores_m";
+/// What stands for a value that is not told.
+const NOT_TOLD: &str = "-";
+
+/// The header.
+pub fn header() -> String {
+    csv_row(COLUMNS)
+}
+
+/// The row of a fit.
+pub fn row(study: &PreparedStudy, Trained { arm, fit }: &Trained) -> String {
+    let located = &fit.evaluation.located;
+    let estimates: Vec<String> = located.iter().map(|at| at.estimate.x_m.to_string()).collect();
+    let held: String = located.iter().map(|at| character(at.covered)).collect();
+    let score =
+        |at: &Located| at.interval_score_m.map_or_else(|| NOT_TOLD.to_owned(), |score| score.to_string());
+    let scores: Vec<String> = located.iter().map(score).collect();
+    let cells = [
+        study.study.arms[*arm].name.clone(),
+        fit.seed.to_string(),
+        estimates.join(" "),
+        held,
+        scores.join(" "),
+    ];
+    csv_row(cells)
+}
+
+fn character(held: Option<bool>) -> char {
+    match held {
+        Some(true) => '1',
+        Some(false) => '0',
+        None => '-',
+    }
+}
+
+/// The fit of a row.
+pub fn read(study: &PreparedStudy, row: &str) -> Result<Trained, RowProblem> {
+    let cells: Vec<&str> = row.split(',').collect();
+    let [arm_name, seed, estimates, held, scores] = cells[..] else {
+        return Err(RowProblem::Cells { found: cells.len(), wanted: COLUMNS.len() });
+    };
+    let (arm, seed) = fit_of(study, arm_name, seed)?;
+    if study.keeps_weights(arm) {
+        return Err(RowProblem::Network { arm: arm_name.to_owned() });
+    }
+    let contacts = study.contacts(arm);
+    let estimates_m = numbers(ESTIMATES, estimates, contacts.len())?;
+    let held = held.chars().map(held_from).collect::<Result<Vec<_>, _>>()?;
+    check_count(HELD, held.len(), contacts.len())?;
+    let scores_m = numbers(SCORES, scores, contacts.len())?;
+    let mut located = Vec::with_capacity(contacts.len());
+    for (i, contact) in contacts.iter().enumerate() {
+        located.push(Located {
+            truth: contact.position,
+            force_n: Some(contact.force_n),
+            estimate: Position::along(estimates_m[i].ok_or_else(|| not_finite(ESTIMATES, NOT_TOLD))?),
+            covered: held[i],
+            interval_score_m: scores_m[i],
+        });
+    }
+    let extent = study.study.arms[arm].rig.setup.surface().extent();
+    let evaluation = Evaluation { extent, located };
+    Ok(Trained { arm, fit: TrainedSeed { seed, training: None, weights: Vec::new(), evaluation } })
+}
+
+/// Finite numbers with blanks between them, as many as there are readings.
+fn numbers(column: &'static str, cell: &str, readings: usize) -> Result<Vec<Option<f64>>, RowProblem> {
+    let number = |value: &str| -> Result<Option<f64>, RowProblem> {
+        if value == NOT_TOLD {
+            return Ok(None);
+        }
+        let number: f64 = read_cell(column, value, FINITE)?;
+        if number.is_finite() { Ok(Some(number)) } else { Err(not_finite(column, value)) }
+    };
+    let numbers = cell.split(' ').map(number).collect::<Result<Vec<_>, _>>()?;
+    check_count(column, numbers.len(), readings)?;
+    Ok(numbers)
+}
+
+const FINITE: &str = "a finite number";
+
+fn not_finite(column: &'static str, value: &str) -> RowProblem {
+    RowProblem::Cell { column, found: super::shortened(value), wanted: FINITE }
+}
+
+fn held_from(character: char) -> Result<Option<bool>, RowProblem> {
+    match character {
+        '1' => Ok(Some(true)),
+        '0' => Ok(Some(false)),
+        '-' => Ok(None),
+        other => Err(RowProblem::Cell { column: HELD, found: other.to_string(), wanted: "1, 0 or -" }),
+    }
+}
+
+fn check_count(column: &'static str, found: usize, wanted: usize) -> Result<(), RowProblem> {
+    if found == wanted { Ok(()) } else { Err(RowProblem::Readings { column, found, wanted }) }
+}
