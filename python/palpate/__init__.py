@@ -58,6 +58,7 @@ from ._palpate import (
     parse_quantity,
 )
 from ._sensors import Columns, Sensors, deflection, raw, reaction, slope, strain
+from ._study import Study, StudyResults
 from ._surfaces import Beam, BeamSection, Digit, Measured, Plate, Support
 from ._tracking import Motion, MovingRecording, Track, TrackedContact, simulate_moving
 from ._training import at, chebyshev, edge_dense, even, grid
@@ -105,6 +106,8 @@ __all__ = [
     "SensorPlacement",
     "Sensors",
     "Setup",
+    "Study",
+    "StudyResults",
     "Support",
     "Track",
     "TrackedContact",

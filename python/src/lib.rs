@@ -23,6 +23,7 @@ mod positions;
 mod quantities;
 mod rig;
 mod sections;
+mod study;
 mod subject;
 mod surface;
 mod tracking;
@@ -51,6 +52,7 @@ mod _palpate {
         positions::{next_press, place_training},
         quantities::parse_quantity,
         rig::Rig,
+        study::{PreparedStudy, paper_study, read_study},
         tracking::{moving_csv, simulate_moving, track},
         training::Training,
     };

@@ -69,6 +69,8 @@ class Bench:
         self.plane_load = pp.UniformLoad(("100 mm", "60 mm"), ("180 mm", "120 mm"), "20 N")
         self.plane_profile = pp.load_profile(self.plane, pp.simulate_loads(self.plane, self.plane_load)[0])
         self.networks = pp.Network(aggregate_error=0.01).of(self.line).fit_many(self.line.simulate(pp.even(10)), range(8))
+        quick = pp.Study("paper").text.replace("max_epochs = 1_000_000", "max_epochs = 200")
+        self.study = pp.Study.from_toml(quick).run(seeds=3, progress=False)
 
 
 @pytest.fixture(scope="module")
@@ -138,6 +140,8 @@ PICTURES = {
     "residuals: line": lambda b, ax: plot.residuals(b.profile, b.line, ax=ax),
     "residuals: plane": lambda b, ax: plot.residuals(b.plane_profile, b.plane, ax=ax),
     "convergence": lambda b, ax: plot.convergence({"eight": b.networks, "one": b.networks[0]}, ax=ax),
+    "study: two arms": lambda b, ax: plot.study(b.study, ["position-10", "middle4-10"], ax=ax),
+    "study: every arm": lambda b, ax: plot.study(b.study, ax=ax),
 }
 # Labels of what is counted, or has no unit.
 WITHOUT_UNIT = {"contacts", "sensors", "sensor", "presses to come", "epochs", "reading", "share of a cell's load"}
@@ -303,6 +307,8 @@ REFUSED = [
     (lambda b: plot.residuals(b.profile, b.one_sensor), "8 channels and the setup has 1"),
     (lambda b: plot.convergence([]), "0 networks"),
     (lambda b: plot.convergence([b.locator]), "not trained by epochs"),
+    (lambda b: plot.study(b.study, "none"), "names 'none'; the study has position-10"),
+    (lambda b: plot.study(b.study, []), "names 0 arms"),
     (lambda b: plot.limit(b.limits["line"], force="maybe"), "'maybe'; it must be \"known\" or \"unknown\""),
 ]
 
@@ -335,6 +341,7 @@ def test_bad_input_is_refused_in_words(draw, words, bench):
         lambda b: plot.load_profile([b.profile]),
         lambda b: plot.load_profile(b.profile, loads=[1]),
         lambda b: plot.convergence([b.line]),
+        lambda b: plot.study(b.line),
     ],
 )
 def test_what_is_of_another_type_is_refused_with_both_types(draw, bench):

@@ -67,6 +67,7 @@ pub mod dead_areas;
 pub mod elliott;
 pub mod paper;
 mod results;
+mod results_file;
 mod run;
 mod tables;
 mod task;
@@ -76,6 +77,7 @@ pub use palpate_rig::{Arm, AskedLayout, Judging, Study};
 pub use results::{
     ArmResults, LimitResults, PortionResults, RunFacts, SensorPlace, SetUp, StudyResults, TrainingSpanResults,
 };
+pub use results_file::ResultsFile;
 pub use run::{ArmOutcome, OnTrained, PreparedStudy, RunOptions, StudyRunError, Trained, TrainedSeed};
 pub use tables::{Checkpoint, CheckpointError, FitRows, RowProblem, StudyTables, TableKind};
 pub use task::{Shard, ShardError, Task};

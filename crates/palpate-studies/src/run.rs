@@ -359,6 +359,25 @@ impl PreparedStudy {
         arms.flat_map(|arm| Task::blocks(&self.study.arms[arm].name, seeds, block)).collect()
     }
 
+    /// The tasks that are left of so many seeds of every arm, where those in `done` are finished: in the order of
+    /// [`PreparedStudy::tasks`], blocks of at most `block` seeds that follow each other.
+    pub fn tasks_left(&self, seeds: u64, block: u64, done: &[Trained]) -> Vec<Task> {
+        let done: HashSet<(usize, u64)> = done.iter().map(|t| (t.arm, t.fit.seed)).collect();
+        let mut left: Vec<Task> = Vec::new();
+        for arm in self.arms_by_cost() {
+            for seed in (0..seeds).filter(|seed| !done.contains(&(arm, *seed))) {
+                let name = &self.study.arms[arm].name;
+                match left.last_mut() {
+                    Some(task) if task.arm == *name && task.seeds.end == seed && task.fits() < block => {
+                        task.seeds.end = seed + 1;
+                    }
+                    _ => left.push(Task { arm: name.clone(), seeds: seed..seed + 1 }),
+                }
+            }
+        }
+        left
+    }
+
     /// Fits every seed of every arm but those in `done`, and answers with all of them. A seed gives the same fit whatever the number of
     /// threads and whatever was done before.
     ///

@@ -24,6 +24,7 @@ from ._estimates import contacts
 from ._limit import force_limit, lightest_touch, limit
 from ._loads import kernel_widths, kernels, load_profile, residuals
 from ._readings import influence, recording
+from ._studies import study
 from ._tracks import speeds, track, track_errors
 from ._training import convergence
 
@@ -53,6 +54,7 @@ __all__ = [
     "setup",
     "shares",
     "speeds",
+    "study",
     "track",
     "track_errors",
     "training_errors",

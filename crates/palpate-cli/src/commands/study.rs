@@ -10,10 +10,10 @@ use palpate_mechanics::units::format_count;
 use palpate_numerics::simd::InstructionSet;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{StudyReport, paper_report, study_report};
-use palpate_studies::paper::{Agreement, Claim, PublishedFigure, STUDY_TOML, claims, published_figures};
+use palpate_studies::paper::{Agreement, PublishedFigure, STUDY_TOML, claims, published_figures};
 use palpate_studies::{
-    ArmResults, Checkpoint, PreparedStudy, RunFacts, RunOptions, Shard, Study, StudyResults, StudyRunError,
-    StudyTables, Task, Trained,
+    ArmResults, Checkpoint, PreparedStudy, ResultsFile, RunFacts, RunOptions, Shard, Study, StudyResults,
+    StudyRunError, StudyTables, Task, Trained,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -105,19 +105,6 @@ impl Arguments {
         }
         Ok(folder)
     }
-}
-
-/// Content of `results.json`.
-#[derive(serde::Serialize)]
-struct ResultsFile<'a> {
-    #[serde(flatten)]
-    run: &'a RunFacts,
-    #[serde(flatten)]
-    results: &'a StudyResults,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    published: Option<Vec<PublishedFigure>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    claims: Option<Vec<Claim>>,
 }
 
 /// A study as it was asked for.

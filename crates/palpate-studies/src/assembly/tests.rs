@@ -305,3 +305,18 @@ fn a_task_of_an_unknown_arm_is_refused() {
         "the study has no arm `nobody`; it has lanes, more, noisy, influence, centroid"
     );
 }
+
+#[test]
+fn what_is_finished_is_left_out_of_the_tasks() {
+    let study = prepare(SMALL);
+    let lanes = study.lanes();
+    assert_eq!(study.tasks_left(SEEDS, lanes, &[]), study.tasks(SEEDS, lanes));
+    let task = Task { arm: "noisy".to_owned(), seeds: 3..5 };
+    let done = study.fit_tasks(&[task], &[], 1, &|_| {}, Watch::NONE).unwrap();
+    let left = study.tasks_left(SEEDS, 4, &done);
+    let of_noisy: Vec<_> = left.iter().filter(|task| task.arm == "noisy").map(|t| t.seeds.clone()).collect();
+    assert_eq!(of_noisy, [0..3, 5..9, 9..11]);
+    assert_eq!(left.iter().map(Task::fits).sum::<u64>(), SEEDS * ARMS as u64 - 2);
+    let all = study.fit_tasks(&study.tasks(1, 1), &[], 1, &|_| {}, Watch::NONE).unwrap();
+    assert_eq!(study.tasks_left(1, 8, &all), []);
+}

@@ -1,0 +1,23 @@
+//! The file `results.json`, as every run of a study writes it.
+
+use serde::Serialize;
+
+use super::paper::{Claim, PublishedFigure};
+use super::results::{RunFacts, StudyResults};
+
+/// Content of `results.json`: results with the facts of their run, and of the founding paper's study how they compare with it.
+#[derive(Clone, Debug, Serialize)]
+pub struct ResultsFile<'a> {
+    /// Facts of the run.
+    #[serde(flatten)]
+    pub run: &'a RunFacts,
+    /// Results.
+    #[serde(flatten)]
+    pub results: &'a StudyResults,
+    /// The paper's figures beside those of the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub published: Option<Vec<PublishedFigure>>,
+    /// The paper's claims.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub claims: Option<Vec<Claim>>,
+}
