@@ -26,6 +26,7 @@ mod sections;
 mod study;
 mod subject;
 mod surface;
+mod tare;
 mod tracking;
 mod training;
 mod values;

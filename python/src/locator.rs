@@ -5,14 +5,15 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use palpate::estimators::arrangement::all_over;
-use palpate::estimators::batch::{BatchError, BatchOptions};
+use palpate::estimators::batch::{BLOCK, BatchError, BatchOptions};
 use palpate::estimators::estimator;
 use palpate::estimators::evaluation;
 use palpate::estimators::setup;
 use palpate::estimators::simulate::simulate_at;
+use palpate::numerics::watch::Watch;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict};
+use pyo3::types::{PyBool, PyBytes, PyDict};
 
 use crate::arrays::{self, Readings};
 use crate::bench::{Recording, Setup};
@@ -21,6 +22,7 @@ use crate::estimates::{Estimate, Estimates, Table};
 use crate::evaluation::{About, Evaluation};
 use crate::files::write_whole;
 use crate::influence;
+use crate::tare;
 use crate::work;
 
 /// A locator: a fitted method with its setup, so that nothing it needs is outside it.
@@ -40,9 +42,6 @@ impl Locator {
         Self { inner, setup, channels, choice }
     }
 }
-
-/// Readings that are located between two looks for Ctrl-C.
-const CHUNK: usize = 8192;
 
 #[pymethods]
 impl Locator {
@@ -86,6 +85,34 @@ impl Locator {
                 Ok(Bound::new(py, Estimates::new(py, table, extent)?)?.into_any())
             }
         }
+    }
+
+    /// Bring readings of a surface whose offsets have moved since its calibration to what calibration learnt.
+    ///
+    /// Parameters
+    /// ----------
+    /// readings : array_like
+    ///     One reading of the shape (channels), or many of the shape (readings, channels), in SI units or raw, in the order of time.
+    /// untouched : array_like, optional
+    ///     Readings of the untouched surface, whose mean is what the channels read today: ``readings[:50]``. Where nothing is said, untouched
+    ///     readings are found among `readings` and their drift is followed.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64
+    ///     As many readings, for `locate`, `track` and `Setup.recording`.
+    ///
+    /// Raises
+    /// ------
+    /// PalpateError
+    ///     Where calibration does not tell what the surface reads untouched.
+    #[pyo3(signature = (readings, *, untouched=None))]
+    fn tare<'py>(
+        &self,
+        readings: &Bound<'py, PyAny>,
+        untouched: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        tare::tare(&self.inner, &self.channels, readings, untouched)
     }
 
     /// Judge the locator: locate the contacts of a recording, and hold the estimates beside where they were.
@@ -350,27 +377,29 @@ impl Locator {
 }
 
 impl Locator {
-    /// Estimates of many readings, one after the other, [`CHUNK`] by [`CHUNK`].
+    /// Estimates of many readings, one after the other; Ctrl-C is heeded between their blocks.
     fn locate_many(&self, py: Python<'_>, readings: &[f64], threads: NonZeroUsize) -> PyResult<Table> {
         let (channels, extent) = (self.channels.len(), self.setup.surface().extent());
         let table = Mutex::new(Table::new(readings.len() / channels, extent));
-        let options = BatchOptions { threads, ..BatchOptions::default() };
-        for (k, chunk) in readings.chunks(CHUNK * channels).enumerate() {
-            let take = |first: usize, estimates: &[estimator::Estimate]| {
-                let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
-                for (i, estimate) in estimates.iter().enumerate() {
-                    table.set(k * CHUNK + first + i, estimate);
-                }
-            };
-            py.detach(|| self.inner.locate_blocks(chunk, options, &take)).map_err(|error| match error {
-                // Rows are counted from 0, as in the array.
-                BatchError::Reading { row, error } => {
-                    refused(format!("readings[{}]: {error}", k * CHUNK + row - 1))
-                }
-                error => refused(error),
-            })?;
-            py.check_signals()?;
-        }
+        let take = |first: usize, estimates: &[estimator::Estimate]| {
+            let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
+            for (i, estimate) in estimates.iter().enumerate() {
+                table.set(first + i, estimate);
+            }
+        };
+        let locate =
+            |watch: Watch<'_>| self.inner.locate_blocks(readings, BatchOptions { threads, watch }, &take);
+        let located = if readings.len() <= BLOCK * channels {
+            // Nobody waits long for one block, and a thread of its own would take longer than many of them.
+            py.detach(|| locate(Watch::NONE))
+        } else {
+            work::run_with(py, Some(PyBool::new(py, false).as_any()), None, locate)?
+        };
+        located.map_err(|error| match error {
+            // Rows are counted from 0, as in the array.
+            BatchError::Reading { row, error } => refused(format!("readings[{}]: {error}", row - 1)),
+            error => refused(error),
+        })?;
         Ok(table.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 }

@@ -188,3 +188,30 @@ def test_many_seeds_are_those_of_single_fits(beam):
     alone = network.fit(presses, seed=9)
     assert np.allclose(many[2].locate(presses.readings).x, alone.locate(presses.readings).x, rtol=1e-12)
     assert many[2].training == alone.training and network.fit_many(presses, []) == []
+
+
+def test_a_moved_baseline_is_tared(locator, presses):
+    moved = np.linspace(-50e-6, 80e-6, 8)
+    untouched = np.random.default_rng(5).normal(0.0, 5e-6, (50, 8)) + moved
+    touched = presses.readings + moved
+    middle = np.abs(presses.x - 0.2) < 0.1
+
+    def error(readings):
+        return np.abs(locator.locate(readings).x - presses.x)[middle].mean()
+
+    tared = locator.tare(touched, untouched=untouched)
+    assert error(tared) < 1.2 * error(presses.readings) and error(touched) > 5 * error(tared)
+    assert np.array_equal(locator.tare(touched[7], untouched=untouched), tared[7])
+    # Found by itself: the first readings are of the untouched board.
+    followed = locator.tare(np.vstack([untouched, touched]))
+    assert followed.shape == (150, 8)
+    assert error(followed[50:]) < 1.5 * error(presses.readings)
+
+
+def test_a_tare_that_cannot_be_had_is_refused(locator, presses):
+    with pytest.raises(pp.PalpateError, match="`untouched` has 0 readings; it must have at least 1"):
+        locator.tare(presses.readings, untouched=np.empty((0, 8)))
+    with pytest.raises(pp.PalpateError, match="have 3 channels"):
+        locator.tare(presses.readings, untouched=np.zeros(3))
+    with pytest.raises(pp.PalpateError, match="untouched: "):
+        locator.tare(presses.readings, untouched=np.full(8, np.nan))

@@ -72,6 +72,27 @@ def test_cross_validation_gives_the_command_s_numbers(tmp_path, command, example
         assert np.isclose(np.median(errors_mm), theirs["median"], rtol=1e-9)
 
 
+def test_real_recordings_give_the_command_s_numbers(tmp_path, command, examples, data):
+    rig = pp.Rig.load(examples / "fsi-water.toml")
+    path = data / "tactile-fsi" / "1d-water-1.5mm.csv"
+    presses = rig.setup.read_csv(path)
+    known = {"force": presses.force, "nuisance": presses.nuisance}
+    head, tail = rig.text[: rig.text.index("[estimator]")], rig.text[rig.text.index("[recording]") :]
+    for regressor in (InfluenceRegressor(setup=rig.setup), NeighboursRegressor(setup=rig.setup)):
+        (tmp_path / "rig.toml").write_text(f'{head}[estimator]\nkind = "{regressor._estimator()._kind}"\n{tail}')
+        judged = command("evaluate", tmp_path / "rig.toml", "--data", path, "--json")
+        theirs = json.loads(judged)["errors"][0]["error_mm"]
+        found = cross_val_predict(regressor, presses.readings, presses.x, cv=PositionKFold(5), params=known)
+        scores = cross_val_score(
+            regressor, presses.readings, presses.x, cv=PositionKFold(5), params=known, scoring="neg_mean_absolute_error"
+        )
+        errors_mm = 1e3 * np.abs(found - presses.x)
+        assert np.isclose(errors_mm.mean(), theirs["mean"], rtol=1e-9)
+        assert np.isclose(np.median(errors_mm), theirs["median"], rtol=1e-9)
+        held_out = [len(rows) for _, rows in PositionKFold(5).split(presses.readings, presses.x)]
+        assert np.isclose(-1e3 * np.average(scores, weights=held_out), theirs["mean"], rtol=1e-9)
+
+
 def test_folds_are_palpate_s_own(board):
     ours = list(PositionKFold(5).split(board.readings, board.x))
     for (fit, held_out), (their_fit, their_held_out) in zip(ours, board.folds(5)):

@@ -114,7 +114,7 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         positions : ndarray of float64
             Of the shape (readings), or (readings, 2) on a plane.
         std : ndarray of float64
-            Standard deviations of the positions, of the same shape: a quarter of the 95 % interval's width, NaN where the method tells none.
+            Standard deviations of the positions, of the same shape: the 95 % interval's width over 3.92, NaN where the method tells none.
         """
         estimates = self.locate(X)
         positions = self._in_frame(estimates.x, estimates.y)
