@@ -55,6 +55,7 @@ def study(results: StudyResults, arms: str | Sequence[str] | None = None, *, ax:
             canvas.band(x, error[:, 1], error[:, 2], index)
         canvas.line(x, error[:, 0], index, name)
         medians.append(error[:, 0])
+    canvas.ax.margins(x=0)
     canvas.scale_by(np.concatenate(medians))
     canvas.labels("contact position, mm", "error, mm")
     canvas.legend()
