@@ -149,61 +149,69 @@ fn contact_dict<'py>(
     Ok(dict)
 }
 
-/// Columns of estimates, a row for each reading.
-pub struct Table {
-    x_m: Vec<f64>,
-    y_m: Vec<f64>,
-    force_n: Vec<f64>,
-    x_95_m: Vec<[f64; 2]>,
-    y_95_m: Vec<[f64; 2]>,
+/// Rows of estimates that are yet to be said, in the columns' memory.
+pub struct Rows<'a> {
+    x_m: &'a mut [f64],
+    y_m: &'a mut [f64],
+    force_n: &'a mut [f64],
+    x_95_m: &'a mut [f64],
+    y_95_m: &'a mut [f64],
+    covariance: &'a mut [f64],
+    status: &'a mut [u8],
+    /// Empty while no row has one.
     force_95_n: Vec<[f64; 2]>,
-    covariance: Vec<[f64; 6]>,
-    status: Vec<u8>,
     /// What few rows have, by row: modes and further contacts.
     several: Vec<(usize, estimator::Estimate)>,
 }
 
+/// Entries of a covariance that there are on a line: xx, xf, ff.
+const ON_LINE: [usize; 3] = [0, 2, 5];
+
 /// What is not known, in a column.
 const UNKNOWN: f64 = f64::NAN;
 
-impl Table {
-    /// Columns of so many rows, in which nothing is known yet.
-    pub fn new(rows: usize, extent: Extent) -> Self {
-        let across = extent.width_m().map_or(0, |_| rows);
-        Self {
-            x_m: vec![UNKNOWN; rows],
-            y_m: vec![UNKNOWN; across],
-            force_n: vec![UNKNOWN; rows],
-            x_95_m: vec![[UNKNOWN; 2]; rows],
-            y_95_m: vec![[UNKNOWN; 2]; across],
-            force_95_n: vec![[UNKNOWN; 2]; rows],
-            covariance: vec![[UNKNOWN; 6]; rows],
-            status: vec![0; rows],
-            several: Vec::new(),
-        }
-    }
+/// What is not known of a contact without uncertainty.
+const NO_UNCERTAINTY: Uncertainty = Uncertainty {
+    covariance: [UNKNOWN; 6],
+    x_95_m: (UNKNOWN, UNKNOWN),
+    y_95_m: (UNKNOWN, UNKNOWN),
+    force_95_n: None,
+};
 
+impl Rows<'_> {
     /// Says a row.
     pub fn set(&mut self, row: usize, estimate: &estimator::Estimate) {
         let contact = &estimate.contact;
+        let uncertainty = contact.uncertainty.as_ref().unwrap_or(&NO_UNCERTAINTY);
+        let pair = 2 * row..2 * row + 2;
         self.x_m[row] = contact.position.x_m;
         self.force_n[row] = contact.force_n.unwrap_or(UNKNOWN);
+        self.x_95_m[pair.clone()].copy_from_slice(&<[f64; 2]>::from(uncertainty.x_95_m));
+        let all = &uncertainty.covariance;
+        match self.covariance.as_chunks_mut() {
+            (rows, []) if self.y_m.is_empty() => rows[row] = ON_LINE.map(|i| all[i]),
+            _ => self.covariance[6 * row..6 * row + 6].copy_from_slice(all),
+        }
         self.status[row] = code(estimate.status);
         if let Some(y_m) = self.y_m.get_mut(row) {
             *y_m = contact.position.y_m;
+            self.y_95_m[pair].copy_from_slice(&<[f64; 2]>::from(uncertainty.y_95_m));
         }
-        if let Some(uncertainty) = &contact.uncertainty {
-            self.x_95_m[row] = uncertainty.x_95_m.into();
-            self.covariance[row] = uncertainty.covariance;
-            self.force_95_n[row] = uncertainty.force_95_n.map_or([UNKNOWN; 2], Into::into);
-            if let Some(y_95_m) = self.y_95_m.get_mut(row) {
-                *y_95_m = uncertainty.y_95_m.into();
-            }
+        if let Some(ends_n) = uncertainty.force_95_n {
+            self.force_95_n.resize(self.x_m.len(), [UNKNOWN; 2]);
+            self.force_95_n[row] = ends_n.into();
         }
         if !estimate.modes.as_slice().is_empty() || !estimate.further.as_slice().is_empty() {
             self.several.push((row, *estimate));
         }
     }
+}
+
+/// The six entries of a covariance on a line; of what is not known none is.
+fn whole(on_line: [f64; 3]) -> [f64; 6] {
+    let mut all = [if on_line[0].is_nan() { UNKNOWN } else { 0.0 }; 6];
+    ON_LINE.into_iter().zip(on_line).for_each(|(i, entry)| all[i] = entry);
+    all
 }
 
 /// Estimates of many readings, as columns.
@@ -227,6 +235,7 @@ pub struct Estimates {
     x_95: Py<PyArray2<f64>>,
     y_95: Option<Py<PyArray2<f64>>>,
     force_95: Py<PyArray2<f64>>,
+    /// All six entries on a plane, those of [`ON_LINE`] on a line.
     covariance: Py<PyArray2<f64>>,
     status: Py<PyArray1<u8>>,
     several: Vec<(usize, estimator::Estimate)>,
@@ -234,25 +243,53 @@ pub struct Estimates {
 }
 
 impl Estimates {
-    /// The estimates of a table, whose memory becomes the arrays'.
-    pub fn new(py: Python<'_>, table: Table, extent: Extent) -> PyResult<Self> {
-        let Table { x_m, y_m, force_n, x_95_m, y_95_m, force_95_n, covariance, status, mut several } = table;
-        several.sort_by_key(|(row, _)| *row);
-        let column = |values: Vec<f64>| PyArray1::from_vec(py, values).unbind();
-        fn rows<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Py<PyArray2<f64>>> {
-            let shape = [rows.len(), N];
-            Ok(PyArray1::from_vec(py, rows.into_flattened()).reshape(shape)?.unbind())
-        }
+    /// Estimates of so many readings, each of which `say` says.
+    ///
+    /// The columns are NumPy's memory: of large pages, which take half as long to be written for the first time.
+    pub fn said(
+        py: Python<'_>,
+        rows: usize,
+        extent: Extent,
+        say: impl FnOnce(Rows<'_>) -> PyResult<Rows<'_>>,
+    ) -> PyResult<Self> {
+        let empty = |shape: &[usize]| py.import("numpy")?.call_method1("empty", (shape.to_vec(),));
+        let column = || Ok::<_, PyErr>(empty(&[rows])?.cast_into::<PyArray1<f64>>()?);
+        let table = |width: usize| Ok::<_, PyErr>(empty(&[rows, width])?.cast_into::<PyArray2<f64>>()?);
         let plane = extent.width_m().is_some();
+        let (x, force, x_95, covariance) =
+            (column()?, column()?, table(2)?, table(if plane { 6 } else { ON_LINE.len() })?);
+        let (y, y_95) = (plane.then(column).transpose()?, plane.then(|| table(2)).transpose()?);
+        let status = PyArray1::<u8>::zeros(py, rows, false);
+        let (force_95_n, mut several) = {
+            let (mut y, mut y_95) = (y.as_ref().map(|y| y.readwrite()), y_95.as_ref().map(|y| y.readwrite()));
+            say(Rows {
+                x_m: x.readwrite().as_slice_mut()?,
+                y_m: y.as_mut().map_or(Ok(&mut [][..]), |y| y.as_slice_mut())?,
+                force_n: force.readwrite().as_slice_mut()?,
+                x_95_m: x_95.readwrite().as_slice_mut()?,
+                y_95_m: y_95.as_mut().map_or(Ok(&mut [][..]), |y| y.as_slice_mut())?,
+                covariance: covariance.readwrite().as_slice_mut()?,
+                status: status.readwrite().as_slice_mut()?,
+                force_95_n: Vec::new(),
+                several: Vec::new(),
+            })
+            .map(|said| (said.force_95_n, said.several))?
+        };
+        several.sort_by_key(|(row, _)| *row);
+        let force_95 = match force_95_n.is_empty() {
+            // One number for all rows, which takes no memory.
+            true => py.import("numpy")?.call_method1("broadcast_to", (UNKNOWN, (rows, 2)))?.cast_into()?,
+            false => PyArray1::from_vec(py, force_95_n.into_flattened()).reshape([rows, 2])?,
+        };
         Ok(Self {
-            x: column(x_m),
-            y: plane.then(|| column(y_m)),
-            force: column(force_n),
-            x_95: rows(py, x_95_m)?,
-            y_95: if plane { Some(rows(py, y_95_m)?) } else { None },
-            force_95: rows(py, force_95_n)?,
-            covariance: rows(py, covariance)?,
-            status: PyArray1::from_vec(py, status).unbind(),
+            x: x.unbind(),
+            y: y.map(Bound::unbind),
+            force: force.unbind(),
+            x_95: x_95.unbind(),
+            y_95: y_95.map(Bound::unbind),
+            force_95: force_95.unbind(),
+            covariance: covariance.unbind(),
+            status: status.unbind(),
             several,
             extent,
         })
@@ -299,8 +336,14 @@ impl Estimates {
 
     /// Covariances of (x, y, force), in m², m·N and N², as upper triangles xx, xy, xf, yy, yf, ff: of the shape (readings, 6).
     #[getter]
-    fn covariance(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
-        self.covariance.clone_ref(py)
+    fn covariance(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f64>>> {
+        if self.y.is_some() {
+            return Ok(self.covariance.clone_ref(py));
+        }
+        let told = self.covariance.bind(py).readonly();
+        let rows: Vec<[f64; 6]> =
+            told.as_array().outer_iter().map(|row| whole([row[0], row[1], row[2]])).collect();
+        Ok(PyArray1::from_vec(py, rows.into_flattened()).reshape([told.as_array().nrows(), 6])?.unbind())
     }
 
     /// Statuses: of the shape (readings).
@@ -455,7 +498,7 @@ impl Estimates {
             self.x_95(py),
             self.y_95(py),
             self.force_95(py),
-            self.covariance(py),
+            self.covariance.clone_ref(py),
             status,
         )
     }
@@ -472,7 +515,10 @@ impl Estimates {
             (row[[at, 0]], row[[at, 1]])
         };
         let covariance = self.covariance.bind(py).readonly();
-        let covariance = std::array::from_fn(|i| covariance.as_array()[[at, i]]);
+        let covariance = match self.y {
+            Some(_) => std::array::from_fn(|i| covariance.as_array()[[at, i]]),
+            None => whole(std::array::from_fn(|i| covariance.as_array()[[at, i]])),
+        };
         let force_n = Some(number(&self.force)).filter(|force_n| !force_n.is_nan());
         let force_95_n = Some(ends(&self.force_95)).filter(|(low_n, _)| !low_n.is_nan());
         let y_95_m = self.y_95.as_ref().map_or((0.0, 0.0), ends);

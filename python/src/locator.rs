@@ -18,7 +18,7 @@ use pyo3::types::{PyBool, PyBytes, PyDict};
 use crate::arrays::{self, Readings};
 use crate::bench::{Recording, Setup};
 use crate::errors::{io_error, of_locator, refused};
-use crate::estimates::{Estimate, Estimates, Table};
+use crate::estimates::{Estimate, Estimates};
 use crate::evaluation::{About, Evaluation};
 use crate::files::write_whole;
 use crate::influence;
@@ -81,8 +81,8 @@ impl Locator {
                 Ok(Bound::new(py, Estimate::new(estimate, extent))?.into_any())
             }
             Readings::Many(readings) => {
-                let table = self.locate_many(py, readings.as_slice()?, threads)?;
-                Ok(Bound::new(py, Estimates::new(py, table, extent)?)?.into_any())
+                let estimates = self.locate_many(py, readings.as_slice()?, threads)?;
+                Ok(Bound::new(py, estimates)?.into_any())
             }
         }
     }
@@ -378,28 +378,30 @@ impl Locator {
 
 impl Locator {
     /// Estimates of many readings, one after the other; Ctrl-C is heeded between their blocks.
-    fn locate_many(&self, py: Python<'_>, readings: &[f64], threads: NonZeroUsize) -> PyResult<Table> {
+    fn locate_many(&self, py: Python<'_>, readings: &[f64], threads: NonZeroUsize) -> PyResult<Estimates> {
         let (channels, extent) = (self.channels.len(), self.setup.surface().extent());
-        let table = Mutex::new(Table::new(readings.len() / channels, extent));
-        let take = |first: usize, estimates: &[estimator::Estimate]| {
-            let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
-            for (i, estimate) in estimates.iter().enumerate() {
-                table.set(first + i, estimate);
-            }
-        };
-        let locate =
-            |watch: Watch<'_>| self.inner.locate_blocks(readings, BatchOptions { threads, watch }, &take);
-        let located = if readings.len() <= BLOCK * channels {
-            // Nobody waits long for one block, and a thread of its own would take longer than many of them.
-            py.detach(|| locate(Watch::NONE))
-        } else {
-            work::run_with(py, Some(PyBool::new(py, false).as_any()), None, locate)?
-        };
-        located.map_err(|error| match error {
-            // Rows are counted from 0, as in the array.
-            BatchError::Reading { row, error } => refused(format!("readings[{}]: {error}", row - 1)),
-            error => refused(error),
-        })?;
-        Ok(table.into_inner().unwrap_or_else(PoisonError::into_inner))
+        Estimates::said(py, readings.len() / channels, extent, |rows| {
+            let rows = Mutex::new(rows);
+            let take = |first: usize, estimates: &[estimator::Estimate]| {
+                let mut rows = rows.lock().unwrap_or_else(PoisonError::into_inner);
+                for (i, estimate) in estimates.iter().enumerate() {
+                    rows.set(first + i, estimate);
+                }
+            };
+            let locate =
+                |watch: Watch<'_>| self.inner.locate_blocks(readings, BatchOptions { threads, watch }, &take);
+            let located = if readings.len() <= BLOCK * channels {
+                // Nobody waits long for one block, and a thread of its own would take longer than many of them.
+                py.detach(|| locate(Watch::NONE))
+            } else {
+                work::run_with(py, Some(PyBool::new(py, false).as_any()), None, locate)?
+            };
+            located.map_err(|error| match error {
+                // Rows are counted from 0, as in the array.
+                BatchError::Reading { row, error } => refused(format!("readings[{}]: {error}", row - 1)),
+                error => refused(error),
+            })?;
+            Ok(rows.into_inner().unwrap_or_else(PoisonError::into_inner))
+        })
     }
 }

@@ -19,7 +19,7 @@ use serde_json::json;
 use crate::arrays::{self, Readings};
 use crate::bench::{Recording, Setup};
 use crate::errors::{of_rig, of_work, refused};
-use crate::estimates::{Estimates, Table};
+use crate::estimates::Estimates;
 use crate::locator::Locator;
 use crate::quantities::{force_n, frequency_hz};
 use crate::rig::Rig;
@@ -283,9 +283,11 @@ fn track_fields<'py>(
     fields.set("first", contact(0)?)?;
     let several = tracks.iter().any(|track| track.contacts.len() > 1);
     fields.set("second", if several { Some(contact(1)?) } else { None })?;
-    let mut table = Table::new(tracks.len(), extent);
-    tracks.iter().enumerate().for_each(|(row, track)| table.set(row, &track.single));
-    fields.set("single", Py::new(py, Estimates::new(py, table, extent)?)?)?;
+    let single = Estimates::said(py, tracks.len(), extent, |mut rows| {
+        tracks.iter().enumerate().for_each(|(row, track)| rows.set(row, &track.single));
+        Ok(rows)
+    })?;
+    fields.set("single", Py::new(py, single)?)?;
     Ok(fields)
 }
 
