@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 from pathlib import Path
 from typing import NoReturn
@@ -20,6 +21,14 @@ def missing(what: str) -> NoReturn:
     if os.environ.get("PALPATE_STRICT"):
         pytest.fail(what)
     pytest.skip(what)
+
+
+@pytest.fixture
+def heeds_ctrl_c():
+    """Ctrl-C as KeyboardInterrupt, also where the tests run in a shell's background, in which it is ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="session")

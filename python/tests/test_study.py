@@ -174,7 +174,7 @@ def test_an_executor_that_breaks_leaves_what_is_finished(long_study, long_whole,
     same(long_study.run(SEEDS, folder=tmp_path, resume=True), long_whole)
 
 
-def test_ctrl_c_keeps_what_is_finished(long_study, long_whole, tmp_path):
+def test_ctrl_c_keeps_what_is_finished(long_study, long_whole, tmp_path, heeds_ctrl_c):
     table = tmp_path / "networks.csv"
 
     def interrupt():

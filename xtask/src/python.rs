@@ -152,6 +152,8 @@ impl Environment {
             "../pyproject.toml",
             "-q",
             "--durations=10",
+            // A worker a core: checks of types and most fits have one thread.
+            "--numprocesses=auto",
             "-p",
             "no:cacheprovider",
         ]);
