@@ -104,7 +104,7 @@ fn noise_by_place_is_found_and_intervals_follow_it() {
         if benches(0) == 0 { &[(120, 30)] } else { &[(25, 9), (60, 15), (120, 30)] };
     for (presses, places) in sizes.iter().copied() {
         for (name, noise, differs) in cases {
-            let count = benches(2);
+            let count = benches(3);
             let strip = |seed| Bench::strip(seed, presses, places);
             let halves = halves_with_and_without(count, strip, 0.5 * STRIP_M, noise);
             let what = format!("strip, {presses} presses at {places} places, {name}");

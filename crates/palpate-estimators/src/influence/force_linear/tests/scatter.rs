@@ -30,10 +30,7 @@ fn scattered_presses_are_weighed_by_their_scatter() {
         Wrong { force: 0.0, position_m: 1e-3 },
         Wrong { force: 0.03, position_m: 1e-3 },
     ];
-    // Of many presses a fit takes seconds; they are for docs/measured.md.
-    let sizes: &[(usize, usize)] =
-        if benches(0) == 0 { &[(25, 9), (60, 15)] } else { &[(25, 9), (60, 15), (120, 30)] };
-    for (presses, places) in sizes.iter().copied() {
+    for (presses, places) in [(25, 9), (60, 15), (120, 30)] {
         for wrong in CASES {
             let mut comparison = Comparison::default();
             for seed in 0..benches(2) {
