@@ -7,7 +7,9 @@ import json
 import math
 import os
 import socket
+import threading
 import time
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
@@ -158,17 +160,16 @@ class Study:
         prepared = _prepared(self._source, self.text)
         block = _count("block", _block(seeds, prepared.lanes) if block is None else block)
         tables = _Tables(prepared, folder, resume=resume, overwrite=overwrite)
-        tasks = prepared.tasks_left(seeds, block, tables.texts())
         start = time.perf_counter()
         with tables:
             if executor is None:
+                tasks = prepared.tasks_left(seeds, block, tables.texts())
                 prepared.fit(tasks, threads=threads, on_fit=tables.add, progress=progress)
                 workers = 1
             else:
                 workers = _Run(self, seeds, block, threads, tables).on(executor, progress)
         facts: dict[str, Any] = {
             "threads": threads * workers,
-            "arithmetic": prepared.arithmetic,
             "presentations": tables.presentations,
             "seconds": time.perf_counter() - start,
         }
@@ -196,16 +197,7 @@ class Study:
         """
         prepared = _prepared(self._source, self.text)
         paths = [Path(folder) for folder in folders]
-        shards = [(str(path), *_read_tables(path)) for path in paths]
-        facts = [_shard_facts(path) for path in paths]
-        seeds, networks, evaluations = prepared.merge(shards)
-        joined: dict[str, Any] = {
-            "threads": max(fact["threads"] for fact in facts),
-            "arithmetic": "; ".join(sorted({fact["arithmetic"] for fact in facts})),
-            "presentations": sum(fact["presentations"] for fact in facts),
-            "seconds": sum(fact["seconds"] for fact in facts),
-        }
-        return StudyResults(**prepared.results(seeds, (networks, evaluations), **joined))
+        return StudyResults(**prepared.merge([(str(path), *_read_tables(path), _read_facts(path)) for path in paths]))
 
     def __repr__(self) -> str:
         return f"<Study: {self.name}, {len(self.arms)} arms, {self.seeds} seeds>"
@@ -415,6 +407,7 @@ class _Tables:
         self.presentations = self.fits = 0
         self._networks, self._evaluations = ([text] for text in prepared.headings())
         self._files: list[IO[str]] = []
+        self._lock = threading.Lock()
         if self.folder is None:
             if resume or overwrite:
                 raise PalpateError("`folder` is None; `resume` and `overwrite` say what becomes of an earlier run in a folder")
@@ -427,8 +420,13 @@ class _Tables:
                 f"{self.folder / found} is of an earlier run; resume=True goes on from what is finished, overwrite=True throws it away"
             )
         if resume:
-            networks, evaluations, _ = prepared.whole(_read_tables(self.folder))
+            (networks, evaluations), cut_off, without_evaluation = prepared.whole(_read_tables(self.folder))
             self._networks, self._evaluations = [networks], [evaluations]
+            for name in cut_off:
+                warnings.warn(f"the last line of {self.folder / name} is cut off; its fit is made again", stacklevel=3)
+            if without_evaluation:
+                words = f"{without_evaluation} fits of {_NETWORKS} are not in {_EVALUATIONS}; they are made again"
+                warnings.warn(words, stacklevel=3)
 
     def __enter__(self) -> _Tables:
         if self.folder is not None:
@@ -447,15 +445,16 @@ class _Tables:
         self._files = []
 
     def add(self, networks: str, evaluations: str, presentations: int) -> None:
-        """Adds the rows of a fit, which is finished with the one of ``networks.csv``."""
+        """Adds the rows of a fit, which is finished with the one of ``networks.csv``; from any thread."""
         rows = [evaluations, networks] if len(self._files) == 2 else [networks]
-        for file, row in zip(self._files, rows):
-            file.write(row)
-            file.flush()
-        self._networks.append(networks)
-        self._evaluations.append(evaluations)
-        self.presentations += presentations
-        self.fits += 1
+        with self._lock:
+            for file, row in zip(self._files, rows):
+                file.write(row)
+                file.flush()
+            self._networks.append(networks)
+            self._evaluations.append(evaluations)
+            self.presentations += presentations
+            self.fits += 1
 
     def texts(self) -> tuple[str, str]:
         """Whole tables, in the order that fits were finished."""
@@ -499,9 +498,8 @@ def _write_tables(folder: Path, texts: tuple[str, str]) -> None:
     write_whole(folder / _NETWORKS, networks)
 
 
-def _shard_facts(folder: Path) -> dict[str, Any]:
+def _read_facts(folder: Path) -> str:
     path = folder / _SHARD
     if not path.exists():
         raise PalpateError(f"{folder}: there is no {_SHARD}; `palpate study FILE --shard K/N --out {folder} --resume` writes it")
-    facts: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return facts
+    return path.read_text(encoding="utf-8")

@@ -7,8 +7,8 @@ use palpate::numerics::simd::InstructionSet;
 use palpate::numerics::watch::Watch;
 use palpate::rig;
 use palpate_studies::{
-    self as studies, ArmOutcome, ArmResults, Checkpoint, CheckpointError, FitRows, ResultsFile, RunFacts,
-    RunOptions, ShardTables, StudyResults, StudyTables, Task, Trained, paper,
+    self as studies, ArmOutcome, ArmResults, AssemblyError, Checkpoint, CheckpointError, FitRows,
+    ResultsFile, RunFacts, RunOptions, ShardTables, StudyResults, StudyTables, Task, Trained, paper,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -63,12 +63,6 @@ impl PreparedStudy {
         self.inner.lanes()
     }
 
-    /// The arithmetic of the lanes, in words.
-    #[getter]
-    fn arithmetic(&self) -> String {
-        format!("{}, {} lanes", InstructionSet::best(), self.inner.lanes())
-    }
-
     /// Tasks that are left of so many seeds of every arm, where tables have what is finished.
     fn tasks_left(&self, py: Python<'_>, seeds: u64, block: u64, finished: Texts) -> PyResult<Vec<Block>> {
         let done = self.read(py, finished)?.done;
@@ -76,12 +70,13 @@ impl PreparedStudy {
         Ok(left.into_iter().map(|task| (task.arm, task.seeds.start, task.seeds.end)).collect())
     }
 
-    /// Whole tables of what some rows or tables have, sorted; and names of the tables whose last line was cut off.
-    fn whole(&self, py: Python<'_>, texts: Texts) -> PyResult<(String, String, Vec<&'static str>)> {
+    /// Whole tables of what some tables have, sorted; the names of those whose last line was cut off; and the number of fits that cannot be
+    /// restored, as they are in `networks.csv` alone.
+    fn whole(&self, py: Python<'_>, texts: Texts) -> PyResult<(Texts, Vec<&'static str>, usize)> {
         let checkpoint = self.read(py, texts)?;
-        let whole = StudyTables::new(&self.inner).whole(&checkpoint.done);
+        let FitRows { networks, evaluations } = StudyTables::new(&self.inner).whole(&checkpoint.done);
         let cut_off = checkpoint.cut_off.iter().map(|table| table.file_name()).collect();
-        Ok((whole.networks, whole.evaluations, cut_off))
+        Ok(((networks, evaluations), cut_off, checkpoint.without_evaluation))
     }
 
     /// Comment and header that the tables begin with.
@@ -127,62 +122,68 @@ impl PreparedStudy {
         }
     }
 
-    /// The fits of shards joined: their number of seeds, and whole tables.
-    fn merge(
+    /// Fields of `palpate.StudyResults`, from the tables and the facts of all shards: of each its place, the two tables and its `shard.json`.
+    fn merge<'py>(
         &self,
-        py: Python<'_>,
-        shards: Vec<(String, String, String)>,
-    ) -> PyResult<(u64, String, String)> {
-        let shards: Vec<ShardTables> = shards
-            .into_iter()
-            .map(|(place, networks, evaluations)| ShardTables {
-                place,
-                texts: FitRows { networks, evaluations },
-            })
-            .collect();
-        let merged = py.detach(|| self.inner.merge(&shards)).map_err(refused)?;
-        let whole = StudyTables::new(&self.inner).whole(&merged.fits);
-        Ok((merged.seeds, whole.networks, whole.evaluations))
+        py: Python<'py>,
+        shards: Vec<(String, String, String, String)>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (mut tables, mut facts) = (Vec::new(), Vec::new());
+        for (place, networks, evaluations, shard_json) in shards {
+            let read = serde_json::from_str::<RunFacts>(&shard_json);
+            facts.push(read.map_err(|error| refused(format!("{place}: shard.json: {error}")))?);
+            tables.push(ShardTables { place, texts: FitRows { networks, evaluations } });
+        }
+        let merged = py.detach(|| self.inner.merge(&tables)).map_err(refused)?;
+        let facts = RunFacts::of_shards(&facts).ok_or_else(|| refused(AssemblyError::Nothing))?;
+        self.fields(py, merged.fits, &RunFacts { seeds: merged.seeds, ..facts })
     }
 
     /// Fields of `palpate.StudyResults`, from tables that have every fit of so many seeds.
-    #[pyo3(signature = (seeds, tables, *, threads, arithmetic, presentations, seconds))]
-    #[expect(clippy::too_many_arguments, reason = "facts of a run, each by its name")]
+    #[pyo3(signature = (seeds, tables, *, threads, presentations, seconds))]
     fn results<'py>(
         &self,
         py: Python<'py>,
         seeds: u64,
         tables: Texts,
         threads: usize,
-        arithmetic: String,
         presentations: u64,
         seconds: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
         let options = RunOptions { seeds, threads };
+        let arithmetic = format!("{}, {} lanes", InstructionSet::best(), self.inner.lanes());
         let facts = RunFacts::new(&self.inner, options, arithmetic, presentations, seconds);
-        let checkpoint = self.read(py, tables)?;
-        let whole = StudyTables::new(&self.inner).whole(&checkpoint.done);
-        let outcomes = self.inner.by_arm(checkpoint.done, seeds);
+        self.fields(py, self.read(py, tables)?.done, &facts)
+    }
+}
+
+impl PreparedStudy {
+    fn fields<'py>(
+        &self,
+        py: Python<'py>,
+        fits: Vec<Trained>,
+        facts: &RunFacts,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let FitRows { networks, evaluations } = StudyTables::new(&self.inner).whole(&fits);
+        let outcomes = self.inner.by_arm(fits, facts.seeds);
         let results = StudyResults::new(&outcomes, &self.inner);
         let file = ResultsFile {
-            run: &facts,
+            run: facts,
             results: &results,
             published: self.is_paper.then(|| paper::published_figures(&results)),
             claims: self.is_paper.then(|| paper::claims(&outcomes, self.inner.judging())),
         };
         let fields = Fields::new(py);
         fields.set("study", &facts.study)?;
-        fields.set("seeds", seeds)?;
+        fields.set("seeds", facts.seeds)?;
         figures(&fields, &results.arms)?;
         fields.set("by_position", by_position(py, &outcomes)?)?;
         fields.set("results_json", serde_json::to_string_pretty(&file).map_err(refused)? + "\n")?;
-        fields.set("networks_csv", whole.networks)?;
-        fields.set("evaluations_csv", whole.evaluations)?;
+        fields.set("networks_csv", networks)?;
+        fields.set("evaluations_csv", evaluations)?;
         Ok(fields.into_dict())
     }
-}
 
-impl PreparedStudy {
     fn read(&self, py: Python<'_>, (networks, evaluations): Texts) -> PyResult<Checkpoint> {
         let texts = FitRows { networks, evaluations };
         let read = py.detach(|| StudyTables::new(&self.inner).read(&texts));

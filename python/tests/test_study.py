@@ -248,6 +248,20 @@ def test_ray_gives_the_same_tables(study, whole):
         ray.shutdown()
 
 
+def test_a_row_that_a_crash_cut_off_is_made_again(study, whole, tmp_path):
+    whole.save(tmp_path)
+    for name in ("networks.csv", "evaluations.csv"):
+        table = tmp_path / name
+        table.write_text(table.read_text()[:-20])
+    with pytest.warns(UserWarning, match=r"the last line of .*\.csv is cut off; its fit is made again") as told:
+        same(study.run(SEEDS, folder=tmp_path, resume=True), whole)
+    assert len(told) == 2
+    evaluations = tmp_path / "evaluations.csv"
+    evaluations.write_text("".join(evaluations.read_text().splitlines(keepends=True)[:-3]))
+    with pytest.warns(UserWarning, match="3 fits of networks.csv are not in evaluations.csv; they are made again"):
+        same(study.run(SEEDS, folder=tmp_path, resume=True), whole)
+
+
 def test_shards_of_the_command_are_joined(study, whole, command, tmp_path):
     (tmp_path / "small.toml").write_text(SMALL)
     folders = [tmp_path / str(number) for number in (1, 2, 3)]
@@ -256,7 +270,11 @@ def test_shards_of_the_command_are_joined(study, whole, command, tmp_path):
             with pytest.raises(pp.PalpateError, match="1 of 3 shards is missing: 3"):
                 study.merge(folders[:2])
         command("study", tmp_path / "small.toml", "--seeds", SEEDS, "--shard", f"{number}/3", "--out", folder)
-    same(study.merge(folders), whole)
+    merged = study.merge(folders)
+    same(merged, whole)
+    # The facts of the run are those that the command tells of the same shards.
+    command("study", tmp_path / "small.toml", "--merge", *folders, "--out", tmp_path / "merged")
+    assert merged.results_json == (tmp_path / "merged" / "results.json").read_text()
     with pytest.raises(pp.PalpateError, match="shard 1/3 is there twice"):
         study.merge([*folders, folders[0]])
     (folders[0] / "shard.json").unlink()
