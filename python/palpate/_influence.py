@@ -10,7 +10,7 @@ from ._results import Floats, Result, position_columns
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InfluenceFunctions(Result):
-    """What each sensor reads per newton, as the presses told it; `Locator.influence_functions` gives them.
+    """Readings of each sensor per newton, as learnt from the presses; `Locator.influence_functions` gives them.
 
     Where the response to the force is not linear, they are per newton of the response. Channels that the locator does not use are NaN.
 

@@ -1,4 +1,4 @@
-"""What objects and files hold, in words."""
+"""Descriptions of objects and files in words."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ._palpate import Locator, Recording, Rig, Setup, Training
 
 @dataclass(frozen=True, repr=False)
 class Inspection:
-    """What something holds, in words; `inspect` tells it.
+    """Description of an object or a file in words, as `inspect` gives it.
 
     Attributes
     ----------
     says : list of str
-        A line for each thing that is to be said.
+        The description, line by line.
     learnt : dict or None
         What a locator of a surface without a model has learnt of it: "structure", "asked_structure", "force_exponent", "presses", "channels" (each
         with "name", "offset", "noise_sd", "drift_sd", "scatter_sd", in its own unit), "drift_course", "noise_by_place", "scatter_force" in newtons,

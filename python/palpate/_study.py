@@ -312,7 +312,7 @@ class StudyResults(Result):
 
 @dataclass(frozen=True)
 class _TaskRows:
-    """What a task leaves: rows of its fits, and who made them."""
+    """Results of a task: rows of its fits, and the worker that made them."""
 
     version: str
     worker: tuple[str, int]

@@ -18,6 +18,7 @@ use pyo3::types::{IntoPyDict, PyBytes, PyDict, PyList, PyTuple};
 use crate::arrays::{self, Readings, positions_array};
 use crate::errors::{io_error, of_csv, refused};
 use crate::files::write_whole;
+use crate::load_profile;
 use crate::quantities::force_n;
 use crate::sections;
 use crate::surface;
@@ -146,7 +147,7 @@ impl Setup {
         surface::support_kinds(self.0.surface())
     }
 
-    /// What holds the edges "left", "right", "bottom" and "top" of a plate: "simple", "clamped" or "free"; None of another surface.
+    /// Supports of the edges "left", "right", "bottom" and "top" of a plate: "simple", "clamped" or "free"; None of another surface.
     #[getter]
     fn edges<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         surface::edges(self.0.surface()).map(|edges| edges.into_py_dict(py)).transpose()
@@ -328,10 +329,7 @@ impl Setup {
         loads: Option<&Bound<'py, PyAny>>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let options = PyDict::new(slf.py());
-        options.set_item("loads", loads)?;
-        options.set_item("progress", progress)?;
-        slf.py().import("palpate._load_profile")?.call_method("load_profile", (slf, readings), Some(&options))
+        load_profile::of_bench(slf.as_any(), readings, loads, progress)
     }
 
     /// Shape of a line that a contact bends: of a beam by beam theory, of a digit exactly.

@@ -149,7 +149,7 @@ fn contact_dict<'py>(
     Ok(dict)
 }
 
-/// Rows of estimates that are yet to be said, in the columns' memory.
+/// Rows of estimates that are yet to be set, in the columns' memory.
 pub struct Rows<'a> {
     x_m: &'a mut [f64],
     y_m: &'a mut [f64],
@@ -160,17 +160,17 @@ pub struct Rows<'a> {
     status: &'a mut [u8],
     /// Empty while no row has one.
     force_95_n: Vec<[f64; 2]>,
-    /// What few rows have, by row: modes and further contacts.
+    /// Modes and further contacts of the few rows that have them, by row.
     several: Vec<(usize, estimator::Estimate)>,
 }
 
 /// Entries of a covariance that there are on a line: xx, xf, ff.
 const ON_LINE: [usize; 3] = [0, 2, 5];
 
-/// What is not known, in a column.
+/// An unknown number, in a column.
 const UNKNOWN: f64 = f64::NAN;
 
-/// What is not known of a contact without uncertainty.
+/// The uncertainty of a contact that has none: every number unknown.
 const NO_UNCERTAINTY: Uncertainty = Uncertainty {
     covariance: [UNKNOWN; 6],
     x_95_m: (UNKNOWN, UNKNOWN),
@@ -179,7 +179,7 @@ const NO_UNCERTAINTY: Uncertainty = Uncertainty {
 };
 
 impl Rows<'_> {
-    /// Says a row.
+    /// Sets a row.
     pub fn set(&mut self, row: usize, estimate: &estimator::Estimate) {
         let contact = &estimate.contact;
         let uncertainty = contact.uncertainty.as_ref().unwrap_or(&NO_UNCERTAINTY);
@@ -207,7 +207,7 @@ impl Rows<'_> {
     }
 }
 
-/// The six entries of a covariance on a line; of what is not known none is.
+/// The six entries of a covariance on a line; all unknown where those are.
 fn whole(on_line: [f64; 3]) -> [f64; 6] {
     let mut all = [if on_line[0].is_nan() { UNKNOWN } else { 0.0 }; 6];
     ON_LINE.into_iter().zip(on_line).for_each(|(i, entry)| all[i] = entry);
@@ -243,14 +243,14 @@ pub struct Estimates {
 }
 
 impl Estimates {
-    /// Estimates of so many readings, each of which `say` says.
+    /// Estimates of so many readings, which `fill` sets row by row.
     ///
     /// The columns are NumPy's memory: of large pages, which take half as long to be written for the first time.
-    pub fn said(
+    pub fn filled(
         py: Python<'_>,
         rows: usize,
         extent: Extent,
-        say: impl FnOnce(Rows<'_>) -> PyResult<Rows<'_>>,
+        fill: impl FnOnce(Rows<'_>) -> PyResult<Rows<'_>>,
     ) -> PyResult<Self> {
         let empty = |shape: &[usize]| py.import("numpy")?.call_method1("empty", (shape.to_vec(),));
         let column = || Ok::<_, PyErr>(empty(&[rows])?.cast_into::<PyArray1<f64>>()?);
@@ -262,7 +262,7 @@ impl Estimates {
         let status = PyArray1::<u8>::zeros(py, rows, false);
         let (force_95_n, mut several) = {
             let (mut y, mut y_95) = (y.as_ref().map(|y| y.readwrite()), y_95.as_ref().map(|y| y.readwrite()));
-            say(Rows {
+            fill(Rows {
                 x_m: x.readwrite().as_slice_mut()?,
                 y_m: y.as_mut().map_or(Ok(&mut [][..]), |y| y.as_slice_mut())?,
                 force_n: force.readwrite().as_slice_mut()?,
@@ -273,7 +273,7 @@ impl Estimates {
                 force_95_n: Vec::new(),
                 several: Vec::new(),
             })
-            .map(|said| (said.force_95_n, said.several))?
+            .map(|filled| (filled.force_95_n, filled.several))?
         };
         several.sort_by_key(|(row, _)| *row);
         let force_95 = match force_95_n.is_empty() {

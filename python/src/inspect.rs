@@ -1,4 +1,4 @@
-//! What objects and files hold, in words.
+//! Descriptions of objects and files in words.
 
 use palpate::estimators::description;
 use palpate::estimators::estimator;
@@ -15,7 +15,7 @@ use crate::rig::Rig;
 use crate::training::Training;
 use crate::values;
 
-/// What a value holds, a line for each thing that is to be said; and what a locator of a surface without a model has learnt of it.
+/// Description of a value, line by line; and, of a locator of a surface without a model, the numbers that it learnt.
 #[pyfunction]
 pub fn inspect<'py>(
     py: Python<'py>,
@@ -45,14 +45,14 @@ pub fn inspect<'py>(
     Ok((lines, learnt))
 }
 
-/// What a study holds, a line for each thing that is to be said.
+/// Description of a study, line by line.
 #[pyfunction]
 pub fn inspect_study(source: &str, text: &str) -> PyResult<Vec<String>> {
     let study = Study::from_toml(text).map_err(|error| of_rig(&error, source, text))?;
     Ok(study.in_words())
 }
 
-/// What was learnt of a surface without a model; sizes in the units of the channels.
+/// Numbers learnt of a surface without a model; sizes in the units of the channels.
 fn of_linear(linear: &ForceLinearLocator, locator: &estimator::Locator) -> Value {
     let names = locator.layout().names();
     let size_of = |sizes: &[(usize, f64)], c: usize| sizes.iter().find(|(of, _)| *of == c).map(|(_, sd)| *sd);

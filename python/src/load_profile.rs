@@ -21,6 +21,19 @@ use crate::subject::Subject;
 use crate::values::{Fields, place};
 use crate::work;
 
+/// The method `load_profile` of a bench: `palpate.load_profile` of it.
+pub fn of_bench<'py>(
+    bench: &Bound<'py, PyAny>,
+    readings: &Bound<'py, PyAny>,
+    loads: Option<&Bound<'py, PyAny>>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let options = PyDict::new(bench.py());
+    options.set_item("loads", loads)?;
+    options.set_item("progress", progress)?;
+    bench.py().import("palpate._load_profile")?.call_method("load_profile", (bench, readings), Some(&options))
+}
+
 /// Fields of `palpate.LoadProfile`, one a reading; `loads` are sections ``[[load]]`` of a rig that the profiles are held beside.
 #[pyfunction]
 #[pyo3(signature = (bench, readings, loads, *, progress))]
@@ -108,7 +121,7 @@ fn uniform_loads(text: &str, setup: &setup::Setup) -> PyResult<Vec<UniformLoad>>
     loads.map_err(|error| of_rig(&error, "load", text))
 }
 
-/// Why there is no profile.
+/// The cause for which there is no profile.
 enum Refused {
     Sensors(LoadSensorsError),
     /// A reading, by its index, and what is wrong with it.

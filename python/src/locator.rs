@@ -22,6 +22,7 @@ use crate::estimates::{Estimate, Estimates};
 use crate::evaluation::{About, Evaluation};
 use crate::files::write_whole;
 use crate::influence;
+use crate::load_profile;
 use crate::tare;
 use crate::work;
 
@@ -235,10 +236,7 @@ impl Locator {
         loads: Option<&Bound<'py, PyAny>>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let options = PyDict::new(slf.py());
-        options.set_item("loads", loads)?;
-        options.set_item("progress", progress)?;
-        slf.py().import("palpate._load_profile")?.call_method("load_profile", (slf, readings), Some(&options))
+        load_profile::of_bench(slf.as_any(), readings, loads, progress)
     }
 
     /// Kind of its estimator: "influence".
@@ -380,7 +378,7 @@ impl Locator {
     /// Estimates of many readings, one after the other; Ctrl-C is heeded between their blocks.
     fn locate_many(&self, py: Python<'_>, readings: &[f64], threads: NonZeroUsize) -> PyResult<Estimates> {
         let (channels, extent) = (self.channels.len(), self.setup.surface().extent());
-        Estimates::said(py, readings.len() / channels, extent, |rows| {
+        Estimates::filled(py, readings.len() / channels, extent, |rows| {
             let rows = Mutex::new(rows);
             let take = |first: usize, estimates: &[estimator::Estimate]| {
                 let mut rows = rows.lock().unwrap_or_else(PoisonError::into_inner);

@@ -237,7 +237,7 @@ fn truths(recording: &recording::Recording, second: Option<&(Vec<f64>, Vec<f64>)
     TimedRecording { recording: recording.clone(), times_s: Vec::new(), second }.truths()
 }
 
-/// What ends a track before its last reading.
+/// The cause that ends a track before its last reading.
 enum Stopped {
     /// A reading, by its index, that cannot be followed.
     At(usize, Box<dyn std::error::Error + Send + Sync>),
@@ -283,7 +283,7 @@ fn track_fields<'py>(
     fields.set("first", contact(0)?)?;
     let several = tracks.iter().any(|track| track.contacts.len() > 1);
     fields.set("second", if several { Some(contact(1)?) } else { None })?;
-    let single = Estimates::said(py, tracks.len(), extent, |mut rows| {
+    let single = Estimates::filled(py, tracks.len(), extent, |mut rows| {
         tracks.iter().enumerate().for_each(|(row, track)| rows.set(row, &track.single));
         Ok(rows)
     })?;

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
@@ -93,20 +95,10 @@ def placement_limit(placement: SensorPlacement, *, method: str | None = None, ax
         canvas.heat_map(x, y, values, setup.length, setup.width, "limit, mm", most=1e3 * setup.length)
         sensor_dots(canvas, setup)
         return canvas.ax
-    canvas, x_mm, drawn = Canvas(ax), 1e3 * placement.contacts["x"], []
-    for name in dict.fromkeys((_EVEN, chosen)):
-        if name not in placement.methods:
-            continue
-        values = 1e3 * _limit(placement, name)
-        drawn.append(values)
-        if name == _EVEN and name != chosen:
-            canvas.reference(x_mm, values, name)
-        else:
-            canvas.line(x_mm, values, 0, name)
-    canvas.scale_by(np.concatenate(drawn))
-    transform = canvas.ax.get_xaxis_transform()
-    at = 1e3 * setup.sensor_positions
-    canvas.markers(at, np.zeros(at.size), 0, "its sensors", "^", transform=transform, clip_on=False, zorder=4)
+    canvas = Canvas(ax)
+    curves = {name: 1e3 * _limit(placement, name) for name in _even_and(chosen, placement.methods)}
+    _beside_even(canvas, 1e3 * placement.contacts["x"], curves, chosen)
+    _marks_below(canvas, 1e3 * setup.sensor_positions, "its sensors")
     canvas.along(setup.length)
     canvas.labels("contact position, mm", "limit, mm")
     canvas.legend()
@@ -157,21 +149,11 @@ def training_errors(placement: TrainingPlacement, *, setup: Setup | None = None,
         at_x, at_y = 1e3 * placement.positions[index].T
         canvas.markers(at_x, at_y, 0, "training positions", "x", color=canvas.colour(1), zorder=3)
         return canvas.ax
-    canvas, drawn = Canvas(ax), []
-    for name in dict.fromkeys((_EVEN, chosen)):
-        if name not in placement.methods:
-            continue
-        index = placement.methods.index(name)
-        values = 1e3 * placement.errors_by_contact[index]
-        drawn.append(values)
-        if name == _EVEN and name != chosen:
-            canvas.reference(1e3 * x, values, name)
-        else:
-            canvas.line(1e3 * x, values, 0, name)
-            at = 1e3 * placement.positions[index]
-            transform = canvas.ax.get_xaxis_transform()
-            canvas.markers(at, np.zeros(at.size), 0, "its positions", "^", transform=transform, clip_on=False, zorder=4)
-    canvas.scale_by(np.concatenate(drawn))
+    canvas = Canvas(ax)
+    index_of = placement.methods.index
+    curves = {name: 1e3 * placement.errors_by_contact[index_of(name)] for name in _even_and(chosen, placement.methods)}
+    _beside_even(canvas, 1e3 * x, curves, chosen)
+    _marks_below(canvas, 1e3 * placement.positions[index_of(chosen)], "its positions")
     canvas.along(length)
     canvas.labels("contact position, mm", "mean error, mm")
     canvas.legend()
@@ -213,6 +195,27 @@ def next_press(advice: NextPress, *, ax: Axes | None = None) -> Axes:
     canvas.labels("presses to come", "expected error, mm")
     canvas.legend()
     return canvas.ax
+
+
+def _even_and(chosen: str, methods: Sequence[str]) -> list[str]:
+    """The even arrangement, where it is among the methods, and the chosen one."""
+    return [name for name in dict.fromkeys((_EVEN, chosen)) if name in methods]
+
+
+def _beside_even(canvas: Canvas, x_mm: Floats, curves: dict[str, Floats], chosen: str) -> None:
+    """The curve of the chosen arrangement, and that of the even one as reference."""
+    for name, values in curves.items():
+        if name == chosen:
+            canvas.line(x_mm, values, 0, name)
+        else:
+            canvas.reference(x_mm, values, name)
+    canvas.scale_by(np.concatenate(list(curves.values())))
+
+
+def _marks_below(canvas: Canvas, at_mm: Floats, name: str) -> None:
+    """Triangles on the lower edge of the axes."""
+    transform = canvas.ax.get_xaxis_transform()
+    canvas.markers(at_mm, np.zeros(at_mm.size), 0, name, "^", transform=transform, clip_on=False, zorder=4)
 
 
 def _limit(placement: SensorPlacement, method: str) -> Floats:

@@ -181,7 +181,7 @@ def _map(ax: Axes | None, limit: Limit, setup: Setup | None, values: Floats, lab
 
 
 def _zones(canvas: Canvas, limit: Limit) -> None:
-    """What the limit warns of: stretches of the line."""
+    """Stretches of the line that the limit warns of."""
     named: set[str] = set()
     for warning in limit.warnings:
         name, hatch = _ZONES[warning["kind"]]

@@ -173,7 +173,7 @@ def kernel_widths(profile: LoadProfile, *, setup: Setup | None = None, ax: Axes 
 
 
 def residuals(profile: LoadProfile, setup: Setup, *, ax: Axes | None = None) -> Axes:
-    """What a profile leaves of the reading, in standard deviations of the noise: by the sensor's position on a line, by its number on a plane.
+    """Residuals of a profile, in standard deviations of the noise: by the sensor's position on a line, by its number on a plane.
 
     Parameters
     ----------

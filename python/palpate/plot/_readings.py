@@ -148,7 +148,7 @@ def _of_one_picture(setup: Setup, channels: Channels) -> list[int]:
 
 
 def _noun(setup: Setup, chosen: Sequence[int]) -> str:
-    """What some channels measure, by name where it is one raw channel or one of a plane."""
+    """Noun for some channels: the measure, or the name where it is one raw channel or one of a plane."""
     measure = setup.measures[chosen[0]]
     if len(chosen) == 1:
         return setup.channels[chosen[0]]

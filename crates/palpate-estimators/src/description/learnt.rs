@@ -1,11 +1,11 @@
-//! What a recording has told of a surface without a model: structure, drift, scatter and noise.
+//! Structure, drift, scatter and noise that were learnt from a recording of a surface without a model, in words.
 
 use crate::influence::{DriftCourse, ForceLinearLocator, Scatter, Source, Structure};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::units::{format_count, format_length_mm};
 use palpate_numerics::regression::Kernel;
 
-/// All that was learnt.
+/// Structure, influence functions, offsets, noise and disturbances: a line for each.
 pub fn learnt(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     let channels =
         linear.channels().map(|(c, offset, noise)| format!("{}: {offset:.4} ± {noise:.2}", names[c]));

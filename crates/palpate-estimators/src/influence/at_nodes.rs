@@ -1,5 +1,6 @@
 //! Influence functions at the nodes of a locator's table, as the presses told them.
 
+use super::channels::Channels;
 use palpate_mechanics::contact::Position;
 
 /// Influence functions of the channels in use, with their uncertainty, at the nodes of a locator's table.
@@ -23,10 +24,11 @@ impl InfluencesAtNodes {
     /// The functions of a table of all channels, nodes × channels, of which some are in use.
     pub(super) fn of_table(
         positions: Vec<Position>,
-        channels: Vec<usize>,
-        [offsets, noise_sd]: [&[f64]; 2],
+        channels: &Channels,
         [values, variances]: [&[f64]; 2],
     ) -> Self {
+        let Channels { offsets, noise_sd, .. } = channels;
+        let channels = channels.live();
         let in_use = |of: &[f64]| -> Vec<f64> {
             let rows = of.chunks_exact(offsets.len());
             rows.flat_map(|row| channels.iter().map(|channel| row[*channel])).collect()

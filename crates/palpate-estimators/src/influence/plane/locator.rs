@@ -48,13 +48,7 @@ impl PlaneLocator {
     pub fn influences_at_nodes(&self) -> InfluencesAtNodes {
         let Stored { table, channels, .. } = &self.stored;
         let positions = (0..table.nodes()).map(|node| table.node(node)).collect();
-        let of_channels = [channels.offsets.as_slice(), &channels.noise_sd];
-        InfluencesAtNodes::of_table(
-            positions,
-            channels.live(),
-            of_channels,
-            [&table.values, &table.variances],
-        )
+        InfluencesAtNodes::of_table(positions, channels, [&table.values, &table.variances])
     }
 
     /// Knowledge of the force.
