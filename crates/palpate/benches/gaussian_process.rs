@@ -24,7 +24,8 @@ fn main() {
         let process = fit();
         let found = process.hyperparameters().clone();
         let fit_s = seconds(|| drop(std::hint::black_box(fit())));
-        let factor_s = seconds(|| drop(std::hint::black_box(regression.condition(samples, &found))));
+        let factor_s =
+            seconds(|| drop(std::hint::black_box(regression.condition(samples, &found, Watch::NONE))));
         println!("{rows} presses: fitted in {fit_s:.2} s, of which {factor_s:.2} s with all rows");
 
         let mut scratch = process.scratch();

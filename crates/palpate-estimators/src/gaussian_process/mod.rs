@@ -8,15 +8,16 @@ use ndarray::Array2;
 
 use crate::features::{FeatureKind, Features, NoFeatures};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
-use crate::recording::{Recording, TooFewPositions};
+use crate::recording::{Fold, Recording, Row, TooFewPositions};
 use crate::setup::Setup;
 use crate::status::on_surface;
+use crate::thinning::thinned;
 use palpate_core::{ContactEstimate, Estimate, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::normal_interval_95;
 use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, RegressionError, Samples, Trend};
 use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_numerics::{mean, normal_interval_95};
 
 /// Gaussian-process regression of the contact's position.
 ///
@@ -33,7 +34,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussianProcessEstimator {
-    /// Features of a reading; `None` for those of [`FeatureKind::contenders`] under which the positions are most probable.
+    /// Features of a reading; `None` for those of [`FeatureKind::contenders`] that suit best.
     pub features: Option<FeatureKind>,
     /// Kernel: the smoothness of the position as a function of the features.
     pub kernel: Kernel,
@@ -79,50 +80,141 @@ impl Fit for GaussianProcessEstimator {
     fn fit_method(&self, task: FitTask) -> Result<GaussianProcessLocator, GaussianProcessError> {
         let FitTask { setup, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
+        let extent = setup.surface().extent();
         let kinds =
             self.features.map_or_else(|| FeatureKind::contenders(setup, recording), |kind| vec![kind]);
-        let mut best: Option<GaussianProcessLocator> = None;
+        let regression =
+            Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
+        // Of more positions few rows that are searched are repeats.
+        let without_repeats =
+            recording.one_row_a_position().filter(|firsts| firsts.rows.len() < self.search_points);
+        let mut candidates = Vec::new();
         for kind in kinds {
-            let fitted = self.with_features(kind, setup, recording, seed, watch)?;
-            let evidence = |locator: &GaussianProcessLocator| locator.process.log_evidence();
-            if best.as_ref().is_none_or(|best| evidence(&fitted) > evidence(best)) {
-                best = Some(fitted);
+            let features = Features::fit(kind, recording)?;
+            let points = Points::new(recording.rows.iter(), &features, extent);
+            let mut processes = vec![regression.fit(points.samples(), watch)?];
+            if let Some(firsts) = &without_repeats {
+                let firsts = Points::new(firsts.rows.iter(), &features, extent);
+                let found = regression.hyperparameters(firsts.samples(), watch)?;
+                processes.push(regression.condition(points.samples(), &found, watch)?);
             }
+            let locators = processes.into_iter().map(|process| GaussianProcessLocator {
+                features: features.clone(),
+                process,
+                extent,
+                force_n: setup.force_n(),
+            });
+            candidates.extend(locators);
         }
-        // Contenders are never none.
-        best.ok_or(GaussianProcessError::Features(NoFeatures {
-            channels: recording.channels.len(),
-            rows: recording.rows.len(),
-        }))
+        Judges::new(recording).best(candidates, &regression, watch)
     }
 }
 
-impl GaussianProcessEstimator {
-    fn with_features(
+/// Features of rows, and where those were pressed.
+struct Points {
+    coordinates: Array2<f64>,
+    outputs_m: Array2<f64>,
+}
+
+impl Points {
+    fn new<'a>(rows: impl ExactSizeIterator<Item = &'a Row>, features: &Features, extent: Extent) -> Self {
+        let mut coordinates = Array2::zeros((rows.len(), features.len()));
+        let mut outputs_m = Array2::zeros((rows.len(), extent.dimensions()));
+        for (i, row) in rows.enumerate() {
+            coordinates.row_mut(i).iter_mut().zip(features.apply(&row.reading)).for_each(|(out, x)| *out = x);
+            let position_m = [row.position.x_m, row.position.y_m];
+            outputs_m.row_mut(i).iter_mut().zip(position_m).for_each(|(out, at)| *out = at);
+        }
+        Self { coordinates, outputs_m }
+    }
+
+    fn samples(&self) -> Samples<'_> {
+        Samples { coordinates: self.coordinates.view(), outputs: self.outputs_m.view(), noise_variance: None }
+    }
+}
+
+/// Presses by which features and hyperparameters are judged: each position is held out once, unless it lies beyond all that are left then, where
+/// no contact is expected.
+///
+/// The evidence alone would be misled by repeats: it takes those of one position for as many witnesses of its value, and prefers functions that
+/// are flat around each position and steep between them.
+struct Judges {
+    recording: Recording,
+    folds: Vec<Fold>,
+}
+
+impl Judges {
+    /// Presses that judge; more would cost time and change little.
+    const MOST: usize = 500;
+    const FOLDS: usize = 5;
+    /// Errors at so few presses differ by chance; where the evidence is misled they differ by more.
+    const MARGIN: f64 = 1.25;
+
+    fn new(recording: &Recording) -> Self {
+        let few: Vec<usize> = thinned(recording.rows.len(), Self::MOST).collect();
+        let recording = recording.subset(&few);
+        let folds = recording.folds(recording.distinct_positions().len().min(Self::FOLDS));
+        let mut folds = folds.unwrap_or_default();
+        for Fold { training, held_out } in &mut folds {
+            let position = |i: &usize| recording.rows[*i].position;
+            let is_between = |at: Position| {
+                let is_reached = |along: fn(Position) -> f64| {
+                    let others = || training.iter().map(|i| along(position(i)));
+                    others().any(|other| other <= along(at)) && others().any(|other| other >= along(at))
+                };
+                is_reached(|at| at.x_m) && is_reached(|at| at.y_m)
+            };
+            held_out.retain(|i| is_between(position(i)));
+        }
+        Self { folds, recording }
+    }
+
+    /// The candidate under which the positions are most probable, unless another has a mean error at positions held out that is less by
+    /// [`Self::MARGIN`].
+    fn best(
         &self,
-        kind: FeatureKind,
-        setup: &Setup,
-        recording: &Recording,
-        seed: u64,
+        mut candidates: Vec<GaussianProcessLocator>,
+        regression: &Regression,
         watch: Watch,
     ) -> Result<GaussianProcessLocator, GaussianProcessError> {
-        let features = Features::fit(kind, recording)?;
-        let extent = setup.surface().extent();
-        let rows = recording.rows.len();
-        let mut coordinates = Array2::zeros((rows, features.len()));
-        for (row, mut out) in recording.rows.iter().zip(coordinates.outer_iter_mut()) {
-            out.iter_mut().zip(features.apply(&row.reading)).for_each(|(out, feature)| *out = feature);
+        let by_evidence = |a: &GaussianProcessLocator, b: &GaussianProcessLocator| {
+            b.process.log_evidence().total_cmp(&a.process.log_evidence())
+        };
+        candidates.sort_by(by_evidence);
+        let mut best = (f64::INFINITY, 0);
+        if candidates.len() > 1 {
+            for (i, candidate) in candidates.iter().enumerate() {
+                let margin = if i == 0 { 1.0 } else { Self::MARGIN };
+                let score = margin * self.mean_error_m(candidate, regression, watch)?;
+                if score < best.0 {
+                    best = (score, i);
+                }
+            }
         }
-        let outputs = Array2::from_shape_fn((rows, extent.dimensions()), |(row, j)| {
-            let position = recording.rows[row].position;
-            if j == 0 { position.x_m } else { position.y_m }
-        });
-        let samples =
-            Samples { coordinates: coordinates.view(), outputs: outputs.view(), noise_variance: None };
-        let regression =
-            Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
-        let process = regression.fit(samples, watch)?;
-        Ok(GaussianProcessLocator { features, process, extent, force_n: setup.force_n() })
+        Ok(candidates.swap_remove(best.1))
+    }
+
+    fn mean_error_m(
+        &self,
+        candidate: &GaussianProcessLocator,
+        regression: &Regression,
+        watch: Watch,
+    ) -> Result<f64, GaussianProcessError> {
+        let GaussianProcessLocator { features, process, extent, .. } = candidate;
+        let mut errors_m = Vec::with_capacity(self.recording.rows.len());
+        for fold in &self.folds {
+            watch.round()?;
+            let row = |i: &usize| &self.recording.rows[*i];
+            let points = Points::new(fold.training.iter().map(row), features, *extent);
+            let process = regression.condition(points.samples(), process.hyperparameters(), watch)?;
+            for row in fold.held_out.iter().map(row) {
+                let (means_m, _) = process.predict(&features.apply(&row.reading));
+                let at_m = [row.position.x_m, row.position.y_m];
+                let square = means_m.iter().zip(at_m).map(|(mean, at)| (mean - at).powi(2)).sum::<f64>();
+                errors_m.push(square.sqrt());
+            }
+        }
+        Ok(if errors_m.is_empty() { f64::INFINITY } else { mean(errors_m) })
     }
 }
 

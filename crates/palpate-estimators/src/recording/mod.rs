@@ -222,6 +222,20 @@ impl Recording {
         (!untouched.is_empty()).then(|| (0..self.channels.len()).map(channel).collect())
     }
 
+    /// The first row of each position in which something touched; `None` where those are all rows.
+    pub fn one_row_a_position(&self) -> Option<Self> {
+        let positions = self.distinct_positions();
+        let mut is_found = vec![false; positions.len()];
+        let mut firsts = Vec::with_capacity(positions.len());
+        for (i, row) in self.rows.iter().enumerate().filter(|(_, row)| row.touches()) {
+            let index = positions.partition_point(|position| position.cmp_by_x_then_y(&row.position).is_lt());
+            if !std::mem::replace(&mut is_found[index], true) {
+                firsts.push(i);
+            }
+        }
+        (firsts.len() < self.rows.len()).then(|| self.subset(&firsts))
+    }
+
     /// The recording that consists of `rows`, indices into this one's; those beyond it are left out.
     pub fn subset(&self, rows: &[usize]) -> Self {
         let rows: Vec<Row> = rows.iter().filter_map(|i| self.rows.get(*i)).cloned().collect();

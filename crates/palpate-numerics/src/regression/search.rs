@@ -54,6 +54,18 @@ impl Regression {
         GaussianProcess::of_groups(&groups, self.kernel, self.trend, &found, watch)
     }
 
+    /// The hyperparameters alone that [`Self::fit`] finds.
+    ///
+    /// # Errors
+    /// [`RegressionError`], with the row or value that no regression can use; or when `watch` stopped it.
+    pub fn hyperparameters(
+        &self,
+        samples: Samples,
+        watch: Watch,
+    ) -> Result<Hyperparameters, RegressionError> {
+        Ok(self.search(&Groups::new(samples)?, watch)?)
+    }
+
     /// As [`Self::fit`], every output with hyperparameters of its own: one process an output.
     ///
     /// # Errors
@@ -69,15 +81,16 @@ impl Regression {
     /// The posterior with hyperparameters that are known.
     ///
     /// # Errors
-    /// [`RegressionError`], with the row or value that no regression can use.
+    /// [`RegressionError`], with the row or value that no regression can use; or when `watch` stopped it.
     pub fn condition(
         &self,
         samples: Samples,
         hyperparameters: &Hyperparameters,
+        watch: Watch,
     ) -> Result<GaussianProcess, RegressionError> {
         let groups = Groups::new(samples)?;
         hyperparameters.check(groups.coordinates.nrows())?;
-        GaussianProcess::of_groups(&groups, self.kernel, self.trend, hyperparameters, Watch::NONE)
+        GaussianProcess::of_groups(&groups, self.kernel, self.trend, hyperparameters, watch)
     }
 
     fn search(&self, groups: &Groups, watch: Watch) -> Result<Hyperparameters, Cancelled> {

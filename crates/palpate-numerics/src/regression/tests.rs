@@ -100,7 +100,7 @@ fn collapsing_repeats_changes_neither_evidence_nor_posterior() {
                 let regression = Regression { kernel, trend, ..Regression::default() };
                 let ratio = if noise.is_some() { 0.2 } else { 0.03 };
                 let h = Hyperparameters { length_scales: vec![0.9, 1.7], noise_ratio: ratio };
-                let process = regression.condition(samples(&x, &y, noise), &h).unwrap();
+                let process = regression.condition(samples(&x, &y, noise), &h, Watch::NONE).unwrap();
                 assert_eq!(process.points(), 12);
                 let truth = dense(&process, regression, samples(&x, &y, noise), [0.4, 1.1]);
                 let (mean, variance) = process.predict(&[0.4, 1.1]);
@@ -311,7 +311,7 @@ fn samples_that_are_none_are_refused() {
     ));
     assert!(matches!(refused(&x, &y, Some(&[0.0])), RegressionError::Count { .. }));
     let h = Hyperparameters { length_scales: vec![0.0], noise_ratio: 1.0 };
-    let error = Regression::default().condition(samples(&x, &y, None), &h).unwrap_err();
+    let error = Regression::default().condition(samples(&x, &y, None), &h, Watch::NONE).unwrap_err();
     assert!(matches!(error, RegressionError::Hyperparameter { number: 1, .. }));
     let stop = |_| false;
     let stopped = Regression::default().fit(samples(&x, &y, None), Watch::new(&stop)).unwrap_err();

@@ -64,7 +64,7 @@ impl Fit for MeasuredInfluence {
         let regression =
             Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
         let process = regression.fit(samples, watch)?;
-        let whitening = presses.whitening(&regression, &process, role)?;
+        let whitening = presses.whitening(&regression, &process, role, watch)?;
         let axes = presses.axes(&process, setup);
         let mut table = presses.table(axes, &process, &whitening, watch)?;
         let mut missed = presses.missed(&table, &process, &whitening);
@@ -97,13 +97,14 @@ impl Presses {
         regression: &Regression,
         process: &GaussianProcess,
         role: NuisanceRole,
+        watch: Watch,
     ) -> Result<Whitening, MeasuredError> {
         let signal =
             Array2::from_diag(&Array1::from_shape_fn(self.means.ncols(), |j| process.signal_variance(j)));
         let noise = self.noise(process, role)?;
         let known = Whitening::from_covariances(noise.clone(), &signal)?;
         // What repeats itself at a place, but not at its neighbours, is noise to a contact between them.
-        let factor = misfit(self, regression, process, &known)?.unwrap_or(1.0);
+        let factor = misfit(self, regression, process, &known, watch)?.unwrap_or(1.0);
         if self.further.is_empty() {
             return Ok(known.widened(factor));
         }
@@ -281,6 +282,7 @@ pub(super) fn misfit(
     regression: &Regression,
     process: &GaussianProcess,
     whitening: &Whitening,
+    watch: Watch,
 ) -> Result<Option<f64>, MeasuredError> {
     let (dimensions, searched) = (presses.dimensions(), presses.searched());
     let Some(held) = held_out(presses, dimensions) else { return Ok(None) };
@@ -288,7 +290,7 @@ pub(super) fn misfit(
     let coordinates = presses.coordinates.select(ndarray::Axis(0), &kept);
     let means = presses.means.select(ndarray::Axis(0), &kept);
     let samples = Samples { coordinates: coordinates.view(), outputs: means.view(), noise_variance: None };
-    let other = regression.condition(samples, process.hyperparameters())?;
+    let other = regression.condition(samples, process.hyperparameters(), watch)?;
 
     let mut known: Vec<Option<Prediction>> = vec![None; held.len()];
     let (mut square, mut count) = (0.0, 0);
