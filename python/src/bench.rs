@@ -18,7 +18,7 @@ use pyo3::types::{IntoPyDict, PyBytes, PyDict, PyList, PyTuple};
 use crate::arrays::{self, Readings, positions_array};
 use crate::errors::{io_error, of_csv, refused};
 use crate::files::write_whole;
-use crate::load_profile;
+use crate::methods;
 use crate::quantities::force_n;
 use crate::sections;
 use crate::surface;
@@ -329,7 +329,7 @@ impl Setup {
         loads: Option<&Bound<'py, PyAny>>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        load_profile::of_bench(slf.as_any(), readings, loads, progress)
+        methods::load_profile(slf.as_any(), readings, loads, progress)
     }
 
     /// Shape of a line that a contact bends: of a beam by beam theory, of a digit exactly.

@@ -18,6 +18,7 @@ mod inspect;
 mod limit;
 mod load_profile;
 mod locator;
+mod methods;
 mod placement;
 mod positions;
 mod quantities;

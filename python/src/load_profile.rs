@@ -21,19 +21,6 @@ use crate::subject::Subject;
 use crate::values::{Fields, place};
 use crate::work;
 
-/// The method `load_profile` of a bench: `palpate.load_profile` of it.
-pub fn of_bench<'py>(
-    bench: &Bound<'py, PyAny>,
-    readings: &Bound<'py, PyAny>,
-    loads: Option<&Bound<'py, PyAny>>,
-    progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let options = PyDict::new(bench.py());
-    options.set_item("loads", loads)?;
-    options.set_item("progress", progress)?;
-    bench.py().import("palpate._load_profile")?.call_method("load_profile", (bench, readings), Some(&options))
-}
-
 /// Fields of `palpate.LoadProfile`, one a reading; `loads` are sections ``[[load]]`` of a rig that the profiles are held beside.
 #[pyfunction]
 #[pyo3(signature = (bench, readings, loads, *, progress))]

@@ -22,7 +22,7 @@ use crate::estimates::{Estimate, Estimates};
 use crate::evaluation::{About, Evaluation};
 use crate::files::write_whole;
 use crate::influence;
-use crate::load_profile;
+use crate::methods;
 use crate::tare;
 use crate::work;
 
@@ -236,7 +236,7 @@ impl Locator {
         loads: Option<&Bound<'py, PyAny>>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        load_profile::of_bench(slf.as_any(), readings, loads, progress)
+        methods::load_profile(slf.as_any(), readings, loads, progress)
     }
 
     /// Kind of its estimator: "influence".

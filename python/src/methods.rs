@@ -1,0 +1,17 @@
+//! Methods that setups and locators share: they call functions of the package that are written in Python.
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// The method `load_profile` of a setup or locator.
+pub fn load_profile<'py>(
+    bench: &Bound<'py, PyAny>,
+    readings: &Bound<'py, PyAny>,
+    loads: Option<&Bound<'py, PyAny>>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let options = PyDict::new(bench.py());
+    options.set_item("loads", loads)?;
+    options.set_item("progress", progress)?;
+    bench.py().import("palpate._load_profile")?.call_method("load_profile", (bench, readings), Some(&options))
+}
