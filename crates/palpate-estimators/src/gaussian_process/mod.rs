@@ -4,20 +4,21 @@
 //! standing for what the sensors' noise does to the position. It asks nothing of the surface but smoothness, and one
 //! error for the whole surface is its limit: where the sensors see little, the truth is wider than it says.
 
-use ndarray::Array2;
+mod selection;
+
+use selection::{Candidate, Points, Selection};
 
 use crate::features::{FeatureKind, Features, NoFeatures};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
-use crate::recording::{Fold, Recording, Row, TooFewPositions};
+use crate::recording::TooFewPositions;
 use crate::setup::Setup;
 use crate::status::on_surface;
-use crate::thinning::thinned;
 use palpate_core::{ContactEstimate, Estimate, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, RegressionError, Samples, Trend};
-use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_numerics::{mean, normal_interval_95};
+use palpate_numerics::normal_interval_95;
+use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, RegressionError, Trend};
+use palpate_numerics::watch::Cancelled;
 
 /// Gaussian-process regression of the contact's position.
 ///
@@ -34,7 +35,7 @@ use palpate_numerics::{mean, normal_interval_95};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussianProcessEstimator {
-    /// Features of a reading; `None` for those of [`FeatureKind::contenders`] that suit best.
+    /// Features of a reading; `None` for those of [`FeatureKind::contenders`] that evidence and held-out positions favour.
     pub features: Option<FeatureKind>,
     /// Kernel: the smoothness of the position as a function of the features.
     pub kernel: Kernel,
@@ -80,141 +81,51 @@ impl Fit for GaussianProcessEstimator {
     fn fit_method(&self, task: FitTask) -> Result<GaussianProcessLocator, GaussianProcessError> {
         let FitTask { setup, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
+        let regression =
+            Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
+        let extent = setup.surface().extent();
+        let candidates = self.candidates(task, regression)?;
+        let selection = Selection { recording, regression, extent, watch };
+        let Candidate { features, hyperparameters, process } = selection.best(candidates)?;
+        let process = match process {
+            Some(process) => process,
+            None => {
+                let points = Points::new(recording, &features, extent);
+                regression.condition(points.samples(), &hyperparameters, watch)?
+            }
+        };
+        Ok(GaussianProcessLocator { features, process, extent, force_n: setup.force_n() })
+    }
+}
+
+impl GaussianProcessEstimator {
+    /// For each kind of features, hyperparameters that are found from all rows, and from one row of each position where there are repeats.
+    fn candidates(
+        &self,
+        task: FitTask,
+        regression: Regression,
+    ) -> Result<Vec<Candidate>, GaussianProcessError> {
+        let FitTask { setup, recording, seed, watch } = task;
         let extent = setup.surface().extent();
         let kinds =
             self.features.map_or_else(|| FeatureKind::contenders(setup, recording), |kind| vec![kind]);
-        let regression =
-            Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
-        // Of more positions few rows that are searched are repeats.
+        // Of more positions than are searched, few of the rows that are searched are repeats.
         let without_repeats =
-            recording.one_row_a_position().filter(|firsts| firsts.rows.len() < self.search_points);
-        let mut candidates = Vec::new();
+            recording.one_row_a_position(seed).filter(|few| few.rows.len() < self.search_points);
+        let mut candidates = Vec::with_capacity(2 * kinds.len());
         for kind in kinds {
             let features = Features::fit(kind, recording)?;
-            let points = Points::new(recording.rows.iter(), &features, extent);
-            let mut processes = vec![regression.fit(points.samples(), watch)?];
-            if let Some(firsts) = &without_repeats {
-                let firsts = Points::new(firsts.rows.iter(), &features, extent);
-                let found = regression.hyperparameters(firsts.samples(), watch)?;
-                processes.push(regression.condition(points.samples(), &found, watch)?);
+            if let Some(few) = &without_repeats {
+                let points = Points::new(few, &features, extent);
+                let hyperparameters = regression.hyperparameters(points.samples(), watch)?;
+                candidates.push(Candidate { features: features.clone(), hyperparameters, process: None });
             }
-            let locators = processes.into_iter().map(|process| GaussianProcessLocator {
-                features: features.clone(),
-                process,
-                extent,
-                force_n: setup.force_n(),
-            });
-            candidates.extend(locators);
+            let points = Points::new(recording, &features, extent);
+            let process = regression.fit(points.samples(), watch)?;
+            let hyperparameters = process.hyperparameters().clone();
+            candidates.push(Candidate { features, hyperparameters, process: Some(process) });
         }
-        Judges::new(recording).best(candidates, &regression, watch)
-    }
-}
-
-/// Features of rows, and where those were pressed.
-struct Points {
-    coordinates: Array2<f64>,
-    outputs_m: Array2<f64>,
-}
-
-impl Points {
-    fn new<'a>(rows: impl ExactSizeIterator<Item = &'a Row>, features: &Features, extent: Extent) -> Self {
-        let mut coordinates = Array2::zeros((rows.len(), features.len()));
-        let mut outputs_m = Array2::zeros((rows.len(), extent.dimensions()));
-        for (i, row) in rows.enumerate() {
-            coordinates.row_mut(i).iter_mut().zip(features.apply(&row.reading)).for_each(|(out, x)| *out = x);
-            let position_m = [row.position.x_m, row.position.y_m];
-            outputs_m.row_mut(i).iter_mut().zip(position_m).for_each(|(out, at)| *out = at);
-        }
-        Self { coordinates, outputs_m }
-    }
-
-    fn samples(&self) -> Samples<'_> {
-        Samples { coordinates: self.coordinates.view(), outputs: self.outputs_m.view(), noise_variance: None }
-    }
-}
-
-/// Presses by which features and hyperparameters are judged: each position is held out once, unless it lies beyond all that are left then, where
-/// no contact is expected.
-///
-/// The evidence alone would be misled by repeats: it takes those of one position for as many witnesses of its value, and prefers functions that
-/// are flat around each position and steep between them.
-struct Judges {
-    recording: Recording,
-    folds: Vec<Fold>,
-}
-
-impl Judges {
-    /// Presses that judge; more would cost time and change little.
-    const MOST: usize = 500;
-    const FOLDS: usize = 5;
-    /// Errors at so few presses differ by chance; where the evidence is misled they differ by more.
-    const MARGIN: f64 = 1.25;
-
-    fn new(recording: &Recording) -> Self {
-        let few: Vec<usize> = thinned(recording.rows.len(), Self::MOST).collect();
-        let recording = recording.subset(&few);
-        let folds = recording.folds(recording.distinct_positions().len().min(Self::FOLDS));
-        let mut folds = folds.unwrap_or_default();
-        for Fold { training, held_out } in &mut folds {
-            let position = |i: &usize| recording.rows[*i].position;
-            let is_between = |at: Position| {
-                let is_reached = |along: fn(Position) -> f64| {
-                    let others = || training.iter().map(|i| along(position(i)));
-                    others().any(|other| other <= along(at)) && others().any(|other| other >= along(at))
-                };
-                is_reached(|at| at.x_m) && is_reached(|at| at.y_m)
-            };
-            held_out.retain(|i| is_between(position(i)));
-        }
-        Self { folds, recording }
-    }
-
-    /// The candidate under which the positions are most probable, unless another has a mean error at positions held out that is less by
-    /// [`Self::MARGIN`].
-    fn best(
-        &self,
-        mut candidates: Vec<GaussianProcessLocator>,
-        regression: &Regression,
-        watch: Watch,
-    ) -> Result<GaussianProcessLocator, GaussianProcessError> {
-        let by_evidence = |a: &GaussianProcessLocator, b: &GaussianProcessLocator| {
-            b.process.log_evidence().total_cmp(&a.process.log_evidence())
-        };
-        candidates.sort_by(by_evidence);
-        let mut best = (f64::INFINITY, 0);
-        if candidates.len() > 1 {
-            for (i, candidate) in candidates.iter().enumerate() {
-                let margin = if i == 0 { 1.0 } else { Self::MARGIN };
-                let score = margin * self.mean_error_m(candidate, regression, watch)?;
-                if score < best.0 {
-                    best = (score, i);
-                }
-            }
-        }
-        Ok(candidates.swap_remove(best.1))
-    }
-
-    fn mean_error_m(
-        &self,
-        candidate: &GaussianProcessLocator,
-        regression: &Regression,
-        watch: Watch,
-    ) -> Result<f64, GaussianProcessError> {
-        let GaussianProcessLocator { features, process, extent, .. } = candidate;
-        let mut errors_m = Vec::with_capacity(self.recording.rows.len());
-        for fold in &self.folds {
-            watch.round()?;
-            let row = |i: &usize| &self.recording.rows[*i];
-            let points = Points::new(fold.training.iter().map(row), features, *extent);
-            let process = regression.condition(points.samples(), process.hyperparameters(), watch)?;
-            for row in fold.held_out.iter().map(row) {
-                let (means_m, _) = process.predict(&features.apply(&row.reading));
-                let at_m = [row.position.x_m, row.position.y_m];
-                let square = means_m.iter().zip(at_m).map(|(mean, at)| (mean - at).powi(2)).sum::<f64>();
-                errors_m.push(square.sqrt());
-            }
-        }
-        Ok(if errors_m.is_empty() { f64::INFINITY } else { mean(errors_m) })
+        Ok(candidates)
     }
 }
 

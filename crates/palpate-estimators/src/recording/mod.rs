@@ -32,7 +32,7 @@ use sha2::{Digest, Sha256};
 
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, SensorKind};
-use palpate_numerics::mean;
+use palpate_numerics::{mean, random_order};
 use std::borrow::Cow;
 
 /// Readings with the contacts that caused them.
@@ -222,18 +222,21 @@ impl Recording {
         (!untouched.is_empty()).then(|| (0..self.channels.len()).map(channel).collect())
     }
 
-    /// The first row of each position in which something touched; `None` where those are all rows.
-    pub fn one_row_a_position(&self) -> Option<Self> {
+    /// One row of each position in which something touched, drawn at random, as presses of a position may come in the order of their depths; `None`
+    /// where those are all rows.
+    pub fn one_row_a_position(&self, seed: u64) -> Option<Self> {
         let positions = self.distinct_positions();
-        let mut is_found = vec![false; positions.len()];
-        let mut firsts = Vec::with_capacity(positions.len());
-        for (i, row) in self.rows.iter().enumerate().filter(|(_, row)| row.touches()) {
-            let index = positions.partition_point(|position| position.cmp_by_x_then_y(&row.position).is_lt());
-            if !std::mem::replace(&mut is_found[index], true) {
-                firsts.push(i);
+        let mut drawn: Vec<Option<usize>> = vec![None; positions.len()];
+        for i in random_order(self.rows.len(), seed) {
+            let row = &self.rows[i];
+            if row.touches() {
+                let index =
+                    positions.partition_point(|position| position.cmp_by_x_then_y(&row.position).is_lt());
+                drawn[index].get_or_insert(i);
             }
         }
-        (firsts.len() < self.rows.len()).then(|| self.subset(&firsts))
+        let drawn: Vec<usize> = drawn.into_iter().flatten().collect();
+        (drawn.len() < self.rows.len()).then(|| self.subset(&drawn))
     }
 
     /// The recording that consists of `rows`, indices into this one's; those beyond it are left out.

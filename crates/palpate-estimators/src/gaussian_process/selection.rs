@@ -1,0 +1,126 @@
+//! The choice of features and hyperparameters: by evidence, and by errors at positions held out.
+//!
+//! The evidence takes the repeats of a position for independent observations of it. Of few positions and many repeats it prefers functions that are
+//! flat around each position and steep between them, far off where nothing was pressed. Errors at positions held out show that; but they are
+//! few, and differ by chance. So the evidence decides, unless those errors disagree by a margin.
+
+use ndarray::Array2;
+
+use super::GaussianProcessError;
+use crate::features::Features;
+use crate::recording::{Fold, Recording};
+use crate::thinning::thinned;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::mean;
+use palpate_numerics::regression::{GaussianProcess, Hyperparameters, Regression, Samples};
+use palpate_numerics::watch::Watch;
+
+/// Features and hyperparameters that may be taken.
+pub(super) struct Candidate {
+    pub features: Features,
+    pub hyperparameters: Hyperparameters,
+    /// The posterior of all rows, where those were searched.
+    pub process: Option<GaussianProcess>,
+}
+
+/// Features of rows, and the positions of their presses.
+pub(super) struct Points {
+    coordinates: Array2<f64>,
+    outputs_m: Array2<f64>,
+}
+
+impl Points {
+    pub fn new(recording: &Recording, features: &Features, extent: Extent) -> Self {
+        let rows = &recording.rows;
+        let mut coordinates = Array2::zeros((rows.len(), features.len()));
+        for (row, mut out) in rows.iter().zip(coordinates.outer_iter_mut()) {
+            out.iter_mut().zip(features.apply(&row.reading)).for_each(|(out, feature)| *out = feature);
+        }
+        let outputs_m = Array2::from_shape_fn((rows.len(), extent.dimensions()), |(row, j)| {
+            let position = rows[row].position;
+            if j == 0 { position.x_m } else { position.y_m }
+        });
+        Self { coordinates, outputs_m }
+    }
+
+    pub fn samples(&self) -> Samples<'_> {
+        Samples { coordinates: self.coordinates.view(), outputs: self.outputs_m.view(), noise_variance: None }
+    }
+}
+
+/// The choice among candidates.
+pub(super) struct Selection<'a> {
+    pub recording: &'a Recording,
+    pub regression: Regression,
+    pub extent: Extent,
+    pub watch: Watch<'a>,
+}
+
+impl Selection<'_> {
+    /// The candidate of the greatest evidence, unless the error of another at positions held out is less by [`MARGIN`].
+    pub fn best(&self, mut candidates: Vec<Candidate>) -> Result<Candidate, GaussianProcessError> {
+        /// Rows that errors are told from; more would cost time and change little.
+        const MOST: usize = 500;
+        const MARGIN: f64 = 1.25;
+        if candidates.len() == 1 {
+            return Ok(candidates.remove(0));
+        }
+        let evidence = |candidate: &Candidate| {
+            candidate.process.as_ref().map_or(f64::NEG_INFINITY, GaussianProcess::log_evidence)
+        };
+        candidates.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
+        let few: Vec<usize> = thinned(self.recording.rows.len(), MOST).collect();
+        let recording = self.recording.subset(&few);
+        let folds = folds_between(&recording);
+        let mut best = (f64::INFINITY, 0);
+        for (i, candidate) in candidates.iter().enumerate() {
+            let margin = if i == 0 { 1.0 } else { MARGIN };
+            let error_m = margin * self.held_out_error_m(candidate, &recording, &folds)?;
+            if error_m < best.0 {
+                best = (error_m, i);
+            }
+        }
+        Ok(candidates.swap_remove(best.1))
+    }
+
+    /// Mean error at the positions that folds hold out; infinite where they hold out none.
+    fn held_out_error_m(
+        &self,
+        Candidate { features, hyperparameters, .. }: &Candidate,
+        recording: &Recording,
+        folds: &[Fold],
+    ) -> Result<f64, GaussianProcessError> {
+        let mut errors_m = Vec::with_capacity(recording.rows.len());
+        for fold in folds {
+            self.watch.round()?;
+            let points = Points::new(&recording.subset(&fold.training), features, self.extent);
+            let process = self.regression.condition(points.samples(), hyperparameters, self.watch)?;
+            for row in fold.held_out.iter().map(|i| &recording.rows[*i]) {
+                let (means_m, _) = process.predict(&features.apply(&row.reading));
+                let at_m = [row.position.x_m, row.position.y_m];
+                let off_m = means_m.iter().zip(at_m).map(|(mean, at)| mean - at);
+                errors_m.push(off_m.map(|off| off * off).sum::<f64>().sqrt());
+            }
+        }
+        Ok(if errors_m.is_empty() { f64::INFINITY } else { mean(errors_m) })
+    }
+}
+
+/// Folds by position; positions beyond all that are left in a fold are not held out of it, as few contacts lie beyond all presses.
+fn folds_between(recording: &Recording) -> Vec<Fold> {
+    const FOLDS: usize = 5;
+    let mut folds = recording.folds(recording.distinct_positions().len().min(FOLDS)).unwrap_or_default();
+    for Fold { training, held_out } in &mut folds {
+        let range = |along: fn(Position) -> f64| {
+            let left = training.iter().map(|i| along(recording.rows[*i].position));
+            left.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), at| (least.min(at), most.max(at)))
+        };
+        let (x_m, y_m) = (range(|position| position.x_m), range(|position| position.y_m));
+        held_out.retain(|i| {
+            let Position { x_m: x, y_m: y } = recording.rows[*i].position;
+            (x_m.0..=x_m.1).contains(&x) && (y_m.0..=y_m.1).contains(&y)
+        });
+    }
+    folds
+}
