@@ -28,6 +28,7 @@ pub mod centroid;
 pub mod closed_form;
 pub mod description;
 pub mod digit;
+pub mod estimate_record;
 pub mod estimator;
 pub mod evaluation;
 pub mod features;

@@ -67,6 +67,58 @@ pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -
     CleanSensors::new(surface, layout).reading(contact)
 }
 
+/// A simulated bench that is read again and again: gains, offsets and places of its sensors are drawn once, noise for each reading.
+///
+/// ```
+/// use palpate_estimators::{setup::Setup, simulate::SimulatedBench};
+/// use palpate_mechanics::contact::{Contact, Position};
+/// use palpate_mechanics::sensing::SensorKind::Deflection;
+/// use palpate_mechanics::surface::Beam;
+/// use palpate_mechanics::units::{gpa, mm, um};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+/// let mut bench = SimulatedBench::new(&setup, 0)?;
+/// let clean = bench.clean(&[Contact { position: Position::along(mm(180.0)), force_n: 3.0 }]);
+/// let (first, second) = (bench.measure(&clean), bench.measure(&clean));
+/// assert!(first != second && (first[3] - clean[3]).abs() < um(30.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct SimulatedBench<'a> {
+    layout: &'a Layout,
+    sensors: CleanSensors<'a>,
+    errors: ChannelErrors,
+    rng: Xoshiro256PlusPlus,
+}
+
+impl<'a> SimulatedBench<'a> {
+    /// The bench of a setup as a seed has it.
+    ///
+    /// # Errors
+    /// [`SimulateError::NoModel`] for a measured surface, [`SimulateError::Surface`] where the surface's equations are not solved.
+    pub fn new(setup: &'a Setup, seed: u64) -> Result<Self, SimulateError> {
+        let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
+        surface.check_solution()?;
+        let (placed, errors, rng) = draw_faults(setup, seed);
+        Ok(Self { layout: setup.layout(), sensors: CleanSensors::new(surface, &placed), errors, rng })
+    }
+
+    /// Faultless reading under contacts on the surface, in the SI unit of each sensor: the sum of what each contact alone makes, and 0 under none.
+    pub fn clean(&self, contacts: &[Contact]) -> Vec<f64> {
+        let mut sum = vec![0.0; self.layout.len()];
+        for contact in contacts {
+            let reading = self.sensors.reading(*contact);
+            sum.iter_mut().zip(reading).for_each(|(sum, value)| *sum += value);
+        }
+        sum
+    }
+
+    /// A reading of the faulty channels, with fresh noise, of what faultless ones read.
+    pub fn measure(&mut self, clean: &[f64]) -> Vec<f64> {
+        measure(self.layout, clean, &self.errors, &mut self.rng)
+    }
+}
+
 impl Setup {
     /// The bench as it is when pressed to calibrate: with the force of these presses.
     ///
@@ -117,17 +169,14 @@ pub fn simulate_contacts(
     repeats: usize,
     seed: u64,
 ) -> Result<Recording, SimulateError> {
-    let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
     let positions: Vec<Position> = contacts.iter().map(|contact| contact.position).collect();
-    OffSurface::check("position", &positions, surface.extent())?;
-    surface.check_solution()?;
-    let (placed, errors, mut rng) = draw_faults(setup, seed);
-    let sensors = CleanSensors::new(surface, &placed);
+    let mut bench = SimulatedBench::new(setup, seed)?;
+    OffSurface::check("position", &positions, setup.surface().extent())?;
     let mut rows = Vec::new();
-    for Contact { position, force_n } in contacts.iter().copied() {
-        let clean = sensors.reading(Contact { position, force_n });
+    for contact @ Contact { position, force_n } in contacts.iter().copied() {
+        let clean = bench.clean(&[contact]);
         for _ in 0..repeats {
-            let reading = measure(setup.layout(), &clean, &errors, &mut rng);
+            let reading = bench.measure(&clean);
             rows.push(Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading });
         }
     }

@@ -1,0 +1,115 @@
+//! An estimate as files and streams have it: in millimetres and newtons, without what was not estimated.
+
+use palpate_core::{ContactEstimate, Estimate, Mode};
+use palpate_mechanics::surface::Extent;
+use serde::Serialize;
+
+/// The word for an estimate near an end, of a force that is not known.
+const TRADE_OFF: &str = "force and position";
+
+/// An estimate as a record of JSON.
+///
+/// ```
+/// use palpate_core::{Estimate, Position, Status};
+/// use palpate_estimators::estimate_record::EstimateRecord;
+/// use palpate_mechanics::surface::Extent;
+///
+/// let estimate = Estimate::of_position(Position::along(0.125), Status::Located);
+/// let record = EstimateRecord::new(&estimate, Extent::line(0.4)?);
+/// assert_eq!(serde_json::to_string(&record)?, r#"{"x_mm":125.0,"status":"located"}"#);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EstimateRecord {
+    /// The contact: the only one, or the strongest.
+    #[serde(flatten)]
+    pub contact: ContactRecord,
+    /// Name of the status.
+    pub status: &'static str,
+    /// Other places that the reading fits, most probable first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub modes: Vec<ModeRecord>,
+    /// Contacts beside the first, strongest first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub further: Vec<ContactRecord>,
+}
+
+/// A contact as a record of JSON.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ContactRecord {
+    /// Position along the surface, in mm.
+    pub x_mm: f64,
+    /// Position across it, in mm; of a plane.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub y_mm: Option<f64>,
+    /// Force, in N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<f64>,
+    /// Ends of the 95 % interval along the surface, in mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub x_95_mm: Option<[f64; 2]>,
+    /// The same across a plane.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub y_95_mm: Option<[f64; 2]>,
+    /// Standard deviation of the position, of a plane that of the distance, in mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sd_mm: Option<f64>,
+    /// Ends of the force's 95 % interval where force and place trade off, in N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_95_n: Option<[f64; 2]>,
+    /// The word for that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trade_off: Option<&'static str>,
+    /// Standard deviation of the force, in N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sd_force_n: Option<f64>,
+}
+
+/// A place that explains a reading, as a record of JSON.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModeRecord {
+    /// The contact there.
+    #[serde(flatten)]
+    pub contact: ContactRecord,
+    /// Its share of the probability, 0 to 1.
+    pub probability: f64,
+}
+
+impl EstimateRecord {
+    /// The record of an estimate on a surface of this extent.
+    pub fn new(estimate: &Estimate, extent: Extent) -> Self {
+        let mode = |mode: &Mode| ModeRecord {
+            contact: ContactRecord::new(&mode.contact, extent),
+            probability: mode.probability,
+        };
+        let further = estimate.further.as_slice().iter();
+        Self {
+            contact: ContactRecord::new(&estimate.contact, extent),
+            status: estimate.status.name(),
+            modes: estimate.modes.as_slice().iter().map(mode).collect(),
+            further: further.map(|contact| ContactRecord::new(contact, extent)).collect(),
+        }
+    }
+}
+
+impl ContactRecord {
+    /// The record of a contact on a surface of this extent.
+    pub fn new(contact: &ContactEstimate, extent: Extent) -> Self {
+        let uncertainty = contact.uncertainty.as_ref();
+        let mm = |(low, high): (f64, f64)| [low * 1e3, high * 1e3];
+        // JSON has no infinity: what is not known at all is left out.
+        let sd = |variance: f64| Some(variance.sqrt()).filter(|sd| *sd > 0.0 && sd.is_finite());
+        let force_95_n = uncertainty.and_then(|u| u.force_95_n).map(|(low_n, high_n)| [low_n, high_n]);
+        Self {
+            x_mm: contact.position.x_m * 1e3,
+            y_mm: extent.if_plane(contact.position.y_m * 1e3),
+            force_n: contact.force_n,
+            x_95_mm: uncertainty.map(|u| mm(u.x_95_m)),
+            y_95_mm: uncertainty.and_then(|u| extent.if_plane(mm(u.y_95_m))),
+            sd_mm: uncertainty.and_then(|u| sd(u.covariance[0] + u.covariance[3])).map(|sd_m| sd_m * 1e3),
+            force_95_n,
+            trade_off: force_95_n.map(|_| TRADE_OFF),
+            sd_force_n: uncertainty.and_then(|u| sd(u.covariance[5])),
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Events of a session.
+
+use palpate_estimators::estimate_record::ContactRecord;
+use serde::Serialize;
+
+/// An event with its time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EventRecord {
+    /// Seconds since 1970-01-01 00:00 UTC.
+    pub time_s: f64,
+    /// What happened.
+    #[serde(flatten)]
+    pub event: Event,
+}
+
+/// What happened in a session.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub enum Event {
+    /// The source is there.
+    SourceOpened {
+        /// Its name.
+        name: String,
+    },
+    /// The source went away, and is looked for again.
+    SourceLost {
+        /// Why.
+        why: String,
+    },
+    /// The source has no more.
+    SourceEnded,
+    /// Readings are missing.
+    Gap {
+        /// Seconds without a reading.
+        seconds: f64,
+        /// Frames that the board sent in the meantime, where it counts them.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        lost_frames: Option<u32>,
+    },
+    /// The wall clock was set.
+    ClockSet {
+        /// By so many seconds, forward where positive.
+        by_s: f64,
+    },
+    /// Something touches.
+    TouchDown {
+        /// Where, and how hard.
+        #[serde(flatten)]
+        contact: ContactRecord,
+    },
+    /// A contact has moved by more than is uncertain of it.
+    Move {
+        /// Where it is, and how hard.
+        #[serde(flatten)]
+        contact: ContactRecord,
+    },
+    /// Nothing touches any more.
+    LiftOff {
+        /// Seconds since it was touched.
+        seconds: f64,
+    },
+    /// A second contact came, or what cannot be told from one.
+    OutsideModel,
+    /// Contacts beside the first.
+    SecondContact {
+        /// Where it is, and how hard.
+        #[serde(flatten)]
+        contact: ContactRecord,
+    },
+    /// The state of a channel has changed.
+    Channel {
+        /// Its name.
+        name: String,
+        /// Its state now.
+        state: ChannelState,
+    },
+    /// The baseline was taken anew.
+    Tared,
+    /// Somebody's mark.
+    Mark {
+        /// Its text.
+        text: String,
+    },
+}
+
+/// State of a channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ChannelState {
+    /// It reads.
+    #[default]
+    Well,
+    /// It reads one and the same value, whatever the others read.
+    Dead,
+    /// It reads the end of its range.
+    Saturated,
+}

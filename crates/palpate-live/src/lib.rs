@@ -1,0 +1,12 @@
+//! Live use of palpate: bytes of a board in, contacts out.
+//!
+//! A [`source`] brings bytes, each with the instant of its arrival. A [`session`] turns them into readings, estimates and events; it touches no
+//! device, file or clock, so that the same bytes at the same instants give the same answers, in a test, a replay or on the bench.
+
+pub mod event;
+pub mod frame;
+pub mod sample;
+pub mod session;
+pub mod simulated_board;
+pub mod source;
+pub mod stamp;

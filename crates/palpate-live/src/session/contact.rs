@@ -1,0 +1,110 @@
+//! Touch-down, move, lift-off: what the estimates say in their course.
+
+use super::touches;
+use crate::event::Event;
+use palpate_core::{ContactEstimate, Estimate, Position, Status};
+use palpate_estimators::estimate_record::ContactRecord;
+use palpate_mechanics::surface::Extent;
+use std::time::Duration;
+
+/// Readings in a row that it takes for a change: of noise one in a thousand is taken for a contact.
+const IN_A_ROW: u32 = 2;
+/// The same for `outside_model`, which about three readings of a contact in a thousand are.
+const DOUBTS_IN_A_ROW: u32 = 3;
+/// Shortest way that is a move, as a share of the length.
+const MOVE: f64 = 0.01;
+/// Least time between two moves that are told.
+const BETWEEN_MOVES: Duration = Duration::from_millis(50);
+
+/// Watch over the contact.
+#[derive(Debug)]
+pub struct ContactWatch {
+    extent: Extent,
+    state: State,
+    /// State that the last estimates have had, and how many in a row.
+    recent: (State, u32),
+    since: Duration,
+    told: (Position, Duration),
+}
+
+/// State of the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    Untouched,
+    Touched { contacts: usize },
+    OutsideModel,
+}
+
+impl ContactWatch {
+    /// Watch over an untouched surface.
+    pub fn new(extent: Extent) -> Self {
+        Self {
+            extent,
+            state: State::Untouched,
+            recent: (State::Untouched, 0),
+            since: Duration::ZERO,
+            told: (Position::default(), Duration::ZERO),
+        }
+    }
+
+    /// True while something touches.
+    pub fn is_touched(&self) -> bool {
+        self.state != State::Untouched
+    }
+
+    /// Takes the next estimate.
+    pub fn add(&mut self, now: Duration, estimate: &Estimate, mut tell: impl FnMut(Event)) {
+        let next = match estimate.status {
+            status if touches(status) => State::Touched { contacts: 1 + estimate.further.as_slice().len() },
+            Status::NoContact => State::Untouched,
+            _ => State::OutsideModel,
+        };
+        self.recent = if self.recent.0 == next { (next, self.recent.1.saturating_add(1)) } else { (next, 1) };
+        let needed = if next == State::OutsideModel { DOUBTS_IN_A_ROW } else { IN_A_ROW };
+        if next != self.state && self.recent.1 >= needed {
+            self.change(now, next, estimate, &mut tell);
+        } else if next == self.state && touches(estimate.status) {
+            self.follow(now, &estimate.contact, &mut tell);
+        }
+    }
+
+    fn change(&mut self, now: Duration, next: State, estimate: &Estimate, tell: &mut impl FnMut(Event)) {
+        let before = std::mem::replace(&mut self.state, next);
+        match next {
+            State::Untouched => {
+                tell(Event::LiftOff { seconds: now.saturating_sub(self.since).as_secs_f64() })
+            }
+            State::OutsideModel => tell(Event::OutsideModel),
+            State::Touched { contacts } => {
+                if before == State::Untouched {
+                    self.since = now;
+                    tell(Event::TouchDown { contact: self.record(&estimate.contact) });
+                }
+                if let (true, Some(second)) = (contacts > 1, estimate.further.as_slice().first()) {
+                    tell(Event::SecondContact { contact: self.record(second) });
+                }
+                self.told = (estimate.contact.position, now);
+            }
+        }
+        if before == State::Untouched {
+            self.since = now;
+        }
+    }
+
+    fn follow(&mut self, now: Duration, contact: &ContactEstimate, tell: &mut impl FnMut(Event)) {
+        let (position, at) = self.told;
+        let uncertain_m = contact.uncertainty.map_or(0.0, |u| {
+            let across = |(low, high): (f64, f64)| 0.5 * (high - low);
+            across(u.x_95_m).max(across(u.y_95_m))
+        });
+        let least_m = (MOVE * self.extent.length_m()).max(uncertain_m);
+        if now.saturating_sub(at) >= BETWEEN_MOVES && position.distance_m(contact.position) > least_m {
+            self.told = (contact.position, now);
+            tell(Event::Move { contact: self.record(contact) });
+        }
+    }
+
+    fn record(&self, contact: &ContactEstimate) -> ContactRecord {
+        ContactRecord::new(contact, self.extent)
+    }
+}

@@ -1,0 +1,95 @@
+//! Health of the channels.
+
+use crate::event::{ChannelState, Event};
+use palpate_mechanics::sensing::Layout;
+use serde::Serialize;
+
+/// Readings in a row of one and the same value after which a channel is dead, where others change.
+const DEAD: u32 = 100;
+/// Readings in a row at the end of its range after which a channel is saturated.
+const SATURATED: u32 = 5;
+
+/// Health of a channel.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChannelHealth {
+    /// Name of its sensor.
+    pub name: String,
+    /// Its state.
+    pub state: ChannelState,
+    /// Lowest and highest value so far, in its SI unit or raw.
+    pub range: [f64; 2],
+    /// Standard deviation of the noise of a reading, from differences of readings that follow one another, in its SI unit or raw.
+    pub noise_sd: f64,
+}
+
+/// Watch over the health of channels.
+#[derive(Debug)]
+pub struct HealthWatch {
+    channels: Vec<ChannelHealth>,
+    /// Ends of the range of each, where they are known.
+    limits: Vec<Option<(f64, f64)>>,
+    last: Vec<f64>,
+    same: Vec<u32>,
+    at_end: Vec<u32>,
+    readings: u64,
+}
+
+impl HealthWatch {
+    /// Watch over the channels of a layout.
+    pub fn new(layout: &Layout) -> Self {
+        let health = |name: &String| ChannelHealth {
+            name: name.clone(),
+            state: ChannelState::Well,
+            range: [f64::INFINITY, f64::NEG_INFINITY],
+            noise_sd: 0.0,
+        };
+        let count = layout.len();
+        Self {
+            channels: layout.names().iter().map(health).collect(),
+            limits: layout.sensors().iter().map(|sensor| sensor.channel.range).collect(),
+            last: vec![f64::NAN; count],
+            same: vec![0; count],
+            at_end: vec![0; count],
+            readings: 0,
+        }
+    }
+
+    /// Health of each channel.
+    pub fn channels(&self) -> &[ChannelHealth] {
+        &self.channels
+    }
+
+    /// Takes the next reading.
+    pub fn add(&mut self, reading: &[f64], mut tell: impl FnMut(Event)) {
+        self.readings += 1;
+        for (i, value) in reading.iter().copied().enumerate() {
+            let channel = &mut self.channels[i];
+            channel.range = [channel.range[0].min(value), channel.range[1].max(value)];
+            let same = self.last[i].to_bits() == value.to_bits();
+            self.same[i] = if same { self.same[i].saturating_add(1) } else { 0 };
+            if self.readings > 1 {
+                // The difference of two readings has twice the variance of one; a mean over the last few hundred.
+                let weight = 1.0 / (self.readings - 1).min(300) as f64;
+                let variance = 0.5 * (value - self.last[i]).powi(2);
+                channel.noise_sd =
+                    (channel.noise_sd.powi(2) + weight * (variance - channel.noise_sd.powi(2))).sqrt();
+            }
+            let ends = self.limits[i].is_some_and(|(low, high)| value <= low || value >= high);
+            self.at_end[i] = if ends { self.at_end[i].saturating_add(1) } else { 0 };
+            self.last[i] = value;
+        }
+        let others_change = self.same.contains(&0);
+        for (i, channel) in self.channels.iter_mut().enumerate() {
+            let state = match channel.state {
+                _ if self.at_end[i] >= SATURATED => ChannelState::Saturated,
+                ChannelState::Dead if self.same[i] > 0 => ChannelState::Dead,
+                _ if self.same[i] >= DEAD && others_change => ChannelState::Dead,
+                _ => ChannelState::Well,
+            };
+            if state != channel.state {
+                channel.state = state;
+                tell(Event::Channel { name: channel.name.clone(), state });
+            }
+        }
+    }
+}

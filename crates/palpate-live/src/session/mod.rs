@@ -1,0 +1,221 @@
+//! A session: bytes and instants in; readings, estimates and events out.
+
+mod contact;
+mod health;
+mod taring;
+mod timeline;
+
+pub use health::ChannelHealth;
+
+use crate::event::{Event, EventRecord};
+use crate::frame::{BadFrame, Channel, Frame, TextDecoder};
+use crate::sample::Sample;
+use crate::source::{Arrival, Arrived};
+use crate::stamp::Stamp;
+use contact::ContactWatch;
+use health::HealthWatch;
+use palpate_core::Status;
+use palpate_estimators::estimator::Locator;
+use palpate_mechanics::surface::Extent;
+use std::collections::BTreeMap;
+use taring::Taring;
+use timeline::Timeline;
+
+/// Configuration of a session.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SessionConfig {
+    /// Treatment of offsets that have moved since calibration.
+    pub tare: TareMode,
+}
+
+/// Treatment of offsets that have moved since calibration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TareMode {
+    /// The baseline is found, and followed while nothing touches, where the locator tells untouched readings.
+    #[default]
+    Auto,
+    /// The baseline stays, until somebody tares.
+    Manual,
+}
+
+/// Wish of a user.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// Take the next readings for untouched.
+    Tare,
+    /// Set a mark.
+    Mark(String),
+}
+
+/// Output of a session.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Output {
+    /// A reading with its estimate.
+    Sample(Sample),
+    /// An event.
+    Event(EventRecord),
+}
+
+/// Numbers of what arrived.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Counters {
+    /// Readings that were located.
+    pub readings: u64,
+    /// Frames that were no reading, by cause.
+    pub bad_frames: BTreeMap<BadFrame, u64>,
+    /// Frames that the board sent and nobody got, where it counts them.
+    pub lost_frames: u64,
+    /// Stretches without readings.
+    pub gaps: u64,
+}
+
+/// A session of a locator.
+pub struct Session<'a> {
+    locator: &'a Locator,
+    channels: Vec<Channel>,
+    extent: Extent,
+    decoder: TextDecoder,
+    timeline: Timeline,
+    taring: Taring,
+    contact: ContactWatch,
+    health: HealthWatch,
+    counters: Counters,
+}
+
+impl<'a> Session<'a> {
+    /// A session that has seen nothing.
+    pub fn new(locator: &'a Locator, config: &SessionConfig) -> Self {
+        let channels = Channel::all_of(&locator.setup);
+        let extent = locator.setup.surface().extent();
+        Self {
+            locator,
+            extent,
+            decoder: TextDecoder::new(&channels),
+            timeline: Timeline::default(),
+            taring: Taring::new(locator, config.tare),
+            contact: ContactWatch::new(extent),
+            health: HealthWatch::new(locator.setup.layout()),
+            counters: Counters::default(),
+            channels,
+        }
+    }
+
+    /// Channels of its frames.
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    /// Numbers of what arrived.
+    pub fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// Health of each channel.
+    pub fn health(&self) -> &[ChannelHealth] {
+        self.health.channels()
+    }
+
+    /// Readings a second, over the last second that had some.
+    pub fn rate_hz(&self) -> f64 {
+        self.timeline.rate_hz()
+    }
+
+    /// Takes what a source brought.
+    pub fn receive(&mut self, arrived: &Arrived, out: &mut Vec<Output>) {
+        let at = arrived.at;
+        if let Some(by_s) = self.timeline.look_at_clock(at) {
+            self.tell(at, Event::ClockSet { by_s }, out);
+        }
+        match &arrived.arrival {
+            Arrival::Opened(name) => self.tell(at, Event::SourceOpened { name: name.clone() }, out),
+            Arrival::Lost(why) => {
+                self.decoder.reset();
+                self.tell(at, Event::SourceLost { why: why.clone() }, out);
+            }
+            Arrival::Ended => {
+                self.decode(at, |decoder, hand_on| decoder.end_message(hand_on), out);
+                self.tell(at, Event::SourceEnded, out);
+            }
+            Arrival::Bytes(bytes) => self.decode(at, |decoder, hand_on| decoder.receive(bytes, hand_on), out),
+            Arrival::Message(bytes) => self.decode(
+                at,
+                |decoder, hand_on| {
+                    decoder.receive(bytes, &mut *hand_on);
+                    decoder.end_message(hand_on);
+                },
+                out,
+            ),
+        }
+    }
+
+    /// Does what a user wishes.
+    pub fn command(&mut self, at: Stamp, command: Command, out: &mut Vec<Output>) {
+        match command {
+            Command::Tare => self.taring.begin(),
+            Command::Mark(text) => self.tell(at, Event::Mark { text }, out),
+        }
+    }
+
+    fn decode(
+        &mut self,
+        at: Stamp,
+        decode: impl FnOnce(&mut TextDecoder, &mut dyn FnMut(Result<Frame, BadFrame>)),
+        out: &mut Vec<Output>,
+    ) {
+        let mut frames = Vec::new();
+        decode(&mut self.decoder, &mut |frame| frames.push(frame));
+        for frame in frames {
+            match frame {
+                Ok(frame) => self.take(at, frame, out),
+                Err(cause) => *self.counters.bad_frames.entry(cause).or_default() += 1,
+            }
+        }
+    }
+
+    /// A reading's way: time, health, tare, estimate, events.
+    fn take(&mut self, at: Stamp, frame: Frame, out: &mut Vec<Output>) {
+        let (unix_ns, gap) = self.timeline.next(at, &frame);
+        if let Some(gap) = gap {
+            self.counters.gaps += 1;
+            self.counters.lost_frames += u64::from(gap.lost_frames.unwrap_or(0));
+            self.tell(at, Event::Gap { seconds: gap.seconds, lost_frames: gap.lost_frames }, out);
+        }
+        let time_s = unix_ns as f64 * 1e-9;
+        self.health.add(&frame.reading, |event| out.push(Output::Event(EventRecord { time_s, event })));
+        let mut tared = frame.reading.clone();
+        let Some((estimate, tares)) = self.taring.locate(self.locator, &frame.reading, &mut tared) else {
+            // Immense values whose difference is no number.
+            *self.counters.bad_frames.entry(BadFrame::NotANumber).or_default() += 1;
+            return;
+        };
+        if tares {
+            out.push(Output::Event(EventRecord { time_s, event: Event::Tared }));
+        }
+        self.contact
+            .add(at.elapsed, &estimate, |event| out.push(Output::Event(EventRecord { time_s, event })));
+        let number = self.counters.readings;
+        self.counters.readings += 1;
+        let reading = frame.reading;
+        out.push(Output::Sample(Sample { number, unix_ns, arrived: at.elapsed, reading, tared, estimate }));
+    }
+
+    fn tell(&self, at: Stamp, event: Event, out: &mut Vec<Output>) {
+        let time_s = self.timeline.unix_ns(at) as f64 * 1e-9;
+        out.push(Output::Event(EventRecord { time_s, event }));
+    }
+
+    /// Whether something touches, by the last readings.
+    pub fn is_touched(&self) -> bool {
+        self.contact.is_touched()
+    }
+
+    /// Extent of the surface.
+    pub fn extent(&self) -> Extent {
+        self.extent
+    }
+}
+
+/// True for the status of an estimate that says where something touches.
+fn touches(status: Status) -> bool {
+    matches!(status, Status::Located | Status::Ambiguous)
+}

@@ -1,0 +1,76 @@
+//! The baseline of a session, and estimates by it.
+
+use super::TareMode;
+use palpate_core::Estimate;
+use palpate_core::Tare;
+use palpate_estimators::estimator::Locator;
+
+/// Readings that make a baseline when a user tares: their mean has a seventh of the noise of one.
+const READINGS: u32 = 50;
+
+/// The baseline of a session.
+#[derive(Debug)]
+pub struct Taring {
+    /// The tare; `None` where the locator has not learnt what its channels read untouched.
+    tare: Option<Tare<Vec<f64>>>,
+    follows: bool,
+    /// A baseline that is being taken, and the readings it still lacks.
+    taken: Option<(Tare<Vec<f64>>, u32)>,
+}
+
+impl Taring {
+    /// The tare of a session that begins.
+    pub fn new(locator: &Locator, mode: TareMode) -> Self {
+        let follows = mode == TareMode::Auto && locator.false_alarm_rate().is_some();
+        Self { tare: locator.tare().ok(), follows, taken: None }
+    }
+
+    /// Begins to take a baseline.
+    pub fn begin(&mut self) {
+        if let Some(tare) = &self.tare {
+            self.taken = Tare::new(tare.learnt().to_vec()).ok().map(|tare| (tare, READINGS));
+        }
+    }
+
+    /// The estimate of a reading, and whether a baseline is complete with it; `tared` holds the tared reading afterwards. `None` for a reading
+    /// beyond numbers.
+    pub fn locate(
+        &mut self,
+        locator: &Locator,
+        reading: &[f64],
+        tared: &mut [f64],
+    ) -> Option<(Estimate, bool)> {
+        let tares = self.take(reading);
+        let Some(tare) = &mut self.tare else { return Some((locator.locate(reading).ok()?, tares)) };
+        if self.follows {
+            // A locator refuses no tared reading: its channels and values were checked by the tare.
+            let mut refused = false;
+            let estimate = tare.follow(reading, tared, |tared| {
+                locator.locate(tared).unwrap_or_else(|_| {
+                    refused = true;
+                    Estimate::of_position(
+                        palpate_core::Position::along(0.0),
+                        palpate_core::Status::OutsideModel,
+                    )
+                })
+            });
+            return estimate.ok().filter(|_| !refused).map(|estimate| (estimate, tares));
+        }
+        tare.apply(reading, tared).ok()?;
+        Some((locator.locate(tared).ok()?, tares))
+    }
+
+    /// Adds a reading to a baseline that is being taken; true when that is complete, and the one that holds.
+    fn take(&mut self, reading: &[f64]) -> bool {
+        let Some((tare, left)) = &mut self.taken else { return false };
+        if tare.add_untouched(reading).is_err() {
+            return false;
+        }
+        *left -= 1;
+        if *left > 0 {
+            return false;
+        }
+        self.tare = self.taken.take().map(|(tare, _)| tare);
+        true
+    }
+}

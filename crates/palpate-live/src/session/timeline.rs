@@ -1,0 +1,94 @@
+//! Times of readings, and stretches without any.
+
+use crate::frame::Frame;
+use crate::stamp::Stamp;
+use std::time::Duration;
+
+/// Times of the readings of a session.
+#[derive(Debug, Default)]
+pub struct Timeline {
+    /// Wall clock at the start, less the monotonic one, in ns: later times are reckoned from it, so that they never go back.
+    base_ns: Option<i128>,
+    /// The same by the last look.
+    seen_ns: i128,
+    last_ns: u64,
+    last_arrival: Option<Duration>,
+    last_sequence: Option<u32>,
+    /// Start of the second that is counted, and readings in it.
+    second: (Duration, u32),
+    rate_hz: f64,
+}
+
+/// A stretch without readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gap {
+    /// Its length in seconds.
+    pub seconds: f64,
+    /// Frames that the board sent in it, where it counts them.
+    pub lost_frames: Option<u32>,
+}
+
+/// A wall clock that is off by more was set, in ns: it is slewed by less.
+const SET_NS: i128 = 500_000_000;
+/// Shortest silence that is a gap, in seconds, and its length in periods of the readings.
+const GAP_S: f64 = 0.5;
+const GAP_PERIODS: f64 = 5.0;
+
+impl Timeline {
+    /// Nanoseconds since 1970 of an instant.
+    pub fn unix_ns(&self, at: Stamp) -> u64 {
+        let base_ns = self.base_ns.unwrap_or_else(|| offset_ns(at));
+        u64::try_from(base_ns + at.elapsed.as_nanos() as i128).unwrap_or(0)
+    }
+
+    /// Seconds by which the wall clock was set since the last look, where it was.
+    pub fn look_at_clock(&mut self, at: Stamp) -> Option<f64> {
+        let offset_ns = offset_ns(at);
+        if self.base_ns.is_none() {
+            self.base_ns = Some(offset_ns);
+            self.seen_ns = offset_ns;
+        }
+        let by_ns = offset_ns - self.seen_ns;
+        self.seen_ns = offset_ns;
+        (by_ns.abs() > SET_NS).then(|| by_ns as f64 * 1e-9)
+    }
+
+    /// Time of the next reading in ns since 1970, and the gap before it.
+    pub fn next(&mut self, at: Stamp, frame: &Frame) -> (u64, Option<Gap>) {
+        let gap = self.gap(at.elapsed, frame.sequence);
+        self.count(at.elapsed);
+        self.last_arrival = Some(at.elapsed);
+        self.last_sequence = frame.sequence;
+        self.last_ns = self.unix_ns(at).max(self.last_ns);
+        (self.last_ns, gap)
+    }
+
+    /// Readings a second.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    fn gap(&self, now: Duration, sequence: Option<u32>) -> Option<Gap> {
+        let seconds = now.saturating_sub(self.last_arrival?).as_secs_f64();
+        let lost_frames =
+            self.last_sequence.zip(sequence).map(|(last, next)| next.wrapping_sub(last).saturating_sub(1));
+        let longest_s =
+            if self.rate_hz > 0.0 { GAP_S.max(GAP_PERIODS / self.rate_hz) } else { f64::INFINITY };
+        (seconds > longest_s || lost_frames.is_some_and(|lost| lost > 0))
+            .then_some(Gap { seconds, lost_frames })
+    }
+
+    fn count(&mut self, now: Duration) {
+        let (start, count) = &mut self.second;
+        *count += 1;
+        let span = now.saturating_sub(*start);
+        if span >= Duration::from_secs(1) {
+            self.rate_hz = f64::from(*count) / span.as_secs_f64();
+            self.second = (now, 0);
+        }
+    }
+}
+
+fn offset_ns(at: Stamp) -> i128 {
+    i128::from(at.unix_ns) - at.elapsed.as_nanos() as i128
+}

@@ -1,0 +1,35 @@
+//! `simulated:rig.toml`: a simulated board within the process.
+
+use super::{Arrival, Outlet, SourceError};
+use crate::simulated_board::{BoardConfig, Finger, SimulatedBoard};
+use palpate_rig::Rig;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Time between two arrivals at most: readings that fall into it arrive together, as they do through USB.
+const BURST: Duration = Duration::from_millis(1);
+
+pub fn open(outlet: Outlet, path: &Path, rate_hz: f64, seed: u64) -> Result<(), SourceError> {
+    let complaint = |error: String| SourceError::Rig { path: path.display().to_string(), error };
+    let text = std::fs::read_to_string(path).map_err(|error| complaint(error.to_string()))?;
+    let rig = Rig::from_toml(&text).map_err(|error| complaint(error.to_string()))?;
+    let config = BoardConfig { rate_hz, seed, ..BoardConfig::default() };
+    // Made once here so that a rig that cannot be simulated is refused before anything is begun.
+    SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, seed))?;
+    let name = format!("a simulated board ({})", path.display());
+    std::thread::Builder::new().name("source".to_owned()).spawn(move || run(&outlet, &rig, &config, name))?;
+    Ok(())
+}
+
+fn run(outlet: &Outlet, rig: &Rig, config: &BoardConfig, name: String) {
+    let Ok(mut board) = SimulatedBoard::new(&rig.setup, config, Finger::random(rig, config.seed)) else {
+        return;
+    };
+    let start = Instant::now();
+    let mut goes_on = outlet.send(Arrival::Opened(name));
+    while goes_on {
+        std::thread::sleep(BURST.max(board.next_at().saturating_sub(start.elapsed())));
+        let bytes = board.send_until(start.elapsed());
+        goes_on = if bytes.is_empty() { !outlet.is_stopped() } else { outlet.send(Arrival::Bytes(bytes)) };
+    }
+}
