@@ -5,8 +5,11 @@
 
 pub mod event;
 pub mod frame;
+pub mod input;
+pub mod pipeline;
 pub mod sample;
 pub mod session;
 pub mod simulated_board;
+pub mod sink;
 pub mod source;
 pub mod stamp;

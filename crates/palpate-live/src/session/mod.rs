@@ -9,8 +9,8 @@ pub use health::ChannelHealth;
 
 use crate::event::{Event, EventRecord};
 use crate::frame::{BadFrame, Channel, Frame, TextDecoder};
+use crate::input::{Arrival, Arrived, Command};
 use crate::sample::Sample;
-use crate::source::{Arrival, Arrived};
 use crate::stamp::Stamp;
 use contact::ContactWatch;
 use health::HealthWatch;
@@ -38,20 +38,11 @@ pub enum TareMode {
     Manual,
 }
 
-/// Wish of a user.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Command {
-    /// Take the next readings for untouched.
-    Tare,
-    /// Set a mark.
-    Mark(String),
-}
-
 /// Output of a session.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Output {
     /// A reading with its estimate.
-    Sample(Sample),
+    Sample(Box<Sample>),
     /// An event.
     Event(EventRecord),
 }
@@ -196,7 +187,14 @@ impl<'a> Session<'a> {
         let number = self.counters.readings;
         self.counters.readings += 1;
         let reading = frame.reading;
-        out.push(Output::Sample(Sample { number, unix_ns, arrived: at.elapsed, reading, tared, estimate }));
+        out.push(Output::Sample(Box::new(Sample {
+            number,
+            unix_ns,
+            arrived: at.elapsed,
+            reading,
+            tared,
+            estimate,
+        })));
     }
 
     fn tell(&self, at: Stamp, event: Event, out: &mut Vec<Output>) {

@@ -6,35 +6,12 @@ mod url;
 
 pub use url::{SourceUrl, SourceUrlError};
 
-use crate::stamp::{HostClock, Stamp};
+use crate::input::{Arrival, Arrived, Input};
+use crate::stamp::HostClock;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
-
-/// What a source brings.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Arrival {
-    /// The device is there; its name.
-    Opened(String),
-    /// Bytes of a stream, in order, cut anywhere.
-    Bytes(Vec<u8>),
-    /// Bytes of a message, as of UDP and MQTT: whole frames.
-    Message(Vec<u8>),
-    /// The device went away, and is looked for again; the reason.
-    Lost(String),
-    /// There will be no more.
-    Ended,
-}
-
-/// An arrival with its instant.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Arrived {
-    /// The instant at which its last byte was there.
-    pub at: Stamp,
-    /// What arrived.
-    pub arrival: Arrival,
-}
 
 /// A source that cannot be opened at all; one that merely is not there is waited for.
 #[derive(Debug, thiserror::Error)]
@@ -69,7 +46,7 @@ impl Drop for Source {
 
 /// Where a source's thread puts what it brings.
 pub(crate) struct Outlet {
-    to: SyncSender<Arrived>,
+    to: SyncSender<Input>,
     clock: HostClock,
     stop: Arc<AtomicBool>,
 }
@@ -77,7 +54,7 @@ pub(crate) struct Outlet {
 impl Outlet {
     /// Hands an arrival on, stamped now; false once nobody wants more.
     pub(crate) fn send(&self, arrival: Arrival) -> bool {
-        !self.is_stopped() && self.to.send(Arrived { at: self.clock.now(), arrival }).is_ok()
+        !self.is_stopped() && self.to.send(Input::Arrived(Arrived { at: self.clock.now(), arrival })).is_ok()
     }
 
     /// True once the source is to end.
@@ -95,7 +72,7 @@ impl Source {
         url: &SourceUrl,
         folder: &Path,
         clock: HostClock,
-        to: SyncSender<Arrived>,
+        to: SyncSender<Input>,
     ) -> Result<Self, SourceError> {
         let stop = Arc::new(AtomicBool::new(false));
         let outlet = Outlet { to, clock, stop: Arc::clone(&stop) };

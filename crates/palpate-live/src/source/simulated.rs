@@ -1,6 +1,7 @@
 //! `simulated:rig.toml`: a simulated board within the process.
 
-use super::{Arrival, Outlet, SourceError};
+use super::{Outlet, SourceError};
+use crate::input::Arrival;
 use crate::simulated_board::{BoardConfig, Finger, SimulatedBoard};
 use palpate_rig::Rig;
 use std::path::Path;
@@ -13,7 +14,7 @@ pub fn open(outlet: Outlet, path: &Path, rate_hz: f64, seed: u64) -> Result<(), 
     let complaint = |error: String| SourceError::Rig { path: path.display().to_string(), error };
     let text = std::fs::read_to_string(path).map_err(|error| complaint(error.to_string()))?;
     let rig = Rig::from_toml(&text).map_err(|error| complaint(error.to_string()))?;
-    let config = BoardConfig { rate_hz, seed, ..BoardConfig::default() };
+    let config = BoardConfig { rate_hz, seed };
     // Made once here so that a rig that cannot be simulated is refused before anything is begun.
     SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, seed))?;
     let name = format!("a simulated board ({})", path.display());

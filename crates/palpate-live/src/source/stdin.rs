@@ -1,6 +1,7 @@
 //! `-`: bytes of the standard input.
 
-use super::{Arrival, Outlet};
+use super::Outlet;
+use crate::input::Arrival;
 use std::io::Read;
 
 /// Most bytes of an arrival.
@@ -14,15 +15,22 @@ pub fn open(outlet: Outlet) -> std::io::Result<()> {
 fn run(outlet: &Outlet) {
     let mut stdin = std::io::stdin().lock();
     let mut buffer = vec![0; CHUNK];
-    let mut goes_on = outlet.send(Arrival::Opened("stdin".to_owned()));
-    while goes_on {
-        goes_on = match stdin.read(&mut buffer) {
-            Ok(0) => outlet.send(Arrival::Ended) && false,
-            Ok(count) => outlet.send(Arrival::Bytes(buffer[..count].to_vec())),
-            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => true,
+    if !outlet.send(Arrival::Opened("stdin".to_owned())) {
+        return;
+    }
+    loop {
+        let arrival = match stdin.read(&mut buffer) {
+            Ok(0) => break,
+            Ok(count) => Arrival::Bytes(buffer[..count].to_vec()),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
             Err(error) => {
-                outlet.send(Arrival::Lost(error.to_string())) && outlet.send(Arrival::Ended) && false
+                outlet.send(Arrival::Lost(error.to_string()));
+                break;
             }
         };
+        if !outlet.send(arrival) {
+            return;
+        }
     }
+    outlet.send(Arrival::Ended);
 }

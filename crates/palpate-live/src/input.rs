@@ -1,0 +1,47 @@
+//! Inputs of a session: what sources and users bring.
+
+use crate::stamp::Stamp;
+
+/// Input of a session's thread.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Input {
+    /// What a source brought.
+    Arrived(Arrived),
+    /// A user's wish.
+    Command(Command),
+    /// The session is to end.
+    Stop,
+}
+
+/// What a source brings.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Arrival {
+    /// The device is there; its name.
+    Opened(String),
+    /// Bytes of a stream, in order, cut anywhere.
+    Bytes(Vec<u8>),
+    /// Bytes of a message, as of UDP and MQTT: whole frames.
+    Message(Vec<u8>),
+    /// The device went away, and is looked for again; the reason.
+    Lost(String),
+    /// There will be no more.
+    Ended,
+}
+
+/// An arrival with its instant.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Arrived {
+    /// The instant at which its last byte was there.
+    pub at: Stamp,
+    /// What arrived.
+    pub arrival: Arrival,
+}
+
+/// Wish of a user.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// Take the next readings for untouched.
+    Tare,
+    /// Set a mark.
+    Mark(String),
+}

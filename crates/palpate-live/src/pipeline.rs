@@ -1,0 +1,73 @@
+//! The thread of a session: what sources and users bring goes in, and what follows goes to the sinks.
+
+use crate::input::{Arrival, Input};
+use crate::session::{Output, Session};
+use crate::sink::{Batch, ChannelRecord, Sink, StateRecord};
+use crate::stamp::HostClock;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
+/// Inputs that wait for the session at most: then the source waits, and the device's own buffer grows.
+pub const WAITING: usize = 1024;
+/// Time between two states.
+const STATE_EVERY: Duration = Duration::from_micros(16_667);
+
+/// Runs a session until the source has ended, everybody who sends has gone, or it is to stop.
+pub fn run(session: &mut Session, clock: HostClock, inputs: &Receiver<Input>, sinks: &mut [Box<dyn Sink>]) {
+    let mut source = None;
+    let mut next_state = Instant::now() + STATE_EVERY;
+    loop {
+        let mut outputs = Vec::new();
+        let mut goes_on = true;
+        match inputs.recv_timeout(next_state.saturating_duration_since(Instant::now())) {
+            Ok(Input::Arrived(arrived)) => {
+                match &arrived.arrival {
+                    Arrival::Opened(name) => source = Some(name.clone()),
+                    Arrival::Lost(_) => source = None,
+                    Arrival::Ended => goes_on = false,
+                    Arrival::Bytes(_) | Arrival::Message(_) => {}
+                }
+                session.receive(&arrived, &mut outputs);
+            }
+            Ok(Input::Command(command)) => session.command(clock.now(), command, &mut outputs),
+            Err(RecvTimeoutError::Timeout) => {}
+            Ok(Input::Stop) | Err(RecvTimeoutError::Disconnected) => goes_on = false,
+        }
+        give(outputs, sinks);
+        if Instant::now() >= next_state || !goes_on {
+            let state = Arc::new(state(session, source.as_deref()));
+            sinks.iter_mut().for_each(|sink| sink.state(&state));
+            next_state = Instant::now() + STATE_EVERY;
+        }
+        if !goes_on {
+            return;
+        }
+    }
+}
+
+fn give(outputs: Vec<Output>, sinks: &mut [Box<dyn Sink>]) {
+    if !outputs.is_empty() {
+        let batch = Arc::new(Batch { outputs });
+        sinks.iter_mut().for_each(|sink| sink.batch(&batch));
+    }
+}
+
+fn state(session: &Session, source: Option<&str>) -> StateRecord {
+    let channels = session.channels().iter().zip(session.health()).map(|(channel, health)| {
+        let factor = channel.unit.factor();
+        ChannelRecord {
+            state: health.state,
+            // JSON has no infinity, which stands where nothing was read yet.
+            range: Some(health.range.map(|end| end / factor)).filter(|range| range[0] <= range[1]),
+            noise_sd: health.noise_sd / factor,
+        }
+    });
+    StateRecord {
+        source: source.map(str::to_owned),
+        rate_hz: session.rate_hz(),
+        touched: session.is_touched(),
+        counters: session.counters().clone(),
+        channels: channels.collect(),
+    }
+}

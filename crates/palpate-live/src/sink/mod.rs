@@ -1,0 +1,73 @@
+//! Sinks: where the outputs of a session go.
+
+mod json_lines;
+
+pub use json_lines::JsonLines;
+
+use crate::event::{ChannelState, EventRecord};
+use crate::sample::Sample;
+use crate::session::{Counters, Output};
+use serde::Serialize;
+use std::sync::Arc;
+
+/// Outputs that follow from one arrival, in their order; shared by all sinks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Batch {
+    /// The outputs.
+    pub outputs: Vec<Output>,
+}
+
+impl Batch {
+    /// Its samples.
+    pub fn samples(&self) -> impl Iterator<Item = &Sample> {
+        self.outputs.iter().filter_map(|output| match output {
+            Output::Sample(sample) => Some(sample.as_ref()),
+            Output::Event(_) => None,
+        })
+    }
+
+    /// Its events.
+    pub fn events(&self) -> impl Iterator<Item = &EventRecord> {
+        self.outputs.iter().filter_map(|output| match output {
+            Output::Event(event) => Some(event),
+            Output::Sample(_) => None,
+        })
+    }
+}
+
+/// State of a session, some sixty times a second.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct StateRecord {
+    /// Name of the source, while it is there.
+    pub source: Option<String>,
+    /// Readings a second.
+    pub rate_hz: f64,
+    /// True while something touches.
+    pub touched: bool,
+    /// Numbers of what arrived.
+    pub counters: Counters,
+    /// State of each channel, in the order of a reading.
+    pub channels: Vec<ChannelRecord>,
+}
+
+/// State of a channel as a record, in the unit of its board.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChannelRecord {
+    /// Its state.
+    pub state: ChannelState,
+    /// Lowest and highest value so far.
+    pub range: Option<[f64; 2]>,
+    /// Standard deviation of the noise of a reading.
+    pub noise_sd: f64,
+}
+
+/// A sink. It must not block: what it cannot take at once it keeps within bounds, or counts as lost.
+pub trait Sink: Send {
+    /// Takes a batch, which is not empty.
+    fn batch(&mut self, batch: &Arc<Batch>);
+
+    /// Takes the state of the session.
+    fn state(&mut self, state: &Arc<StateRecord>) {
+        let _ = state;
+    }
+}
