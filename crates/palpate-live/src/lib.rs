@@ -13,4 +13,5 @@ pub mod session;
 pub mod simulated_board;
 pub mod sink;
 pub mod source;
+pub mod stage;
 pub mod stamp;
