@@ -1,5 +1,6 @@
 //! One module a verb.
 
+pub mod calibrate;
 pub mod compare;
 pub mod design;
 pub mod evaluate;

@@ -29,16 +29,28 @@ use palpate_mechanics::units::Unit;
 /// # Errors
 /// Whatever `out` reports.
 pub fn write(recording: &Recording, extent: Extent, comment: &str, out: impl Write) -> io::Result<()> {
-    let columns = Columns::own(&recording.channels, &recording.kinds, extent);
+    let own = Columns::own(&recording.channels, &recording.kinds, extent);
+    write_as(recording, &with_nuisances(own, recording), comment, out)
+}
+
+/// Writes `recording` with these columns, so that who reads by them gets the same numbers: their names, units and coordinates. Fields are separated
+/// by commas, whatever the columns say. The time and the force are written where every row has one.
+///
+/// # Errors
+/// Whatever `out` reports.
+pub fn write_as(recording: &Recording, columns: &Columns, comment: &str, out: impl Write) -> io::Result<()> {
     let forces_known = recording.rows.iter().all(|row| row.force_n.is_some());
-    let columns = Columns { force: columns.force.filter(|_| forces_known), ..columns };
-    let columns = with_nuisances(columns, recording);
+    let columns = Columns { force: columns.force.clone().filter(|_| forces_known), ..columns.clone() };
     let times_known = recording.times_s().is_some();
     let timed = |time: Option<String>, rest: Vec<String>| -> Vec<String> {
         time.into_iter().filter(|_| times_known).chain(rest).collect()
     };
-    let heading = timed(Some(TIME.to_owned()), header(&columns));
-    let time = |row: &Row| row.time_s.map(|time_s| Unit::NONE.format_si(time_s));
+    let (time_column, time_unit) = match &columns.time {
+        Some(time) => (column_name(&time.column), time.unit),
+        None => (TIME.to_owned(), Unit::NONE),
+    };
+    let heading = timed(Some(time_column), header(&columns));
+    let time = |row: &Row| row.time_s.map(|time_s| time_unit.format_si(time_s));
     let rows = recording.rows.iter().map(|row| timed(time(row), record(row, &columns)));
     write_lines(comment, std::iter::once(heading).chain(rows), out)
 }
@@ -113,17 +125,21 @@ fn header(columns: &Columns) -> Vec<String> {
     let nuisances = columns.nuisances().map(|nuisance| &nuisance.column);
     let channels = columns.channels.iter().map(|channel| &channel.column);
     let all = position.into_iter().chain(force).chain(nuisances).chain(channels);
-    let name = |column: &Column| match column {
+    all.map(column_name).collect()
+}
+
+fn column_name(column: &Column) -> String {
+    match column {
         Column::Name(name) => name.clone(),
         Column::Number(number) => number.to_string(),
-    };
-    all.map(name).collect()
+    }
 }
 
 fn record(row: &Row, columns: &Columns) -> Vec<String> {
-    let mut record = vec![columns.position_unit.format_si(row.position.x_m)];
+    let origin = columns.frame.origin;
+    let mut record = vec![columns.position_unit.format_si(row.position.x_m + origin.x_m)];
     if let PositionColumns::Plane { .. } = columns.position {
-        record.push(columns.position_unit.format_si(row.position.y_m));
+        record.push(columns.position_unit.format_si(row.position.y_m + origin.y_m));
     }
     if let (Some(force), Some(force_n)) = (&columns.force, row.force_n) {
         record.push(force.values.unit.format_si(force_n));

@@ -19,7 +19,7 @@ pub use csv_in::{
     LineParser, LineProgress, ReadingParser, Schema, TimedParser, TimedReading, TimedRecording, read,
     read_pair,
 };
-pub use csv_out::{csv_row, write, write_timed};
+pub use csv_out::{csv_row, write, write_as, write_timed};
 pub use dialect::Dialect;
 pub use heading::Heading;
 pub use marks::{Decimal, Separator};
