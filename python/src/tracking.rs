@@ -187,7 +187,8 @@ pub fn track<'py>(
         if smooth {
             let mut tracker = SmoothTracker::new(likelihood, config);
             let take = |time_s: f64, reading: &[f64]| tracker.follow(time_s, reading).map(|()| None);
-            follow(&times_s, readings, watch, take).map(|_| tracker.smoothed())
+            follow(&times_s, readings, watch, take)?;
+            tracker.smoothed(watch).map_err(Stopped::Cancelled)
         } else {
             let mut tracker = Tracker::new(likelihood, config);
             follow(&times_s, readings, watch, |time_s, reading| tracker.follow(time_s, reading).map(Some))

@@ -82,7 +82,8 @@ pub enum Status {
     Located,
     /// Nothing touches: the reading is noise. The position means nothing.
     NoContact,
-    /// Several places explain the reading; the estimate is the most probable one, and its modes are the others.
+    /// Several places explain the reading: the estimate is the most probable one, and its modes are the others. Or hardly any place is
+    /// excluded: the 95 % interval is the surface, and there are no modes.
     Ambiguous,
     /// No contact explains the reading within the noise: more contacts than assumed, a damaged sensor, drift.
     OutsideModel,

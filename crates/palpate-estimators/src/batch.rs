@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use palpate_core::Estimate;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-use crate::fit::{CheckEstimate, Fitted, Locate, ReadingError, anywhere_on};
+use crate::fit::{CheckEstimate, Fitted, Locate, ReadingError, told};
 use crate::status::NO_CONTACT;
 
 /// Readings of a block: their estimates, 0.9 kB each, stay in a core's second cache.
@@ -166,8 +166,8 @@ impl<M: Locate> Fitted<M> {
         if let Some(check) = &self.check {
             check.check_batch(readings, channels, estimates, extent);
         }
-        for estimate in estimates.iter_mut().filter(|estimate| !estimate.is_in_numbers()) {
-            *estimate = anywhere_on(extent);
+        for estimate in estimates {
+            *estimate = told(*estimate, extent);
         }
         Ok(())
     }

@@ -13,6 +13,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 
 use crate::recording::{Provenance, Recording};
 use crate::setup::Setup;
+use crate::status::unless_left_open;
 
 /// Task of a fit: setup, recording and seed.
 #[derive(Clone, Copy, Debug)]
@@ -336,7 +337,7 @@ impl<M: Locate> Fitted<M> {
             Some(check) => check.checked(reading, estimate, extent),
             None => estimate,
         };
-        Ok(if estimate.is_in_numbers() { estimate } else { anywhere_on(extent) })
+        Ok(told(estimate, extent))
     }
 
     /// Checks what a file may have got wrong.
@@ -355,9 +356,24 @@ impl<M: Locate> Fitted<M> {
     }
 }
 
+/// An estimate as locators give it: in numbers, and `located` only where the reading tells something of the place.
+pub(crate) fn told(estimate: Estimate, extent: Extent) -> Estimate {
+    // Where no contact explains a reading, and all are infinitely far from it, none is excluded beside another.
+    let is_point = estimate.status == Status::OutsideModel
+        && estimate
+            .contact
+            .uncertainty
+            .is_some_and(|uncertainty| uncertainty.x_95_m.0 >= uncertainty.x_95_m.1);
+    if estimate.is_in_numbers() && !is_point {
+        unless_left_open(estimate, extent)
+    } else {
+        anywhere_on(extent)
+    }
+}
+
 /// The estimate in place of one of which something is not a number, as of readings far beyond all that a sensor reads: no contact explains the
 /// reading, and the whole surface is left.
-pub(crate) fn anywhere_on(extent: Extent) -> Estimate {
+fn anywhere_on(extent: Extent) -> Estimate {
     let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
     let uniform = |side_m: f64| side_m * side_m / 12.0;
     let uncertainty = Uncertainty {

@@ -10,7 +10,8 @@
 //! - `outside_model`: the misfit χ² of the best contact is one that a contact of the model exceeds less often than
 //!   [`OUTSIDE_MODEL_RATE`], or the contact seems spread out, as that of a point does less often than
 //!   [`SPREAD_RATE`]: the residual lies along the second derivative of the influences (estimators of a finger do without).
-//! - `ambiguous`: another place has a share of at least [`OTHER_PLACE`] of the posterior probability.
+//! - `ambiguous`: another place has a share of at least [`OTHER_PLACE`] of the posterior probability, or the reading leaves the place open:
+//!   the 95 % interval has at least the share [`PLACE_LEFT_OPEN`] of every side of the surface, as that of a contact anywhere has.
 //!
 //! One reading in a thousand, or three, is a false alarm that an engineer sees and can live with: a channel read a hundred times a second
 //! then gives one every few seconds, and a tracker averages it away; a rate ten times lower moves both bounds by a tenth of their size
@@ -102,6 +103,9 @@ pub const SPREAD_RATE: f64 = 2e-3;
 /// The least share of the posterior probability for another place to make an estimate `ambiguous`: of the readings that are `located`,
 /// fewer than one in a hundred comes from another place than the one that is said.
 pub const OTHER_PLACE: f64 = 0.01;
+
+/// Share of a side of the surface that a 95 % interval has of a contact that may be anywhere along it.
+pub const PLACE_LEFT_OPEN: f64 = 0.95;
 
 /// χ² that noise exceeds at [`OUTSIDE_MODEL_RATE`], with `freedom` channels more than unknowns; without any, that of one. Contacts press and
 /// lie on the surface, so that as many readings as unknowns need not have a contact that explains them; what the best leaves then is the
@@ -367,6 +371,21 @@ fn simpson((from, to): (f64, f64), steps: usize, of: impl Fn(f64) -> f64) -> f64
 
 /// The estimate of a reading that nothing but noise is in.
 pub(crate) const NO_CONTACT: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);
+
+/// The estimate with the status of one that leaves the place open where it does: `ambiguous` instead of `located`.
+pub(crate) fn unless_left_open(estimate: Estimate, extent: Extent) -> Estimate {
+    let is_left_open = estimate.contact.uncertainty.is_some_and(|uncertainty| {
+        let is_open = |(low, high): (f64, f64), side_m: f64| {
+            high.min(side_m) - low.max(0.0) >= PLACE_LEFT_OPEN * side_m
+        };
+        is_open(uncertainty.x_95_m, extent.length_m())
+            && extent.width_m().is_none_or(|width_m| is_open(uncertainty.y_95_m, width_m))
+    });
+    match estimate.status {
+        Status::Located if is_left_open => Estimate { status: Status::Ambiguous, ..estimate },
+        _ => estimate,
+    }
+}
 
 /// The estimate of a method that does not know the noise of its channels: located, or outside the surface.
 pub(crate) fn on_surface(contact: ContactEstimate, extent: Extent) -> Estimate {

@@ -10,6 +10,7 @@ use crate::setup::Setup;
 use crate::simulate::{MovingContacts, SimulateError, simulate_moving};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Mean errors over the contacts while they touched, in metres, and how often the 95 % intervals held them. Where there are
 /// several, those that were found are paired with the true ones so that the distances are least.
@@ -158,6 +159,9 @@ pub enum FollowError {
     /// A row is out of order.
     #[error(transparent)]
     Track(#[from] TrackError),
+    /// It was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// Follows a recording whose times rise.
@@ -174,7 +178,7 @@ pub fn follow(
     for (row, time_s) in recording.recording.rows.iter().zip(&recording.times_s) {
         tracker.follow(*time_s, &row.reading)?;
     }
-    Ok(Followed { smoothed: tracker.smoothed(), filtered: tracker.filtered().to_vec() })
+    Ok(Followed { smoothed: tracker.smoothed(Watch::NONE)?, filtered: tracker.filtered().to_vec() })
 }
 
 /// The errors at one speed.

@@ -329,6 +329,10 @@ impl<'a> SensorDesignReport<'a> {
                 li {
                     (counted(self.problem.contacts().len(), "contact", "contacts")) " over " (zone(design.contacts.from, design.contacts.to))
                     ", " (stated(self.problem.force_n())) " N, force " (self.problem.force().name())
+                    @let left_out = self.problem.contacts_over_supports().len();
+                    @if left_out > 0 {
+                        ", of which those over supports (" (left_out) "), where no layout tells a force that is not known, are left out of scores and limits"
+                    }
                     @if !design.contacts.weights.is_empty() { ", some stretches touched more often than others" }
                     "."
                 }

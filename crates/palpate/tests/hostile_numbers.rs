@@ -69,6 +69,10 @@ fn faults_of_answers(locator: &Locator, what: &str) -> Vec<String> {
     let mut faults = Vec::new();
     for reading in readings(locator.setup.layout().len()) {
         let estimate = locator.locate(&reading).unwrap();
+        let x_95_m = estimate.contact.uncertainty.map(|uncertainty| uncertainty.x_95_m);
+        if estimate.status == Status::OutsideModel && x_95_m.is_some_and(|(low_m, high_m)| low_m >= high_m) {
+            faults.push(format!("{what}: at {:e} an interval of one point", reading[0]));
+        }
         if let Some(part) = not_a_number(&estimate) {
             faults.push(format!("{what}: at {:e} the {part} of {}", reading[0], estimate.status.name()));
         }

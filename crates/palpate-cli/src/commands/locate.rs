@@ -9,6 +9,7 @@ use palpate_estimators::digit::{DigitShape, ShapePoint};
 use palpate_estimators::estimator::{ContactEstimate, Estimate, Locator, Mode, Uncertainty};
 use palpate_estimators::recording::csv_row;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::normal_interval_95;
 use serde::Serialize;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -118,12 +119,17 @@ fn untouched_json(line: u64) -> Result<String, Failure> {
 /// The columns of [`csv`].
 fn heading(extent: Extent) -> &'static str {
     match extent {
-        Extent::Line { .. } => "line,position_mm,force_n,low_mm,high_mm,status\n",
-        Extent::Plane { .. } => "line,x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,status\n",
+        Extent::Line { .. } => {
+            "line,position_mm,force_n,low_mm,high_mm,force_low_n,force_high_n,trade_off,status\n"
+        }
+        Extent::Plane { .. } => {
+            "line,x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,force_low_n,force_high_n,trade_off,status\n"
+        }
     }
 }
 
-/// An estimate as a line of CSV: the line of its reading, position, force, the ends of the 95 % interval, status. What a locator does not estimate stays empty.
+/// An estimate as a line of CSV: the line of its reading, position, force, the ends of the 95 % intervals of place and force, what trades off, status.
+/// What a locator does not estimate stays empty.
 fn csv(estimate: &Estimate, line: u64, extent: Extent) -> String {
     let contact = &estimate.contact;
     let mm = |at_m: f64| format!("{:.4}", at_m * 1e3);
@@ -136,6 +142,9 @@ fn csv(estimate: &Estimate, line: u64, extent: Extent) -> String {
             [x.0, x.1, y.0, y.1].map(mm).into_iter().take(2 * extent.dimensions()).collect()
         }
     });
+    let (low_n, high_n) = force_95_n(contact).unzip();
+    cells.extend([low_n, high_n].map(|end_n| end_n.map_or_else(String::new, |end_n| format!("{end_n:.4}"))));
+    cells.push(trade_off(contact).unwrap_or_default().to_owned());
     cells.push(estimate.status.name().to_owned());
     csv_row(cells)
 }
@@ -178,8 +187,20 @@ fn shape_point(point: &ShapePoint) -> impl Serialize {
     }
 }
 
-/// The word for an estimate near an end, of a force that is not known.
-const TRADE_OFF: &str = "force and position";
+/// The ends of the 95 % interval of a force that is estimated: its own where it trades off against the place, elsewhere that of a normal distribution.
+fn force_95_n(contact: &ContactEstimate) -> Option<(f64, f64)> {
+    let uncertainty = contact.uncertainty.as_ref()?;
+    let normal = |force_n: f64| {
+        let sd_n = uncertainty.covariance[5].sqrt();
+        (sd_n > 0.0 && sd_n.is_finite()).then(|| normal_interval_95(force_n, sd_n))
+    };
+    uncertainty.force_95_n.or_else(|| contact.force_n.and_then(normal))
+}
+
+/// The words for an estimate near an end, of a force that is not known.
+fn trade_off(contact: &ContactEstimate) -> Option<&'static str> {
+    contact.uncertainty.and_then(|uncertainty| uncertainty.force_95_n).map(|_| "force and position")
+}
 
 fn contact_fields(contact: &ContactEstimate, extent: Extent) -> impl Fields + use<> {
     let uncertainty = contact.uncertainty.as_ref();
@@ -194,7 +215,7 @@ fn contact_fields(contact: &ContactEstimate, extent: Extent) -> impl Fields + us
         "y_95_mm"?: uncertainty.and_then(|uncertainty| extent.if_plane(mm(uncertainty.y_95_m))),
         "sd_mm"?: uncertainty.and_then(|u| sd(u.covariance[0] + u.covariance[3])).map(|sd_m| sd_m * 1e3),
         "force_95_n"?: uncertainty.and_then(|u| u.force_95_n).map(|(low_n, high_n)| [low_n, high_n]),
-        "trade_off"?: uncertainty.and_then(|u| u.force_95_n).map(|_| TRADE_OFF),
+        "trade_off"?: trade_off(contact),
         "sd_force_n"?: uncertainty.and_then(|u| sd(u.covariance[5])),
     }
 }

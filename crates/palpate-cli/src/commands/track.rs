@@ -16,6 +16,7 @@ use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, sweep_speeds};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::surface::modal::ModalBeam;
+use palpate_numerics::watch::Watch;
 use palpate_report::{TrackReport, track_report};
 use serde_json::json;
 use std::io::Write;
@@ -215,7 +216,11 @@ impl Stream<'_> {
             return Ok((std::mem::take(&mut self.filtered), Vec::new()));
         };
         let filtered = tracker.filtered().to_vec();
-        let smoothed = if self.arguments.smooth { tracker.smoothed() } else { Vec::new() };
+        // After a signal, too, for as long as the process is left.
+        let smoothed = match self.arguments.smooth {
+            true => tracker.smoothed(Watch::NONE).map_err(|_| Failure::stopped())?,
+            false => Vec::new(),
+        };
         let mut out = std::io::stdout().lock();
         let shown = if self.arguments.smooth { &smoothed } else { &filtered };
         for (track, line) in shown.iter().zip(&self.numbers) {

@@ -60,10 +60,15 @@ fn a_plate_is_simulated_fitted_located_and_evaluated() {
 
     let located = said(&palpate(path).args(["locate", "plate.locator", "presses.csv"]).output().unwrap());
     let mut lines = located.lines();
-    assert_eq!(lines.next(), Some("line,x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,status"));
+    assert_eq!(
+        lines.next(),
+        Some(
+            "line,x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,force_low_n,force_high_n,trade_off,status"
+        )
+    );
     let first: Vec<&str> = lines.next().unwrap().split(',').collect();
     let [x_mm, y_mm] = [first[1], first[2]].map(|cell| cell.parse::<f64>().unwrap());
-    assert!((x_mm - 60.0).abs() < 5.0 && (y_mm - 60.0).abs() < 5.0 && first[8] == "located", "{first:?}");
+    assert!((x_mm - 60.0).abs() < 5.0 && (y_mm - 60.0).abs() < 5.0 && first[11] == "located", "{first:?}");
 
     let arguments = ["evaluate", "plate.locator", "--data", "presses.csv", "--out", "report"];
     let words = said(&run(path, &arguments));

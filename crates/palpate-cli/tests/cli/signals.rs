@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use crate::support::command::{folder, palpate, run, said};
-use crate::support::examples::{LOAD_PROFILE, MOVING_LOAD, NOISY_BEAM, PLATE};
+use crate::support::examples::{FSI_WATER, LOAD_PROFILE, MOVING_LOAD, NOISY_BEAM, PLATE};
 use crate::support::toml::Toml;
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -118,6 +118,65 @@ fn what_came_before_a_signal_is_smoothed_and_reported() {
     let told = String::from_utf8(stopped.stdout).unwrap();
     assert_eq!(told.lines().count(), 41, "{told}");
     assert!(folder.join("report/report.html").exists());
+}
+
+/// A hundred thousand rows of a strip with two channels: five hundred places, four depths.
+fn many_rows() -> String {
+    let row = |i: usize| {
+        let (x_mm, depth_mm, wobble) =
+            (0.2 * (i % 500) as f64, 0.5 * (i % 4) as f64 + 1.0, (0.7 * i as f64).sin());
+        let [left, right] = [100.0 - x_mm, x_mm].map(|near_mm| depth_mm * near_mm * near_mm + wobble);
+        format!("{x_mm},{left},{right},{depth_mm},{depth_mm}\n")
+    };
+    "X,Pl,Pr,F,depth\n".to_owned() + &(0..100_000).map(row).collect::<String>()
+}
+
+#[test]
+fn studies_simulations_and_fits_of_many_rows_end_within_a_second() {
+    let bench = folder(NOISY_BEAM);
+    let folder = bench.path();
+    fs::write(folder.join("strip.toml"), FSI_WATER).unwrap();
+    fs::write(folder.join("many.csv"), many_rows()).unwrap();
+    let plate = Toml::parse(PLATE).add("surface.elements", 200).to_string();
+    fs::write(folder.join("plate.toml"), plate).unwrap();
+    let long: [&[&str]; 7] = [
+        &["study", "paper", "--seeds", "1000", "--out", "paper"],
+        &["study", "elliott", "--out", "elliott"],
+        &["simulate", "plate.toml", "--every", "1 mm", "-o", "never.csv"],
+        &["fit", "strip.toml", "--data", "many.csv", "-o", "never.json"],
+        &["compare", "rig.toml", "--calibrations", "5000"],
+        // A mesh of 200 x 200 elements is factored.
+        &["fit", "plate.toml", "-o", "never.json"],
+        &["limit", "plate.toml"],
+    ];
+    for (arguments, signal) in long.into_iter().zip(["-INT", "-TERM"].into_iter().cycle()) {
+        let mut child = begin(folder, arguments);
+        std::thread::sleep(Duration::from_millis(700));
+        assert!(child.try_wait().unwrap().is_none(), "{arguments:?} was done before");
+        end(child, signal, COMPUTING);
+    }
+    assert!(!folder.join("never.csv").exists() && !folder.join("never.json").exists());
+}
+
+#[test]
+fn a_long_recording_that_is_smoothed_ends_within_a_second() {
+    let bench = moving_bench();
+    let folder = bench.path();
+    let csv = fs::read_to_string(folder.join("moving.csv")).unwrap();
+    let (head, rows): (Vec<&str>, Vec<&str>) =
+        csv.lines().partition(|line| !line.starts_with(|c: char| c.is_ascii_digit()));
+    // Over and over, without times: --rate counts.
+    let without_time: Vec<&str> = rows.iter().map(|row| row.split_once(',').unwrap().1).collect();
+    let heading = head.last().unwrap().split_once(',').unwrap().1;
+    let long = format!("{heading}\n{}", (without_time.join("\n") + "\n").repeat(100));
+    fs::write(folder.join("long.csv"), long).unwrap();
+    for signal in ["-INT", "-TERM"] {
+        let mut child =
+            begin(folder, &["track", "locator.json", "long.csv", "--rate", "1000 Hz", "--smooth"]);
+        std::thread::sleep(Duration::from_millis(1500));
+        assert!(child.try_wait().unwrap().is_none(), "it was done before");
+        end(child, signal, COMPUTING);
+    }
 }
 
 #[test]

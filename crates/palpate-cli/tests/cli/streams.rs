@@ -99,7 +99,7 @@ fn every_answer_has_the_line_of_its_reading() {
     let output = fed(bench.path(), &locate, stream.as_bytes());
     complained(&output, 3);
     let told = lines(&output);
-    assert_eq!(told[0], "line,position_mm,force_n,low_mm,high_mm,status");
+    assert_eq!(told[0], "line,position_mm,force_n,low_mm,high_mm,force_low_n,force_high_n,trade_off,status");
     let numbers: Vec<&str> = told[1..].iter().map(|row| row.split(',').next().unwrap()).collect();
     assert_eq!(numbers, ["2", "5"]);
 

@@ -74,12 +74,27 @@ fn what_a_tare_takes_is_said_and_its_rows_stay_in_their_places() {
     fs::write(folder.path().join("few.csv"), board.recording(&[Touch::NONE, Touch::NONE, touch])).unwrap();
     let output = run(folder.path(), &["locate", "board.json", "few.csv", "--tare", "2"]);
     let lines: Vec<String> = said(&output).lines().map(str::to_owned).collect();
-    assert_eq!(lines[..3], ["line,position_mm,force_n,low_mm,high_mm,status", "2,,,,,tare", "3,,,,,tare"]);
+    assert_eq!(
+        lines[..3],
+        [
+            "line,position_mm,force_n,low_mm,high_mm,force_low_n,force_high_n,trade_off,status",
+            "2,,,,,,,,tare",
+            "3,,,,,,,,tare"
+        ]
+    );
     assert!(lines[3].ends_with(",located"), "{lines:?}");
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(told.contains("tare from the mean of 2 readings; g"), "{told}");
     let json = said(&run(folder.path(), &["locate", "board.json", "few.csv", "--tare", "2", "--json"]));
     assert_eq!(json.lines().nth(1), Some(r#"{"line":3,"status":"tare"}"#));
+
+    // Nothing is found where every reading is of a touch.
+    let touches: Vec<Touch> =
+        (1..8).map(|i| Touch { position_mm: 30.0 * f64::from(i), force_n: 2.0 }).collect();
+    fs::write(folder.path().join("touches.csv"), board.recording(&touches)).unwrap();
+    let output = run(folder.path(), &["locate", "board.json", "touches.csv", "--tare", "auto"]);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("--tare auto found no untouched reading"), "{told}");
 
     // A touched board is no tare.
     let touched: Vec<Touch> = (0..40).map(|i| if i % 2 == 0 { touch } else { Touch::NONE }).collect();

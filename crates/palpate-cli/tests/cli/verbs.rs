@@ -1,7 +1,7 @@
 //! simulate, fit, evaluate, locate and inspect from outside, on the paper's bench and on a real recording.
 
 use crate::support::command::{complained, folder, palpate, run, said};
-use crate::support::examples::{FSI_WATER, PAPER};
+use crate::support::examples::{FSI_WATER, NOISY_BEAM, PAPER};
 use crate::support::toml::Toml;
 use serde_json::Value;
 use std::fs;
@@ -65,7 +65,10 @@ fn readings_are_located_as_they_come() {
         .unwrap();
     let mut readings = child.stdin.take().unwrap();
     let mut estimates = BufReader::new(child.stdout.take().unwrap()).lines();
-    assert_eq!(estimates.next().unwrap().unwrap(), "line,position_mm,force_n,low_mm,high_mm,status");
+    assert_eq!(
+        estimates.next().unwrap().unwrap(),
+        "line,position_mm,force_n,low_mm,high_mm,force_low_n,force_high_n,trade_off,status"
+    );
     for _ in 0..3 {
         // The answer comes before the next reading goes in. No contact of 3 N reads so.
         writeln!(readings, "-1.2,-2.2,-3.0,-3.4,-3.4,-3.0,-2.2,-1.2").unwrap();
@@ -122,4 +125,34 @@ fn a_reader_that_leaves_is_no_error() {
     BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn the_force_has_an_interval_and_a_word_where_it_trades_off_against_the_place() {
+    let unknown_force = Toml::parse(NOISY_BEAM).remove("contact.force").add("training.force", "3 N");
+    let folder = folder(unknown_force);
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    said(&run(folder.path(), &["simulate", "rig.toml", "--every", "4 mm", "-o", "presses.csv"]));
+    let csv = said(&run(folder.path(), &["locate", "locator.json", "presses.csv"]));
+    let json = said(&run(folder.path(), &["locate", "locator.json", "presses.csv", "--json"]));
+    let mut trading = 0;
+    for (row, record) in csv.lines().skip(1).zip(json.lines()) {
+        let cells: Vec<&str> = row.split(',').collect();
+        let record: Value = serde_json::from_str(record).unwrap();
+        assert_eq!(cells[8], record["status"]);
+        assert_eq!(cells[7], record["trade_off"].as_str().unwrap_or_default(), "{row}");
+        let Some(force_n) = record["force_n"].as_f64() else { continue };
+        let ends = match record["force_95_n"].as_array() {
+            Some(ends) => [0, 1].map(|i| ends[i].as_f64().unwrap()),
+            None => {
+                [-1.0, 1.0].map(|side| force_n + side * 1.959964 * record["sd_force_n"].as_f64().unwrap())
+            }
+        };
+        trading += usize::from(record["force_95_n"].is_array());
+        for (cell, end) in cells[5..7].iter().zip(ends) {
+            assert!((cell.parse::<f64>().unwrap() - end).abs() < 1e-3, "{row}: {end}");
+        }
+    }
+    let rows = json.lines().count();
+    assert!(trading > 0 && trading < rows / 2, "{trading} of {rows}");
 }

@@ -16,7 +16,6 @@ use palpate_estimators::estimator::{Estimator, FitError};
 use palpate_estimators::evaluation::{Calibration, EvaluationError};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulateError;
-use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::{Bound, CramerRaoBound, Force, LimitCurve};
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::Extent;
@@ -32,13 +31,12 @@ const READINGS: usize = 4000;
 /// The score of so many sensors is good enough when it lies within this share of the score of the most.
 const ENOUGH: f64 = 0.1;
 
-/// Figures of merit of a layout for the contacts of a design.
+/// Figures of merit of a layout for the contacts of a design; of an unknown force, for those that are not over a support.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Assessment {
     /// The criterion's value, the smaller the better: in metres of a limit, a share, or ½·ln det.
     pub score: f64,
-    /// The mean limit in metres, of an unknown force over the contacts that are not over a support; `None` where the readings do not tell
-    /// some contact at all.
+    /// The mean limit in metres; `None` where the readings do not tell some contact at all.
     pub mean_limit_m: Option<f64>,
     /// The largest limit in metres; `None` where the readings do not tell some contact at all.
     pub worst_limit_m: Option<f64>,
@@ -61,27 +59,21 @@ impl SensorProblem<'_> {
     /// [`DesignError::Limit`] where a sensor has no noise or all are dead.
     pub fn assess(&self, layout: &Layout) -> Result<Assessment, DesignError> {
         let Sensitivity { surface, contacts, force_n, force } = &self.sensitivity;
+        let weights = self.sensitivity.judged_weights();
         let limit = CramerRaoBound::new(*surface, layout)?;
         let curve = LimitCurve::at_positions(&limit, *force_n, *force, &contacts.positions)?;
-        // Over a support nothing but its reaction tells an unknown force: there no layout is compared with another.
-        let is_judged = |position: Position| {
-            *force == Force::Known || surface.insensitive_sensor(SensorKind::Deflection, position).is_none()
-        };
-        let judged =
-            curve.points.iter().zip(&contacts.weights).filter(|(point, _)| is_judged(point.position));
+        let judged = curve.points.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0);
         let bounds: Option<Vec<(Bound, f64)>> =
             judged.map(|(point, weight)| Some((point.bound?, *weight))).collect();
         let good = |bound: Option<Bound>| {
             bound.is_some_and(|bound| bound.sd_position_m <= self.pool.design.tolerance_m)
         };
-        let within = curve.points.iter().map(|point| if good(point.bound) { 1.0 } else { 0.0 });
-        let within_tolerance_percent = 100.0 * contacts.mean(within);
+        let within = curve.points.iter().zip(&weights).filter(|(point, _)| good(point.bound));
+        let within_tolerance_percent = 100.0 * within.map(|(_, weight)| weight).sum::<f64>();
         let (score, score_one_dead) = self.scores(layout);
         let limits = bounds.filter(|bounds| !bounds.is_empty()).map(|bounds| {
-            let share: f64 = bounds.iter().map(|(_, weight)| weight).sum();
-            let mean = |of: fn(&Bound) -> f64| {
-                bounds.iter().map(|(bound, weight)| weight * of(bound)).sum::<f64>() / share
-            };
+            let mean =
+                |of: fn(&Bound) -> f64| bounds.iter().map(|(bound, weight)| weight * of(bound)).sum::<f64>();
             let worst = bounds.iter().map(|(bound, _)| bound.sd_position_m).fold(0.0, f64::max);
             (mean(|bound| bound.sd_position_m), worst, mean(Bound::mean_error_m))
         });

@@ -337,6 +337,12 @@ pub enum DesignError {
         /// Quantity that they measure.
         kind: SensorKind,
     },
+    /// Contacts over supports alone.
+    #[error("all {contacts} contacts are over supports, where no layout tells a force that is not known")]
+    OverSupports {
+        /// Number of contacts.
+        contacts: usize,
+    },
     /// Fewer sites than sensors.
     #[error("{count} sensors are wanted, but only {sites} sites can hold one")]
     TooFewSites {

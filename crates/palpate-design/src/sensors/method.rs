@@ -250,6 +250,10 @@ impl SensorProblem<'_> {
         }
         let candidates = SensorAt::of_design(&self.pool.sensors, design);
         let components = PrincipalComponents::from_readings(&self.sensitivity.readings(&candidates, watch)?);
+        // Readings that are all 0 in their noise, or beyond all numbers, have none.
+        if components.modes.is_empty() {
+            return Ok(designed);
+        }
         let search = Search { objective: &Reconstruction::new(&components), ..self.search(watch) };
         let found = search.greedy_exchange(&self.feasible, seed)?;
         designed.push(self.designed(Method::PrincipalComponents, &found.selection)?);

@@ -22,7 +22,7 @@
 //! ([`DesignCriterion`]). Searches put layouts together that keep every constraint of a [`SensorDesign`]; what cannot be kept
 //! is a [`DesignError`] that names it. Beside them stand layouts by the historical methods, and the even layout.
 //!
-//! Where readings do not tell a contact there is no limit, and a mean would not exist. Criteria therefore reckon with what is
+//! Contacts over a support, of a force that is not known, no layout tells: they are left out. Where readings do not tell another contact there is no limit, and a mean would not exist. Criteria therefore reckon with what is
 //! known without any reading, that the contact lies on the surface: a flat prior of variance l²/12. Along a line the score of a
 //! contact is then 1/√(1/s² + 12/l²), with s the limit. The mean, the largest limit and the share within a tolerance that an
 //! [`Assessment`] has are those of the limit itself.
@@ -57,6 +57,7 @@ use std::sync::Arc;
 use candidates::{Candidates, Pool};
 use objective::{Block, Objective};
 use palpate_estimators::setup::Setup;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::{Force, LimitError};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
@@ -131,6 +132,12 @@ impl<'a> SensorProblem<'a> {
         &self.sensitivity.contacts
     }
 
+    /// Positions of contacts over supports, where no layout tells an unknown force: neither searches nor assessments count them.
+    pub fn contacts_over_supports(&self) -> Vec<Position> {
+        let positions = self.sensitivity.contacts.positions.iter().copied();
+        positions.filter(|position| !self.sensitivity.is_judged(*position)).collect()
+    }
+
     /// Knowledge that the locator has of the contacts' force.
     pub fn force(&self) -> Force {
         self.sensitivity.force
@@ -171,6 +178,9 @@ fn checked<'a>(
     }
     let contacts = WeightedContacts::from_prior(&design.contacts, surface.extent())?;
     let sensitivity = Sensitivity { surface, contacts, force_n, force: design.force };
+    if !sensitivity.contacts.positions.iter().any(|position| sensitivity.is_judged(*position)) {
+        return Err(DesignError::OverSupports { contacts: sensitivity.contacts.len() });
+    }
     Ok((sensitivity, Candidates::new(surface, design)?))
 }
 

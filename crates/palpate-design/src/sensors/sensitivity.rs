@@ -72,6 +72,25 @@ pub(super) struct Sensitivity<'a> {
 }
 
 impl Sensitivity<'_> {
+    /// True of a contact by which layouts are judged. Over a support nothing but its reaction tells an unknown force: no layout is compared with
+    /// another there, as [`palpate_mechanics::limit::LimitCurve::summary`] leaves such contacts out.
+    pub fn is_judged(&self, position: Position) -> bool {
+        self.force == Force::Known
+            || self.surface.insensitive_sensor(SensorKind::Deflection, position).is_none()
+    }
+
+    /// Shares of the contacts in what layouts are judged by: 0 of those that are left out.
+    pub fn judged_weights(&self) -> Vec<f64> {
+        let WeightedContacts { positions, weights } = &self.contacts;
+        let mut judged = weights.clone();
+        let left_out = positions.iter().zip(&mut judged).filter(|(position, _)| !self.is_judged(**position));
+        let left_out: f64 = left_out.map(|(_, weight)| std::mem::take(weight)).sum();
+        if left_out > 0.0 {
+            judged.iter_mut().for_each(|weight| *weight /= 1.0 - left_out);
+        }
+        judged
+    }
+
     /// Number of unknowns of a contact.
     fn unknowns(&self) -> usize {
         usize::from(self.force == Force::Unknown) + self.surface.extent().dimensions()
@@ -225,7 +244,7 @@ impl Sensitivity<'_> {
         tolerance_m: f64,
     ) -> Box<dyn Objective> {
         let sides_m: Vec<f64> = self.surface.extent().sides_m().collect();
-        let weights = &self.contacts.weights;
+        let weights = &self.judged_weights();
         match (self.force, sides_m.len()) {
             (Force::Known, 1) => {
                 Box::new(LimitObjective::<1, 0>::new(table, weights, &sides_m, criterion, tolerance_m))

@@ -3,6 +3,9 @@ use super::*;
 use crate::fixtures::{plate, sensor_design};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelModel, Layout, SensorKind};
+use palpate_mechanics::surface::{
+    BeamSection, BeamSupport, BeamSupportKind, SupportedBeam, SupportedBeamSpec,
+};
 use palpate_numerics::watch::Cancelled;
 use palpate_numerics::watch::Progress;
 use rand::{Rng, RngExt, SeedableRng};
@@ -235,6 +238,59 @@ fn budgets_buy_what_helps_most() {
     assert!(poor >= fair && fair >= rich && rich < 0.99 * poor, "{poor} {fair} {rich}");
 }
 
+/// Three spans of a bridge on four supports, read by strains.
+fn bridge() -> Setup {
+    let simple = |at_m| BeamSupport { at_m, kind: BeamSupportKind::Simple };
+    let spec = SupportedBeamSpec {
+        length_m: 24.0,
+        youngs_modulus_pa: 30e9,
+        sections: vec![BeamSection { to_m: 24.0, width_m: 0.3, thickness_m: 0.3 }],
+        supports: [0.0, 8.0, 16.0, 24.0].map(simple).to_vec(),
+    };
+    let sensors = SensorKind::Strain.evenly(6).noise(1e-6);
+    let setup = Setup::new(SupportedBeam::new(spec).unwrap()).sensors(sensors);
+    setup.and_then(|setup| setup.known_force(1e3)).unwrap()
+}
+
+#[test]
+fn contacts_over_supports_count_for_nothing_where_the_force_is_unknown() {
+    let setup = bridge();
+    let mut design = SensorDesign::for_setup(&setup).unwrap().unknown_force();
+    design.sites = Sites::Every(1.0);
+    let along = ContactPrior::along(1.0, 23.0, 1.0);
+    let criteria = [
+        DesignCriterion::MeanLimit,
+        DesignCriterion::WorstLimit,
+        DesignCriterion::WithinTolerance,
+        DesignCriterion::DOptimality,
+    ];
+    for criterion in criteria {
+        let design = SensorDesign { criterion, ..design.clone() };
+        let all = problem(&setup, &design.clone().contacts(along.clone()));
+        assert_eq!(all.contacts_over_supports().iter().map(|at| at.x_m).collect::<Vec<_>>(), [8.0, 16.0]);
+        let mut only_told = problem(&setup, &design.clone().contacts(along.clone()));
+        only_told.sensitivity.contacts = WeightedContacts {
+            positions: (1..=23).filter(|at| at % 8 != 0).map(|at| Position::along(f64::from(at))).collect(),
+            weights: vec![1.0 / 21.0; 21],
+        };
+        let table = Arc::new(Vec::new());
+        only_told.objective = only_told.sensitivity.objective(table, criterion, design.tolerance_m);
+        for layout in [setup.layout().clone(), exchanged(&all).layout] {
+            let [with, told] = [&all, &only_told].map(|problem| problem.assess(&layout).unwrap());
+            assert!((with.score / told.score - 1.0).abs() < 1e-9, "{criterion:?}: {with:?}, {told:?}");
+            assert!(
+                (with.within_tolerance_percent - told.within_tolerance_percent).abs() < 1e-9,
+                "{criterion:?}: {with:?}, {told:?}"
+            );
+        }
+    }
+    let known = problem(&setup, &SensorDesign { force: Force::Known, ..design.clone() });
+    assert!(known.contacts_over_supports().is_empty());
+    let over = design.contacts(ContactPrior::along(8.0, 16.0, 8.0));
+    let refused = refusal(&setup, &over);
+    assert_eq!(refused, DesignError::OverSupports { contacts: 2 });
+}
+
 /// With an unknown force, two reaction sensors tell the position at the supports that deflections do not.
 #[test]
 fn mixed_kinds_go_beyond_deflections() {
@@ -243,6 +299,18 @@ fn mixed_kinds_go_beyond_deflections() {
     design.offers = four_kinds();
     let designed = exchanged(&problem(&setup, &design));
     assert!(designed.assessment.score < 0.5 * deflections, "{:?}", designed.assessment);
+}
+
+#[test]
+fn readings_without_principal_components_have_no_layouts_by_them() {
+    for force_n in [1e-308, 1e308] {
+        let setup = sensor_design().0.known_force(force_n).unwrap();
+        let design = SensorDesign { count: 3, ..SensorDesign::for_setup(&setup).unwrap() };
+        let designed = problem(&setup, &design).all(0, Watch::NONE).unwrap();
+        let by_components =
+            |designed: &Designed| matches!(designed.method, Method::PrincipalComponents | Method::QrPivoting);
+        assert!(!designed.is_empty() && !designed.iter().any(by_components), "{force_n} N");
+    }
 }
 
 #[test]

@@ -15,6 +15,14 @@ pub enum LocatorFileError {
     /// Not the JSON of a locator; the error names line and column.
     #[error("this is not a locator file: {0}")]
     Json(#[from] serde_json::Error),
+    /// A number that no locator has; the reader of the JSON sees it only when the object around it is whole.
+    #[error("{}", without_place(.error))]
+    Number {
+        /// The number with its name and bound.
+        error: serde_json::Error,
+        /// Line and column, from 1, of the number.
+        place: (usize, usize),
+    },
     /// JSON of another kind.
     #[error("the file's format is `{found}`; a locator's is `{FORMAT}`")]
     Format {
@@ -56,7 +64,7 @@ impl LocatorFileError {
         match self {
             Self::Json(error) if error.line() > 0 => Some((error.line(), error.column().max(1))),
             Self::Fault { place, .. } => *place,
-            Self::TooLarge { place, .. } => Some(*place),
+            Self::Number { place, .. } | Self::TooLarge { place, .. } => Some(*place),
             _ => None,
         }
     }
@@ -114,7 +122,8 @@ impl Locator {
         if let Some((at, value)) = numbers(text).find(|(_, value)| value.abs() > LARGEST) {
             return Err(LocatorFileError::TooLarge { value, place: line_and_column(text, at) });
         }
-        let File::<Self> { locator, .. } = serde_json::from_str(text)?;
+        let File::<Self> { locator, .. } =
+            serde_json::from_str(text).map_err(|error| at_number(error, text))?;
         locator.check().map_err(|fault| LocatorFileError::Fault { fault, place: place_of(&fault, text) })?;
         Ok(locator)
     }
@@ -153,6 +162,61 @@ fn end_of_string(bytes: &[u8], mut at: usize) -> usize {
         }
     }
     at
+}
+
+/// An error of the JSON; of a number that is out of its range, with the number's own place.
+fn at_number(error: serde_json::Error, text: &str) -> LocatorFileError {
+    match place_within_object(&error, text) {
+        Some(place) => LocatorFileError::Number { error, place },
+        None => error.into(),
+    }
+}
+
+/// Line and column, from 1, of the number that an error names ("…is -0.4; it must be greater than 0"): the only one of this value in the object whose end
+/// is the error's place.
+fn place_within_object(error: &serde_json::Error, text: &str) -> Option<(usize, usize)> {
+    let told = error.to_string();
+    let (named, _) = told.split_once("; it must be ")?;
+    let (_, number) = named.rsplit_once(" is ")?;
+    let number: f64 = number.split(' ').next()?.parse().ok()?;
+    let end = byte_at(text, error.line(), error.column())?;
+    let start = start_of_object(text.as_bytes(), end);
+    let is_it = |(at, value): &(usize, f64)| (start..end).contains(at) && value.to_bits() == number.to_bits();
+    let mut places = numbers(text).filter(is_it);
+    let (at, _) = places.next()?;
+    places.next().is_none().then(|| line_and_column(text, at))
+}
+
+/// The message of an error without the place at its end.
+fn without_place(error: &serde_json::Error) -> String {
+    let told = error.to_string();
+    let place = format!(" at line {} column {}", error.line(), error.column());
+    told.strip_suffix(&place).unwrap_or(&told).to_owned()
+}
+
+/// The byte behind line and column, both from 1.
+fn byte_at(text: &str, line: usize, column: usize) -> Option<usize> {
+    let before: usize = text.split_inclusive('\n').take(line.checked_sub(1)?).map(str::len).sum();
+    Some((before + column).min(text.len()))
+}
+
+/// The byte at which the object or list that ends before `end` begins; that of the text where none does.
+fn start_of_object(bytes: &[u8], end: usize) -> usize {
+    let mut open = Vec::new();
+    let (mut at, mut start) = (0, 0);
+    while at < end {
+        match bytes[at] {
+            b'"' => {
+                at = end_of_string(bytes, at + 1);
+                continue;
+            }
+            b'{' | b'[' => open.push(at),
+            b'}' | b']' => start = open.pop().unwrap_or(0),
+            _ => {}
+        }
+        at += 1;
+    }
+    start
 }
 
 /// Line and column, from 1, of the number that is at fault: the only one of this value, or the first that is too small, which is none that a

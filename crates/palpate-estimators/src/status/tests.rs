@@ -3,14 +3,16 @@
 use super::*;
 use crate::closed_form::ClosedForm;
 use crate::digit::{DigitEstimator, DigitTheory};
-use crate::estimator::Estimator;
+use crate::estimator::{Estimator, Locator};
 use crate::fit::{Fit, Fitted};
 use crate::fixtures::{Example, beam, digit, paper, plate, raw_recording};
 use crate::influence::{ForceLinearLocator, Influence, InfluenceLocator, Structure};
+use crate::neighbours::Neighbours;
 use crate::recording::Row;
 use crate::setup::Setup;
 use crate::simulate::{CleanSensors, clean_reading};
 use ndarray::Array1;
+use palpate_core::Uncertainty;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::sensing::SensorKind::Deflection;
 use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
@@ -350,4 +352,80 @@ fn as_many_readings_as_unknowns_can_be_outside_the_model() {
         let (_, most) = binomial_bounds(case.readings, case.outside.1);
         assert!(outside_model <= most, "{}: {outside_model}", locator.kind());
     }
+}
+
+/// Contacts of a bench whose force is not known, anywhere, and those among them that are told and whose interval is the surface.
+fn left_open(locator: &Locator, bench: &Example, force_n: f64, contacts: usize) -> [usize; 2] {
+    let (layout, extent) = (bench.setup.layout(), bench.setup.surface().extent());
+    let clean = CleanSensors::new(bench.setup.surface().model().unwrap(), layout);
+    let errors = ChannelErrors::none(layout);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    let mut counts = [0; 2];
+    for _ in 0..contacts {
+        let x_m = rng.random_range(0.0..extent.length_m());
+        let y_m = extent.width_m().map_or(0.0, |width_m| rng.random_range(0.0..width_m));
+        let contact = Contact { position: Position { x_m, y_m }, force_n };
+        let reading = measure(layout, &clean.reading(contact), &errors, &mut rng);
+        let estimate = locator.locate(&reading).unwrap();
+        let Some(uncertainty) = estimate.contact.uncertainty else { continue };
+        let share = |(low, high): (f64, f64), side_m: f64| (high - low) / side_m;
+        let shares = [
+            share(uncertainty.x_95_m, extent.length_m()),
+            extent.width_m().map_or(1.0, |width_m| share(uncertainty.y_95_m, width_m)),
+        ];
+        let is_told = matches!(estimate.status, Status::Located | Status::Ambiguous);
+        let is_open = shares.iter().all(|share| *share >= PLACE_LEFT_OPEN);
+        assert!(
+            !(is_open && estimate.status == Status::Located),
+            "{}: located anywhere: {estimate:?}",
+            locator.kind()
+        );
+        counts[0] += usize::from(is_told);
+        counts[1] += usize::from(is_told && is_open);
+    }
+    counts
+}
+
+/// Printed with --nocapture.
+#[test]
+fn nothing_is_located_whose_interval_is_the_surface() {
+    const CONTACTS: usize = 2_000;
+    let plate = plate(24, ChannelModel { noise_sd: 5e-6, ..ChannelModel::default() });
+    println!("| bench | force | told | of these with the place left open |\n|---|---|---|---|");
+    for (name, bench, forces_n) in [("beam", paper(5e-6, 10), [1.0, 3.0]), ("plate", plate, [2.0, 5.0])] {
+        let setup = bench.setup.clone().unknown_force();
+        let presses = bench.simulate(0);
+        for estimator in [influence(), Estimator::Neighbours(Neighbours::default())] {
+            let locator = estimator.fit(&setup, &presses).unwrap();
+            let kind = locator.kind();
+            for force_n in forces_n {
+                let [told, open] = left_open(&locator, &bench, force_n, CONTACTS);
+                let percent = 100.0 * open as f64 / told as f64;
+                println!("| {name}, {kind} | {force_n} N | {told} of {CONTACTS} | {percent:.2} % |");
+                // There are some, beside ends and edges, and they are few.
+                assert!(open > 0 && percent < 3.0, "{name}, {kind}, {force_n} N: {open} of {told}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_interval_of_a_whole_side_alone_tells_the_other_coordinate() {
+    let plane = Extent::plane(0.3, 0.2).unwrap();
+    let of = |x_95_m, y_95_m, status| {
+        let uncertainty = Uncertainty { x_95_m, y_95_m, ..Uncertainty::default() };
+        let contact = ContactEstimate { uncertainty: Some(uncertainty), ..ContactEstimate::default() };
+        unless_left_open(Estimate::of_contact(contact, status), plane).status
+    };
+    let (whole_x, whole_y) = ((0.0, 0.29), (-0.1, 0.195));
+    assert_eq!(of(whole_x, whole_y, Status::Located), Status::Ambiguous);
+    assert_eq!(of(whole_x, (0.05, 0.195), Status::Located), Status::Located);
+    assert_eq!(of((0.02, 0.3), whole_y, Status::Located), Status::Located);
+    // What lies beyond the surface is none of it.
+    assert_eq!(of(whole_x, (-0.1, 0.1), Status::Located), Status::Located);
+    for status in [Status::NoContact, Status::OutsideModel, Status::OutsideSurface] {
+        assert_eq!(of(whole_x, whole_y, status), status);
+    }
+    let unknown = Estimate::of_position(Position::along(0.1), Status::Located);
+    assert_eq!(unless_left_open(unknown, plane).status, Status::Located);
 }

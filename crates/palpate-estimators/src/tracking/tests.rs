@@ -15,6 +15,8 @@ use crate::track_errors::TrackErrors;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{ChannelErrors, measure};
 use palpate_mechanics::surface::Motion;
+use palpate_numerics::watch::{Cancelled, Progress, Watch};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 const RATE_HZ: f64 = 1000.0;
 
@@ -76,7 +78,7 @@ pub(super) fn assert_closer_than_readings(
     }
     let truths: Vec<Vec<Contact>> = readings.iter().map(|(_, truth, _)| vec![*truth]).collect();
     let errors = |tracks: &[Track]| TrackErrors::new(tracks, &truths, likelihood.extent()).unwrap();
-    let (filtered, smoothed) = (errors(tracker.filtered()), errors(&tracker.smoothed()));
+    let (filtered, smoothed) = (errors(tracker.filtered()), errors(&tracker.smoothed(Watch::NONE).unwrap()));
     assert_eq!((filtered.tracked, smoothed.tracked), (readings.len(), readings.len()));
     assert!(filtered.ratio() > filter, "{filtered:?}");
     assert!(smoothed.ratio() > smoother, "{smoothed:?}");
@@ -91,6 +93,28 @@ fn a_track_is_several_times_closer_than_its_readings() {
     for (force_n, factors) in [(Some(3.0), [3.0, 5.0]), (None, [4.0, 6.0])] {
         assert_closer_than_readings(&likelihood(&rig, force_n), &readings, factors);
     }
+}
+
+#[test]
+fn smoothing_stops_when_it_is_told_to() {
+    let rig = rig();
+    let likelihood = likelihood(&rig, Some(3.0));
+    let mut tracker = SmoothTracker::new(&likelihood, TrackerConfig::default());
+    for (time_s, _, reading) in readings(&rig, along_the_beam(), 2).iter().take(200) {
+        tracker.follow(*time_s, reading).unwrap();
+    }
+    assert_eq!(tracker.smoothed(Watch::NONE).unwrap().len(), 200);
+    let most = AtomicUsize::new(0);
+    let stop_at_half = |progress| match progress {
+        Progress::Counted { done, of, .. } => {
+            most.fetch_max(done, Ordering::Relaxed);
+            done < of / 2
+        }
+        _ => true,
+    };
+    assert_eq!(tracker.smoothed(Watch::new(&stop_at_half)), Err(Cancelled));
+    let most = most.into_inner();
+    assert!((100..200).contains(&most), "{most}");
 }
 
 #[test]

@@ -6,6 +6,7 @@ use super::birth::BirthModel;
 use super::{Track, TrackError, Tracked, TrackerConfig};
 use crate::likelihood::{Geometry, Likelihood};
 use palpate_core::Estimate;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// The most hypotheses that are held possible at once.
 const MOST_HYPOTHESES: usize = 12;
@@ -321,11 +322,19 @@ impl<'a> SmoothTracker<'a> {
 
     /// Smoothed tracks, one a reading. The number of contacts stays what the filter found; of
     /// the hypotheses it held, the one that lasted is gone back over.
-    pub fn smoothed(&self) -> Vec<Track> {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch stopped it.
+    pub fn smoothed(&self, watch: Watch) -> Result<Vec<Track>, Cancelled> {
+        /// Readings between two looks at the watch.
+        const EACH: usize = 64;
         let mut smoothed = self.tracks.clone();
         // The contacts at the reading after, as all readings show them.
         let mut later: Option<(u64, Belief)> = None;
         for k in (0..smoothed.len()).rev() {
+            if k % EACH == 0 {
+                watch.counted("smoothing", "readings", smoothed.len() - k, smoothed.len())?;
+            }
             let number = self.tracks[k].contacts.len();
             let lasting = later.and_then(|(id, belief)| self.smoothed_belief(k, id, &belief));
             let lasting = lasting.filter(|(_, belief)| belief.contacts() == number);
@@ -335,7 +344,7 @@ impl<'a> SmoothTracker<'a> {
             smoothed[k].contacts = moments
                 .map_or_else(Vec::new, |moments| Tracked::from_belief(&moments, self.tracker.likelihood));
         }
-        smoothed
+        Ok(smoothed)
     }
 
     /// Belief of hypothesis `id` at reading `k`, given its belief at the next.

@@ -232,6 +232,7 @@ pub fn help(error: &DesignError) -> &'static str {
         DesignError::SingularNoise { .. } => {
             "add `noise = \"5 um\"` to [sensors], or to the kind in [design] `kinds`"
         }
+        DesignError::OverSupports { .. } => "set [design] `contacts` elsewhere too, or `force = \"known\"`",
         DesignError::TooFewSites { .. } => {
             "lower `count`, bring `sites` closer together, or make `keep_out` smaller"
         }
@@ -272,6 +273,9 @@ fn print(outcome: &Outcome) -> Result<(), Failure> {
         problem.force().name(),
         score_in_words(design.criterion)
     ))?;
+    if let Some(words) = left_out_in_words(problem) {
+        output::say(words + "\n")?;
+    }
     output::say(designs(outcome))?;
     if outcome.designed.iter().any(|designed| !designed.assessment.keeps_constraints) {
         output::say("* breaks a constraint of [design]")?;
@@ -284,6 +288,20 @@ fn print(outcome: &Outcome) -> Result<(), Failure> {
         output::say(format!("\nBest: {}", gain(outcome, best)))?;
     }
     if outcome.counts.is_empty() { Ok(()) } else { print_counts(outcome) }
+}
+
+/// "1 contact, at 12000 mm, is over a support …": those that count for nothing; `None` where there is none.
+fn left_out_in_words(problem: &SensorProblem) -> Option<String> {
+    let places = problem.contacts_over_supports();
+    let reason = "where no layout tells a force that is not known: left out of scores and limits";
+    match places.as_slice() {
+        [] => None,
+        [place] => Some(format!(
+            "1 contact, at {}, is over a support, {reason}",
+            problem.extent().place_in_words(*place)
+        )),
+        _ => Some(format!("{} contacts are over supports, {reason}", places.len())),
+    }
 }
 
 fn score_in_words(criterion: DesignCriterion) -> &'static str {
@@ -437,6 +455,7 @@ fn to_json(outcome: &Outcome) -> impl Serialize {
         "tolerance_mm": design.tolerance_m * 1e3,
         "candidates": problem.candidates(),
         "contacts": problem.contacts().len(),
+        "contacts_over_supports": problem.contacts_over_supports().len(),
         "designs": outcome.designed.iter().map(designed).collect::<Vec<_>>(),
         "counts": outcome.counts.iter().map(count).collect::<Vec<_>>(),
     }
