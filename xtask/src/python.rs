@@ -2,8 +2,10 @@
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fs;
+use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, Result, bail};
 
@@ -21,14 +23,30 @@ const MOST_BYTES: u64 = 6_000_000;
 /// The C library that wheels are for: that of Debian 10, Ubuntu 18.10 and all later ones.
 const MANYLINUX: &str = "manylinux_2_28";
 
-/// Compiles the package, and runs its tests in the environment `target/xtask/python`, which is made where it is not there.
-pub fn test(root: &Path, skips: Skips) -> Result<(bool, Option<Counts>)> {
-    if !PYTHON.is_there(root) {
+/// An environment in the making.
+pub type Making = JoinHandle<Result<Environment>>;
+
+/// Makes the environment of the tests, `target/xtask/python`, where it is not there, in a thread of its own; `None` without Python.
+pub fn make_environment(root: &Path) -> Option<Making> {
+    let root = root.to_path_buf();
+    PYTHON.is_there(&root).then(|| {
+        thread::spawn(move || Environment::at(&root, "target/xtask/python", "python3", &[REQUIREMENTS]))
+    })
+}
+
+/// Runs the tests of the package in an environment of their own; what `tested` tells cargo to build holds the package.
+pub fn test(
+    root: &Path,
+    skips: Skips,
+    environment: Option<Making>,
+    tested: &[&str],
+) -> Result<(bool, Option<Counts>)> {
+    let Some(environment) = environment else {
         println!("{}", PYTHON.describe());
         return Ok((skips == Skips::Pass, None));
-    }
+    };
     let mut build = Command::new("cargo");
-    build.args(["build", "--quiet", "-p", "palpate-python", "-p", "palpate-cli"]).current_dir(root);
+    build.args(["build", "--quiet"]).args(tested).current_dir(root);
     if !run::shown(&mut build)? {
         return Ok((false, None));
     }
@@ -39,7 +57,7 @@ pub fn test(root: &Path, skips: Skips) -> Result<(bool, Option<Counts>)> {
     fs::copy(&built, &copied)
         .and_then(|_| fs::rename(&copied, &module))
         .with_context(|| format!("cannot copy {}", built.display()))?;
-    let environment = Environment::at(root, "target/xtask/python", "python3", &[REQUIREMENTS])?;
+    let environment = environment.join().unwrap_or_else(|panic| resume_unwind(panic))?;
     let mut tests = environment.pytest(root);
     tests.env("PYTHONPATH", root.join("python"));
     if skips == Skips::Fail {
@@ -96,7 +114,7 @@ pub fn wheel(root: &Path) -> Result<bool> {
 }
 
 /// A virtual environment.
-struct Environment {
+pub struct Environment {
     folder: PathBuf,
 }
 

@@ -15,6 +15,8 @@ use crate::tidy;
 
 /// Arguments for all that is checked: every crate, with the features that are off by default.
 const EVERYTHING: [&str; 2] = ["--workspace", "--all-features"];
+/// Arguments for what tests need: of [`EVERYTHING`], lest another choice of features compiles it all again for the Python package.
+const TESTED: [&str; 5] = ["--workspace", "--all-features", "--lib", "--tests", "--bin=palpate"];
 
 /// Result of one step.
 struct Step {
@@ -28,19 +30,23 @@ struct Step {
 pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     let skipped = Skipped::begin(root)?;
     let mut missing = Vec::new();
+    let prerequisites = step("prerequisites", || prerequisites(root, skips, &mut missing))?;
+    // An environment is made while the compiler waits for one crate or another.
+    let environment = python::make_environment(root);
     let steps = [
-        step("prerequisites", || prerequisites(root, skips, &mut missing))?,
+        prerequisites,
         step("formatting", || shown(root, &["fmt", "--all", "--check"]))?,
         step("clippy", || {
             shown(root, &[&["clippy", "--all-targets"], &EVERYTHING[..], &["--", "-D", "warnings"]].concat())
         })?,
+        step("build", || shown(root, &[&["build"], &TESTED[..]].concat()))?,
         step("tests", || tests(root, skips, &skipped))?,
         step("doc tests", || watched(cargo(root, &[&["test", "--doc"], &EVERYTHING[..]].concat())))?,
         step("docs", || {
             let mut docs = cargo(root, &[&["doc", "--no-deps"], &EVERYTHING[..]].concat());
             Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
         })?,
-        step("Python tests", || python::test(root, skips))?,
+        step("Python tests", || python::test(root, skips, environment, &TESTED))?,
         step("tidy", || Ok((tidy::run(root)?, None)))?,
     ];
     let lines = skipped.lines()?;

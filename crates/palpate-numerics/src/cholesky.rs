@@ -6,10 +6,10 @@
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut2, Axis, s};
 
-/// Columns that are factored before the rest of the matrix is updated.
+/// Rows of a product that are computed at once, from the columns that differ from 0.
 const BLOCK: usize = 64;
 
-/// Columns that are factored one after the other; more are halved.
+/// Columns that are factored, and rows that are solved for, one after the other; more are halved.
 const NARROW: usize = 16;
 
 /// Rows that are solved for side by side.
@@ -129,10 +129,32 @@ impl Cholesky {
         self.solve_upper(&self.solve_lower(b))
     }
 
-    /// L⁻¹·B, column by column, in blocks that are matrix products.
+    /// L⁻¹·B, in blocks that are matrix products.
+    ///
+    /// # Panics
+    /// When B has not as many rows as the matrix.
     pub fn solve_lower_matrix(&self, mut b: Array2<f64>) -> Array2<f64> {
+        assert_eq!(b.nrows(), self.size(), "a right side has as many rows as the matrix");
         let columns = b.ncols();
-        self.substitute_forward(&mut b, |_| columns);
+        self.substitute_forward(b.view_mut(), 0, &|_| columns);
+        b
+    }
+
+    /// A⁻¹·B.
+    ///
+    /// # Panics
+    /// When B has not as many rows as the matrix.
+    pub fn solve_matrix(&self, b: Array2<f64>) -> Array2<f64> {
+        self.solve_upper_matrix(self.solve_lower_matrix(b))
+    }
+
+    /// L⁻ᵀ·B, in blocks that are matrix products.
+    ///
+    /// # Panics
+    /// When B has not as many rows as the matrix.
+    pub fn solve_upper_matrix(&self, mut b: Array2<f64>) -> Array2<f64> {
+        assert_eq!(b.nrows(), self.size(), "a right side has as many rows as the matrix");
+        self.substitute_backward(b.view_mut(), 0);
         b
     }
 
@@ -145,26 +167,56 @@ impl Cholesky {
     pub fn inverse_lower(&self) -> Array2<f64> {
         let mut inverse = Array2::eye(self.size());
         // Right of the diagonal block, rows stay 0.
-        self.substitute_forward(&mut inverse, |end| end);
+        self.substitute_forward(inverse.view_mut(), 0, &|end| end);
         inverse
     }
 
-    /// L⁻¹·B in the place of B, of which the rows before `end` differ from 0 in their first `columns(end)` columns at most.
-    fn substitute_forward(&self, b: &mut Array2<f64>, columns: impl Fn(usize) -> usize) {
-        let size = self.size();
-        for start in (0..size).step_by(BLOCK) {
-            let end = (start + BLOCK).min(size);
-            let (mut done, mut rest) = b.slice_mut(s![.., ..columns(end)]).split_at(Axis(0), end);
-            for i in start..end {
-                let (above, mut below) = done.view_mut().split_at(Axis(0), i);
-                let mut row = below.row_mut(0);
-                for k in start..i {
-                    row.scaled_add(-self.lower[[i, k]], &above.row(k));
-                }
-                row /= self.lower[[i, i]];
+    /// Solves for the rows of B from `start` on, from which those before have been taken off: one half after the other. Rows before `end` differ from
+    /// 0 in their first `columns(end)` columns at most.
+    fn substitute_forward(&self, mut b: ArrayViewMut2<f64>, start: usize, columns: &impl Fn(usize) -> usize) {
+        let size = b.nrows();
+        if size > NARROW {
+            let half = (size / 2).next_multiple_of(NARROW);
+            let (mut above, mut below) = b.split_at(Axis(0), half);
+            self.substitute_forward(above.view_mut(), start, columns);
+            let middle = start + half;
+            let left = self.lower.slice(s![middle..start + size, start..middle]);
+            let used = s![.., ..columns(middle)];
+            general_mat_mul(-1.0, &left, &above.slice(used), 1.0, &mut below.slice_mut(used));
+            self.substitute_forward(below, middle, columns);
+            return;
+        }
+        let mut b = b.slice_mut(s![.., ..columns(start + size)]);
+        for i in 0..size {
+            let (above, mut below) = b.view_mut().split_at(Axis(0), i);
+            let mut row = below.row_mut(0);
+            for (k, above) in above.outer_iter().enumerate() {
+                row.scaled_add(-self.lower[[start + i, start + k]], &above);
             }
-            let left = self.lower.slice(s![end.., start..end]);
-            general_mat_mul(-1.0, &left, &done.slice(s![start.., ..]), 1.0, &mut rest);
+            row /= self.lower[[start + i, start + i]];
+        }
+    }
+
+    /// Solves with Lᵀ for the rows of B from `start` on, from which those behind have been taken off: one half after the other.
+    fn substitute_backward(&self, mut b: ArrayViewMut2<f64>, start: usize) {
+        let size = b.nrows();
+        if size > NARROW {
+            let half = (size / 2).next_multiple_of(NARROW);
+            let middle = start + half;
+            let (mut above, mut below) = b.split_at(Axis(0), half);
+            self.substitute_backward(below.view_mut(), middle);
+            let left = self.lower.slice(s![middle..start + size, start..middle]);
+            general_mat_mul(-1.0, &left.t(), &below, 1.0, &mut above);
+            self.substitute_backward(above, start);
+            return;
+        }
+        for i in (0..size).rev() {
+            let (mut done, below) = b.view_mut().split_at(Axis(0), i + 1);
+            let mut row = done.row_mut(i);
+            for (k, below) in below.outer_iter().enumerate() {
+                row.scaled_add(-self.lower[[start + i + 1 + k, start + i]], &below);
+            }
+            row /= self.lower[[start + i, start + i]];
         }
     }
 
@@ -294,6 +346,9 @@ mod tests {
         let truth = Array1::from_shape_fn(130, |i| (i as f64).sin());
         let found = cholesky.solve(&matrix.dot(&truth));
         assert!((&found - &truth).iter().all(|e| e.abs() < 1e-9));
+        let columns = Array2::from_shape_fn((130, 7), |(i, j)| ((i * (j + 1)) as f64).sin());
+        let solved = cholesky.solve_matrix(matrix.dot(&columns));
+        assert!((&solved - &columns).iter().all(|e| e.abs() < 1e-9));
         let unit = cholesky.inverse().dot(&matrix) - Array2::<f64>::eye(130);
         assert!(unit.iter().all(|e| e.abs() < 1e-9));
     }

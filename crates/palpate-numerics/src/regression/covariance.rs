@@ -5,7 +5,7 @@
 //! A = Hᵀ·K⁻¹·H + I/b², q×q: P = K⁻¹ − K⁻¹·H·A⁻¹·Hᵀ·K⁻¹ (Rasmussen and Williams, section 2.7). b² does not have to be
 //! small enough to add, so the trend's prior can be broad without losing digits.
 
-use ndarray::{Array1, Array2, ArrayView2, Axis};
+use ndarray::{Array2, ArrayView2};
 
 use super::groups::Groups;
 use super::kernel::squared_distances_into;
@@ -124,15 +124,9 @@ impl Covariance {
 
     /// α = P·y and the trend's coefficients β = A⁻¹·Hᵀ·K⁻¹·y, for each column of y, n×m: n×m and q×m.
     pub fn solve(&self, outputs: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
-        let mut alpha = Array2::zeros(outputs.dim());
-        let mut beta = Array2::zeros((self.trend.size(), outputs.ncols()));
-        for (j, y) in outputs.axis_iter(Axis(1)).enumerate() {
-            let half = self.factor.solve_lower(&y.to_owned());
-            let coefficients = self.trend.solve(&self.basis.t().dot(&half));
-            let rest: Array1<f64> = half - self.basis.dot(&coefficients);
-            alpha.column_mut(j).assign(&self.factor.solve_upper(&rest));
-            beta.column_mut(j).assign(&coefficients);
-        }
+        let half = self.factor.solve_lower_matrix(outputs.as_standard_layout().into_owned());
+        let beta = self.trend.solve_matrix(self.basis.t().dot(&half));
+        let alpha = self.factor.solve_upper_matrix(half - self.basis.dot(&beta));
         (alpha, beta)
     }
 

@@ -198,13 +198,9 @@ pub(super) fn learn(
     let factor = Cholesky::factor(precision)?;
     let half = factor.solve_lower_matrix(scores);
     let explained = half.map_axis(Axis(0), |half| half.dot(&half));
-    let mut weights = Array2::zeros((all, outputs));
-    let mut trend = Array2::zeros((terms, outputs));
-    for j in 0..outputs {
-        let solved = factor.solve_upper(&half.column(j).to_owned());
-        weights.column_mut(j).assign(&whiten.solve_upper(&solved.slice(s![..all]).to_owned()));
-        trend.column_mut(j).assign(&solved.slice(s![all..]));
-    }
+    let solved = factor.solve_upper_matrix(half);
+    let weights = whiten.solve_upper_matrix(solved.slice(s![..all, ..]).to_owned());
+    let trend = solved.slice(s![all.., ..]).to_owned();
     // The process is L·w at the chosen points.
     let mut values = factor.inverse_lower();
     let at_points = values.slice(s![.., ..all]).dot(&whiten.lower().t());

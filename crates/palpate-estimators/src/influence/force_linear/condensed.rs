@@ -271,10 +271,12 @@ impl Estimate {
         let evidence = Evidence::new(&presses, prior, &[]);
         for channels in of_equal_ratio(fits) {
             let restricted = evidence.restricted(fits[channels[0]].ratio)?;
-            let (white, own) = restricted.residuals(presses.means.clone());
-            for c in channels {
-                coefficients.column_mut(c).assign(&own.column(c));
-                weights.column_mut(c).assign(&restricted.cholesky.solve_upper(&white.column(c).to_owned()));
+            let means = presses.means.select(Dimension(1), &channels);
+            let (white, own) = restricted.residuals(means);
+            let solved = restricted.cholesky.solve_upper_matrix(white);
+            for (k, c) in channels.into_iter().enumerate() {
+                coefficients.column_mut(c).assign(&own.column(k));
+                weights.column_mut(c).assign(&solved.column(k));
             }
         }
         let (offsets, polynomials) = coefficients.view().split_at(Dimension(0), 1);

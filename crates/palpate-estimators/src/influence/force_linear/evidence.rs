@@ -10,7 +10,8 @@
 
 use super::presses::{Presses, Repeated};
 use super::prior::Prior;
-use ndarray::{Array1, Array2, ArrayView1, Axis as Dimension};
+use ndarray::linalg::general_mat_mul;
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 use palpate_numerics::{Cholesky, NotPositiveDefinite};
 
 /// Powers of ten of ρ.
@@ -51,19 +52,23 @@ impl Restricted {
 
     /// The coefficients of H in each column of L⁻¹·y.
     pub fn coefficients(&self, white: &Array2<f64>) -> Array2<f64> {
-        let right = self.effects.t().dot(white);
-        let mut solved = Array2::zeros(right.dim());
-        for (column, mut out) in right.columns().into_iter().zip(solved.columns_mut()) {
-            out.assign(&self.gram.solve(&column.to_owned()));
-        }
-        solved
+        self.gram.solve_matrix(self.effects.t().dot(white))
     }
 
     /// M·L⁻¹·y of each column of y, with the coefficients of H.
     pub fn residuals(&self, columns: Array2<f64>) -> (Array2<f64>, Array2<f64>) {
-        let mut white = self.cholesky.solve_lower_matrix(columns);
+        self.residuals_of_white(self.cholesky.solve_lower_matrix(columns))
+    }
+
+    /// M·L⁻¹.
+    pub fn projection(&self) -> Array2<f64> {
+        self.residuals_of_white(self.cholesky.inverse_lower()).0
+    }
+
+    /// M·x of each column x = L⁻¹·y, with the coefficients of H.
+    fn residuals_of_white(&self, mut white: Array2<f64>) -> (Array2<f64>, Array2<f64>) {
         let coefficients = self.coefficients(&white);
-        white -= &self.effects.dot(&coefficients);
+        general_mat_mul(-1.0, &self.effects, &coefficients, 1.0, &mut white);
         (white, coefficients)
     }
 
@@ -107,11 +112,44 @@ impl ChannelFit {
 pub(super) struct Evidence<'a> {
     pub presses: &'a Presses,
     pub prior: &'a Prior,
+    /// Without noise and drift.
     covariance: Array2<f64>,
+    /// Of noise and drift, over ρ.
+    noise: Noise,
     effects: Array2<f64>,
     /// Readings of the presses by a source of unit amplitude at each place.
     sources: Array2<f64>,
     repeats: RepeatedNoise,
+}
+
+/// Covariance of noise and drift of the presses over that of an untouched row.
+struct Noise {
+    /// Of the noise, which is independent.
+    diagonal: Vec<f64>,
+    /// n × n; nothing where there is none.
+    drift: Option<Array2<f64>>,
+}
+
+impl Noise {
+    fn new(presses: &Presses, prior: &Prior) -> Self {
+        let n = presses.len();
+        let time = &presses.time;
+        let drift = || Array2::from_shape_fn((n, n), |(i, j)| prior.drift_between(time[i], time[j]));
+        Self {
+            diagonal: (0..n).map(|i| prior.relative_noise_of(presses, i) / presses.count[i]).collect(),
+            drift: (prior.drift > 0.0).then(drift),
+        }
+    }
+
+    /// K + ρ·(noise and drift).
+    fn added_to(&self, covariance: &Array2<f64>, ratio: f64) -> Array2<f64> {
+        let mut sum = covariance.clone();
+        sum.diag_mut().iter_mut().zip(&self.diagonal).for_each(|(sum, noise)| *sum += ratio * noise);
+        if let Some(drift) = &self.drift {
+            sum.scaled_add(ratio, drift);
+        }
+        sum
+    }
 }
 
 /// Noise of untouched rows as the scatter of repeats tells it.
@@ -149,6 +187,7 @@ impl<'a> Evidence<'a> {
             presses,
             prior,
             covariance: prior.covariance(presses),
+            noise: Noise::new(presses, prior),
             effects: prior.effects(presses),
             sources: prior.sources(presses, sensors_m),
             repeats: RepeatedNoise::new(presses, prior),
@@ -162,7 +201,7 @@ impl<'a> Evidence<'a> {
 
     /// The covariance at one ρ.
     pub fn restricted(&self, ratio: f64) -> Result<Restricted, NotPositiveDefinite> {
-        Restricted::new(self.prior.with_noise(&self.covariance, self.presses, ratio), &self.effects)
+        Restricted::new(self.noise.added_to(&self.covariance, ratio), &self.effects)
     }
 
     /// The most probable ρ of every channel among some powers of ten; `None` where the presses do not tell offset and polynomials apart.
@@ -207,48 +246,90 @@ impl<'a> Evidence<'a> {
     fn with_ratio(&self, ratio: f64) -> Option<Vec<ChannelFit>> {
         let restricted = self.restricted(ratio).ok()?;
         let (white, _) = restricted.residuals(self.presses.means.clone());
-        let (sources, _) = restricted.residuals(self.sources.clone());
+        let sources = WhiteSources::new(restricted.residuals(self.sources.clone()).0);
+        let products = sources.products(&white.view());
         let fits = (0..self.presses.centre.len())
-            .map(|c| self.channel(&restricted, ratio, c, &white.column(c), &sources))
+            .map(|c| self.channel(&restricted, ratio, c, &white.column(c), (&sources, &products.column(c))))
             .collect::<Vec<_>>();
         fits.iter().all(|fit| fit.evidence.is_finite()).then_some(fits)
     }
 
-    /// The fit of channel `c` at one ρ, from M·L⁻¹·y of its presses and M·L⁻¹·u of the sources.
+    /// The fit of channel `c` at one ρ, from M·L⁻¹·y of its presses and the sources with their products with it.
     pub fn channel(
         &self,
         restricted: &Restricted,
         ratio: f64,
         c: usize,
         white: &ArrayView1<f64>,
-        sources: &Array2<f64>,
+        (sources, products): (&WhiteSources, &ArrayView1<f64>),
     ) -> ChannelFit {
         let freedom = self.freedom();
         let square = white.dot(white) + self.repeats.squares[c] / ratio;
         let determinant =
             restricted.log_determinant + self.repeats.freedom * ratio.ln() + self.repeats.log_determinant;
-        if sources.ncols() == 0 {
+        if sources.is_empty() {
             let signal = square / freedom;
             let evidence = -0.5 * (freedom * signal.ln() + determinant);
             return ChannelFit { ratio, signal, evidence, sources: Vec::new() };
         }
-        let products = sources.t().dot(white);
-        let squares: Array1<f64> = sources.map_axis(Dimension(0), |column| column.dot(&column));
-        let amplitudes: Vec<f64> = AMPLITUDES.map(|decade| 10f64.powi(decade)).collect();
-        let mut tried = Vec::with_capacity(squares.len() * amplitudes.len());
-        for (place, (product, length)) in products.iter().zip(&squares).enumerate() {
-            for tau in &amplitudes {
-                let variance = tau / (1.0 + tau * length);
-                let signal = (square - variance * product * product).max(f64::MIN_POSITIVE) / freedom;
-                let evidence = -0.5 * (freedom * signal.ln() + determinant + (tau * length).ln_1p());
-                tried.push((
-                    evidence,
-                    signal,
-                    SourceFit { place, weight: 0.0, amplitude: variance * product, variance },
-                ));
-            }
+        let mut tried = Vec::with_capacity(sources.amplitudes.len());
+        for Amplitude { place, variance, log_determinant } in &sources.amplitudes {
+            let product = products[*place];
+            let signal = (square - variance * product * product).max(f64::MIN_POSITIVE) / freedom;
+            let evidence = -0.5 * (freedom * signal.ln() + determinant + log_determinant);
+            tried.push((
+                evidence,
+                signal,
+                SourceFit { place: *place, weight: 0.0, amplitude: variance * product, variance: *variance },
+            ));
         }
         average(ratio, &mut tried)
+    }
+}
+
+/// Sources at places as presses at one ρ tell them, of any channel.
+#[derive(Clone)]
+pub(super) struct WhiteSources {
+    /// v = M·L⁻¹·u, a column a place.
+    pub columns: Array2<f64>,
+    amplitudes: Vec<Amplitude>,
+}
+
+/// A source at one of the places, with an amplitude of the variance τ·s².
+#[derive(Clone, Copy)]
+struct Amplitude {
+    place: usize,
+    /// Variance of the amplitude over s², given the presses: τ/(1 + τ·vᵀ·v).
+    variance: f64,
+    /// ln(1 + τ·vᵀ·v).
+    log_determinant: f64,
+}
+
+impl WhiteSources {
+    pub fn new(columns: Array2<f64>) -> Self {
+        let mut squares = vec![0.0; columns.ncols()];
+        for row in columns.outer_iter() {
+            squares.iter_mut().zip(row).for_each(|(square, v)| *square += v * v);
+        }
+        let taus: Vec<f64> = AMPLITUDES.map(|decade| 10f64.powi(decade)).collect();
+        let amplitudes = squares.iter().enumerate().flat_map(|(place, length)| {
+            taus.iter().map(move |tau| Amplitude {
+                place,
+                variance: tau / (1.0 + tau * length),
+                log_determinant: (tau * length).ln_1p(),
+            })
+        });
+        let amplitudes = amplitudes.collect();
+        Self { columns, amplitudes }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.columns.ncols() == 0
+    }
+
+    /// vᵀ·w of each place and each column w of M·L⁻¹·y.
+    pub fn products(&self, white: &ArrayView2<f64>) -> Array2<f64> {
+        self.columns.t().dot(white)
     }
 }
 

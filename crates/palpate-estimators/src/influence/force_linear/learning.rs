@@ -550,6 +550,7 @@ impl Search<'_> {
         for step in [2.0, std::f64::consts::SQRT_2, 1.2] {
             for k in 0..prior.lengths_m.len() {
                 for factor in [step, 1.0 / step] {
+                    let from_m = prior.lengths_m[k];
                     loop {
                         let mut candidate = prior.clone();
                         candidate.lengths_m[k] =
@@ -559,6 +560,10 @@ impl Search<'_> {
                             break;
                         }
                         (best, prior) = (total, candidate);
+                    }
+                    // The evidence rose all the way: it is less on the way back.
+                    if prior.lengths_m[k] != from_m {
+                        break;
                     }
                 }
             }

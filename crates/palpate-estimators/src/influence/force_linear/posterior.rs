@@ -7,7 +7,7 @@
 //! they are apart is variance.
 
 use super::drift::END;
-use super::evidence::{ChannelFit, Evidence, Restricted, SourceFit};
+use super::evidence::{ChannelFit, Evidence, Restricted, SourceFit, WhiteSources};
 use super::presses::Presses;
 use super::prior::Prior;
 use crate::influence::measured::MeasuredError;
@@ -229,12 +229,39 @@ impl<'a> Posterior<'a> {
         let asked = Functionals::new(prior, presses, known.ratio, asked);
         let explained = known.restricted.cholesky.solve_lower_matrix(asked.covariance.clone());
         let open = known.restricted.open_effects(&asked.effects, &explained);
-        let moments = |told: &Told| {
-            let base = asked.effects.t().dot(&known.coefficients.column(told.c))
-                + explained.t().dot(&known.white.column(told.c));
-            told.moments(prior, &asked, &base.view(), [explained.view(), open.view()])
+        let within = Within::new(&asked, [&explained, &open]);
+        let own: Vec<usize> = channels.iter().map(|told| told.c).collect();
+        let means = asked.effects.t().dot(&known.coefficients.select(Dimension(1), &own))
+            + explained.t().dot(&known.white.select(Dimension(1), &own));
+        let of_channel = |(told, means): (&Told, ArrayView1<f64>)| {
+            told.moments(prior, &asked, &means, &explained.view(), &within)
         };
-        channels.iter().map(moments).collect()
+        channels.iter().zip(means.columns()).map(of_channel).collect()
+    }
+}
+
+/// What presses leave open of functionals beside sources, over s²: the same of all channels.
+struct Within {
+    variance: Vec<f64>,
+    with_first: Vec<f64>,
+}
+
+impl Within {
+    /// From L⁻¹·k and R⁻ᵀ·(h − Hᵀ·A⁻¹·k), a column a functional.
+    fn new(asked: &Functionals, [explained, open]: [&Array2<f64>; 2]) -> Self {
+        let mut within =
+            Self { variance: asked.variance.clone(), with_first: vec![0.0; asked.variance.len()] };
+        for (sign, rows) in [(-1.0, explained), (1.0, open)] {
+            for row in rows.outer_iter() {
+                let first = sign * row.first().copied().unwrap_or(0.0);
+                let sums = within.variance.iter_mut().zip(&mut within.with_first);
+                for ((variance, with_first), value) in sums.zip(&row) {
+                    *variance += sign * value * value;
+                    *with_first += first * value;
+                }
+            }
+        }
+        within
     }
 }
 
@@ -259,8 +286,8 @@ impl Known {
 #[derive(Clone)]
 struct Sources {
     sensors_m: Vec<Vec<f64>>,
-    /// M·L⁻¹·u of each source, and its coefficients of H.
-    white: Array2<f64>,
+    white: WhiteSources,
+    /// Coefficients of H of L⁻¹·u of each source.
     coefficients: Array2<f64>,
     fits: Vec<SourceFit>,
 }
@@ -269,11 +296,14 @@ impl Sources {
     fn new(evidence: &Evidence, known: &Known, sensors_m: Vec<Vec<f64>>) -> Self {
         let columns = evidence.prior.sources(evidence.presses, &sensors_m);
         let (white, coefficients) = known.restricted.residuals(columns);
-        Self { sensors_m, white, coefficients, fits: Vec::new() }
+        Self { sensors_m, white: WhiteSources::new(white), coefficients, fits: Vec::new() }
     }
 
     fn fitted(self, evidence: &Evidence, known: &Known, c: usize) -> Self {
-        let fit = evidence.channel(&known.restricted, known.ratio, c, &known.white.column(c), &self.white);
+        let white = known.white.slice(s![.., c..=c]);
+        let products = self.white.products(&white);
+        let sources = (&self.white, &products.column(0));
+        let fit = evidence.channel(&known.restricted, known.ratio, c, &white.column(0), sources);
         Self { fits: fit.sources, ..self }
     }
 
@@ -336,7 +366,8 @@ impl Told {
         prior: &Prior,
         asked: &Functionals,
         base: &ArrayView1<f64>,
-        [explained, open]: [ArrayView2<f64>; 2],
+        explained: &ArrayView2<f64>,
+        within: &Within,
     ) -> Vec<Moments> {
         let used: Vec<usize> = {
             let mut places: Vec<usize> = self.sources.fits.iter().map(|source| source.place).collect();
@@ -344,7 +375,7 @@ impl Told {
             places
         };
         // What of each source the presses do not tell.
-        let vs = self.sources.white.select(Dimension(1), &used);
+        let vs = self.sources.white.columns.select(Dimension(1), &used);
         let coefficients = self.sources.coefficients.select(Dimension(1), &used);
         let sensors_m: Vec<Vec<f64>> =
             used.iter().map(|place| self.sources.sensors_m[*place].clone()).collect();
@@ -357,10 +388,8 @@ impl Told {
         let first_shift: f64 = shift_of(0);
         let moments = |k: usize| {
             let shift: f64 = shift_of(k);
-            let told = explained.column(k);
-            let within = asked.variance[k] - told.dot(&told) + open.column(k).dot(&open.column(k));
-            let with_first = -told.dot(&explained.column(0)) + open.column(k).dot(&open.column(0));
-            let (mut variance, mut covariance) = (self.signal * within, self.signal * with_first);
+            let mut variance = self.signal * within.variance[k];
+            let mut covariance = self.signal * within.with_first[k];
             for (j, f) in &sources {
                 let (r, first) = (rest[[k, *j]], rest[[0, *j]]);
                 variance += f.weight * (self.signal * f.variance * r * r + (r * f.amplitude - shift).powi(2));

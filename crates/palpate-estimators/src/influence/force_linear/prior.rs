@@ -200,20 +200,6 @@ impl Prior {
         covariance
     }
 
-    /// Adds noise and drift of the ratio ρ to s².
-    pub fn with_noise(&self, covariance: &Array2<f64>, presses: &Presses, ratio: f64) -> Array2<f64> {
-        let mut covariance = covariance.clone();
-        for (i, count) in presses.count.iter().enumerate() {
-            covariance[[i, i]] += ratio * self.relative_noise_of(presses, i) / count;
-        }
-        if self.drift > 0.0 {
-            for ((i, j), value) in covariance.indexed_iter_mut() {
-                *value += ratio * self.drift_between(presses.time[i], presses.time[j]);
-            }
-        }
-        covariance
-    }
-
     /// Variance of the noise of a press over that of an untouched row.
     pub fn relative_noise(&self, force_n: f64, place_m: &[f64]) -> f64 {
         if force_n == 0.0 { 1.0 } else { self.scatter_of(force_n) * self.noise_at(place_m) }

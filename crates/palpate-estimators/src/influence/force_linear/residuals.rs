@@ -38,23 +38,23 @@ impl Residuals {
             let ratio = fits[channels[0]].ratio;
             let restricted = evidence.restricted(ratio)?;
             freedom = (n - restricted.effects()) as f64;
-            // M·L⁻¹, whose squared columns sum to the diagonal of the projected inverse.
-            let (projection, _) = restricted.residuals(Array2::eye(n));
+            // (M·L⁻¹)ᵀ, whose squared rows sum to the diagonal of the projected inverse.
+            let projection = restricted.projection().t().as_standard_layout().into_owned();
+            let squared: Array1<f64> = projection.outer_iter().map(|row| row.dot(&row)).collect();
             let (white, _) = restricted.residuals(presses.means.clone());
             for c in channels {
                 let mut left = white.column(c).to_owned();
-                let mut diagonal: Array1<f64> =
-                    projection.columns().into_iter().map(|column| column.dot(&column)).collect();
+                let mut diagonal = squared.clone();
                 if let Some(source) = fits[c].sources.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)) {
                     let place = std::slice::from_ref(&sensors_m[source.place]);
                     let (column, _) = restricted.residuals(prior.sources(presses, place));
                     let column = column.column(0).to_owned();
                     let share = column.dot(&left) / column.dot(&column);
-                    let seen = projection.t().dot(&column);
+                    let seen = projection.dot(&column);
                     diagonal.scaled_add(-1.0 / column.dot(&column), &seen.mapv(|v| v * v));
                     left.scaled_add(-share, &column);
                 }
-                let errors = projection.t().dot(&left);
+                let errors = projection.dot(&left);
                 for i in 0..n {
                     told[[i, c]] = diagonal[i] * ratio * noise[i];
                     squares[[i, c]] = errors[i].powi(2) / (diagonal[i] * fits[c].signal);

@@ -36,8 +36,13 @@ impl PlateInfluence {
         degrees.map(|degrees| Self { mesh: solved.mesh, degrees }).collect()
     }
 
+    /// Bytes that this one takes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.degrees.as_slice())
+    }
+
     /// Bytes that one takes.
-    pub fn bytes(spec: &PlateSpec) -> f64 {
+    pub fn bytes_of(spec: &PlateSpec) -> f64 {
         (size_of::<f64>() * Mesh::new(spec.extent(), spec.elements).degrees()) as f64
     }
 

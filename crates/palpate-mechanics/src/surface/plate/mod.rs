@@ -4,6 +4,7 @@
 
 mod dissection;
 mod influence;
+mod kept;
 mod mesh;
 mod rigid;
 mod solved;
@@ -24,12 +25,14 @@ use super::{
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 use influence::{NotANumber, PlateInfluence, PlateReadings, full_scales};
+use kept::Kept;
 use solved::Solved;
 
 /// A plate that was checked, whose equations are factored when they are first asked for, once for all its clones.
 ///
 /// Computed values are no part of the plate: they are neither compared nor written to files. They stay in memory as long as a
-/// clone lives: some 85 MB for a square plate of the default mesh, 230 MB for 200 × 200 elements.
+/// clone lives: some 85 MB for a square plate of the default mesh, 230 MB for 200 × 200 elements, and up to 128 MB of influence functions that
+/// were asked for.
 ///
 /// ```
 /// use palpate_mechanics::contact::Position;
@@ -59,10 +62,11 @@ pub struct Plate {
     computed: Arc<Computed>,
 }
 
-/// Cache of a plate's factored equations and full scales.
+/// Cache of a plate's factored equations, influence functions and full scales.
 #[derive(Default)]
 struct Computed {
     solved: OnceLock<Result<Solved, Unsolvable>>,
+    influences: Kept,
     full_scales: OnceLock<[f64; SensorKind::ALL.len()]>,
 }
 
@@ -144,7 +148,7 @@ impl Surface for Plate {
         self.influence_functions(kind, &[sensor]).pop().unwrap_or_else(|| Arc::new(NotANumber))
     }
 
-    /// In few sweeps through the factor.
+    /// In few sweeps through the factor, unless they were asked for before.
     fn influence_functions(
         &self,
         kind: SensorKind,
@@ -153,8 +157,9 @@ impl Surface for Plate {
         let Ok(solved) = self.solved() else {
             return sensors.iter().map(|_| Arc::new(NotANumber) as Arc<dyn InfluenceFunction>).collect();
         };
-        let all = PlateInfluence::of_all(&self.spec, solved, kind, sensors).into_iter();
-        all.map(|function| Arc::new(function) as Arc<dyn InfluenceFunction>).collect()
+        let solve = |sensors: &[Position]| PlateInfluence::of_all(&self.spec, solved, kind, sensors);
+        let all = self.computed.influences.of_all(kind, sensors, solve).into_iter();
+        all.map(|function| function as Arc<dyn InfluenceFunction>).collect()
     }
 
     fn response_functions(
@@ -183,7 +188,7 @@ impl Surface for Plate {
         // Two sweeps through the factor; by contact, readings and derivatives at 16 degrees of freedom a sensor.
         let sweeps = 2.0 * spec::estimated_factor_size(&self.spec);
         let (kept, multiply_adds) = match solving {
-            Solving::BySensor => (PlateInfluence::bytes(&self.spec), sweeps),
+            Solving::BySensor => (PlateInfluence::bytes_of(&self.spec), sweeps),
             Solving::ByContact => (PlateReadings::BYTES_EACH, sweeps + 16.0 * sensors),
         };
         let memory_bytes = self.estimated_bytes() + sensors * kept;

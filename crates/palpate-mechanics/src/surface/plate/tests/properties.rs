@@ -221,6 +221,24 @@ fn positions_off_the_plate_are_answered_without_a_panic() {
 }
 
 #[test]
+fn influence_functions_that_are_asked_for_again_are_the_same() {
+    let fresh = || plate(MIXED.spec().clone());
+    let (asked, places) = (fresh(), [at(0.041, 0.052), at(0.15, 0.1), at(0.222, 0.143)]);
+    let kept = |plate: &Plate, kind: SensorKind, places: &[Position]| {
+        let values = |function: &Arc<dyn InfluenceFunction + '_>| function.at(at(0.07, 0.03)).to_bits();
+        plate.influence_functions(kind, places).iter().map(values).collect::<Vec<u64>>()
+    };
+    for kind in KINDS {
+        kept(&asked, kind, &places[..2]);
+        let alone: Vec<u64> = places.iter().flat_map(|place| kept(&fresh(), kind, &[*place])).collect();
+        assert_eq!(kept(&asked, kind, &places), alone, "{kind}");
+        assert_eq!(kept(&asked, kind, &[places[2], places[0], places[2]]), [alone[2], alone[0], alone[2]]);
+    }
+    let influence = || asked.influence_function(SensorKind::Strain, places[0]);
+    assert!(Arc::ptr_eq(&influence(), &influence()), "it was solved for twice");
+}
+
+#[test]
 fn readings_by_contact_are_those_of_the_influence_functions() {
     for plate in [&*MIXED, &*ON_POINTS] {
         let places = [(0.041, 0.052), (0.15, 0.1), (0.222, 0.143), (0.3, 0.2)];

@@ -1,0 +1,61 @@
+//! The influence functions that a plate was last asked for: fits of one setup, fold after fold and seed after seed, ask for the same.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::influence::PlateInfluence;
+use crate::contact::Position;
+use crate::sensing::SensorKind;
+
+/// Most memory that they take: those of a fit on the default mesh are 100 MB.
+const MOST_BYTES: usize = 128_000_000;
+
+/// Kind and position of a sensor, by their bits.
+type Key = (SensorKind, [u64; 2]);
+
+/// Influence functions by sensor.
+#[derive(Default)]
+pub(super) struct Kept {
+    functions: Mutex<HashMap<Key, Arc<PlateInfluence>>>,
+}
+
+impl Kept {
+    /// The influence functions of some sensors; `solve` is asked once for all that are not kept.
+    pub fn of_all(
+        &self,
+        kind: SensorKind,
+        sensors: &[Position],
+        solve: impl FnOnce(&[Position]) -> Vec<PlateInfluence>,
+    ) -> Vec<Arc<PlateInfluence>> {
+        let key = |at: &Position| (kind, [at.x_m.to_bits(), at.y_m.to_bits()]);
+        let mut found: HashMap<Key, Arc<PlateInfluence>> = {
+            let kept = self.functions.lock().unwrap_or_else(PoisonError::into_inner);
+            sensors.iter().map(key).filter_map(|key| Some((key, kept.get(&key)?.clone()))).collect()
+        };
+        let missing: Vec<Position> =
+            sensors.iter().filter(|at| !found.contains_key(&key(at))).copied().collect();
+        if !missing.is_empty() {
+            let solved: Vec<_> =
+                missing.iter().map(key).zip(solve(&missing).into_iter().map(Arc::new)).collect();
+            self.keep(&solved);
+            found.extend(solved);
+        }
+        sensors.iter().filter_map(|at| found.get(&key(at)).cloned()).collect()
+    }
+
+    /// Keeps functions, and where these are then too many, none from before.
+    fn keep(&self, solved: &[(Key, Arc<PlateInfluence>)]) {
+        let bytes = |functions: &mut dyn Iterator<Item = &Arc<PlateInfluence>>| -> usize {
+            functions.map(|function| function.bytes()).sum()
+        };
+        let new = bytes(&mut solved.iter().map(|(_, function)| function));
+        if new > MOST_BYTES {
+            return;
+        }
+        let mut kept = self.functions.lock().unwrap_or_else(PoisonError::into_inner);
+        if bytes(&mut kept.values()) + new > MOST_BYTES {
+            kept.clear();
+        }
+        kept.extend(solved.iter().cloned());
+    }
+}
