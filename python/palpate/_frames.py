@@ -20,7 +20,7 @@ def recording(recording: Recording) -> pd.DataFrame:
 
     setup = recording.setup
     columns: dict[str, Any] = {"x [m]": recording.x}
-    if setup.width is not None:
+    if recording.y is not None:
         columns["y [m]"] = recording.y
     if not np.isnan(recording.force).all():
         columns["force [N]"] = recording.force

@@ -10,13 +10,14 @@ use palpate::mechanics::limit::{
     limit_warnings, positions_with_spacing,
 };
 use palpate::mechanics::surface::Extent;
+use palpate::mechanics::units::format_count;
 use palpate::numerics::watch::Watch;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::{Value, json};
 
 use crate::errors::{of_work, refused};
-use crate::quantities::{force_n, length_m, share};
+use crate::quantities::{self, force_n, length_m, share};
 use crate::subject::Subject;
 use crate::training::positions;
 use crate::values::{Fields, place};
@@ -24,7 +25,7 @@ use crate::work;
 
 /// Fields of `palpate.Limit`.
 #[pyfunction]
-#[pyo3(signature = (bench, *, force, unknown_force, at, every, false_alarm_rate, progress))]
+#[pyo3(signature = (bench, *, force, unknown_force, at, every, false_alarm_rate, memory_limit, progress))]
 #[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
 pub fn limit<'py>(
     py: Python<'py>,
@@ -34,6 +35,7 @@ pub fn limit<'py>(
     at: Option<Bound<'py, PyAny>>,
     every: Option<Bound<'py, PyAny>>,
     false_alarm_rate: Option<Bound<'py, PyAny>>,
+    memory_limit: Option<&Bound<'py, PyAny>>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let subject = Subject::of(bench, "bench")?;
@@ -71,6 +73,15 @@ pub fn limit<'py>(
         force_n.ok_or_else(|| refused(format!("{}: give `force`, as in \"3 N\"", LimitError::NoForce)))?;
     let force = if unknown_force || setup.force_n().is_none() { Force::Unknown } else { Force::Known };
     let asked = Asked { force_n, force, at, rate };
+    if let (Some(limit), Some(surface)) = (memory_limit, setup.surface().model()) {
+        let listed = asked.at.as_ref().map_or(0, Vec::len);
+        let cost = CramerRaoBound::cost(surface, setup.layout(), listed);
+        let what = format!("the limit of {} sensors", format_count(setup.layout().len() as u64));
+        let checked = quantities::memory_limit(limit)?.check(&what, cost.memory_bytes);
+        checked.map_err(|error| {
+            refused(format!("{error}: raise the limit, or take fewer sensors or `elements`"))
+        })?;
+    }
     let told = work::run_with(py, progress, None, |watch| match &subject {
         Subject::Locator(locator) if let Some(linear) = locator.force_linear() => {
             asked.tell(&linear.cramer_rao_bound(extent), &linear.lightest_touch(), watch)
