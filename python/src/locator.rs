@@ -253,8 +253,8 @@ impl Locator {
     /// >>> setup = pp.Setup(beam, pp.deflection(8, noise="5 um"), force="3 N")
     /// >>> tracker = pp.Influence().fit(setup.simulate(pp.even(10), repeats=5)).tracker()
     /// >>> for count in range(3):
-    /// ...     now = tracker.follow(0.01 * count, setup.response([0.2 + 0.001 * count])[0])
-    /// >>> bool(abs(now.x - 0.202) < 1e-3)
+    /// ...     now = tracker.follow(0.01 * count, setup.response([0.1 + 0.001 * count], force="3 N")[0])
+    /// >>> bool(abs(now.x - 0.102) < 1e-3)
     /// True
     #[pyo3(signature = (*, frequency=None, damping=None))]
     fn tracker<'py>(
