@@ -62,24 +62,23 @@ def calls() -> Iterator[tuple[str, Call]]:
     measured = pp.Setup(pp.Measured("400 mm"), pp.raw(8))
     with_forces = measured.recording(many.readings, many.x, force=many.force * np.tile([1.0, 1.5, 2.0], 1000))
 
+    on_fine = fine.recording(on_plate.readings, on_plate.x, on_plate.y, force=5.0)
+
     yield "fit, Network", lambda: pp.Network(aggregate_error=1e-12, max_epochs=2_000_000_000).fit(few)
     yield "fit_many, Network", lambda: pp.Network(aggregate_error=1e-12, max_epochs=2_000_000).fit_many(few, range(100))
     yield "fit, LevenbergMarquardt", lambda: pp.LevenbergMarquardt().fit(many)
     yield "fit, GaussianProcess", lambda: pp.GaussianProcess().fit(many)
     yield "fit, Influence of a beam", lambda: pp.Influence().fit(beam.simulate(pp.even(300), repeats=100))
     yield "fit, Influence of a plate", lambda: pp.Influence().fit(on_plate)
-    yield "fit, Influence of a fine plate", lambda: pp.Influence().fit(on_fine())
+    yield "fit, Influence of a fine plate", lambda: pp.Influence().fit(on_fine)
     yield "fit, Influence of a measured surface", lambda: pp.Influence().fit(with_forces)
     yield "fit, Neighbours", lambda: pp.Neighbours().fit(beam.simulate(pp.even(300), repeats=100))
     yield "fit, ClosedForm", lambda: pp.ClosedForm().fit(beam.simulate(pp.even(300), repeats=100))
     yield "fit, Centroid", lambda: pp.Centroid().fit(beam.simulate(pp.even(300), repeats=100))
     yield "fit, Auto", lambda: pp.Auto().fit(many)
 
-    def on_fine() -> pp.Recording:
-        return fine.recording(on_plate.readings, on_plate.x, on_plate.y, force=5.0)
-
     yield "limit of a fine plate", lambda: pp.limit(fine)
-    yield "limit, every 0.7 mm", lambda: pp.limit(plate, every="0.7 mm")
+    yield "limit, every 1 mm", lambda: pp.limit(plate, every="1 mm")
     yield "place_sensors", lambda: pp.place_sensors(beam, sites="0.5 mm", verify=50)
     yield "place_sensors on a fine plate", lambda: pp.place_sensors(fine)
     yield "place_training", lambda: pp.place_training(beam, count=10)
@@ -107,6 +106,8 @@ def calls() -> Iterator[tuple[str, Call]]:
 
 
 def main() -> None:
+    # A shell's background ignores it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     word = sys.argv[1] if len(sys.argv) > 1 else ""
     print("| call | longest, ms | median, ms | interrupted |\n|---|---|---|---|")
     for name, call in calls():

@@ -108,6 +108,9 @@ fn complaint(error: &LimitError) -> PyErr {
     refused(format!("{error}: {help}"))
 }
 
+/// Positions that are told between two looks for Ctrl-C.
+const TOGETHER: usize = 500;
+
 /// A question for the limit.
 struct Asked {
     force_n: f64,
@@ -132,18 +135,32 @@ impl Asked {
     fn tell(&self, limit: &CramerRaoBound, touch: &LightestTouch, watch: Watch) -> Result<Told, LimitError> {
         limit.prepare(self.at.as_deref().unwrap_or_default(), watch)?;
         let curve = |force| match &self.at {
-            Some(at) => LimitCurve::at_positions(limit, self.force_n, force, at),
+            Some(at) => {
+                let mut curve = LimitCurve::at_positions(limit, self.force_n, force, &[])?;
+                for positions in at.chunks(TOGETHER) {
+                    watch.counted("limit", "positions", curve.points.len(), at.len())?;
+                    curve
+                        .points
+                        .extend(LimitCurve::at_positions(limit, self.force_n, force, positions)?.points);
+                }
+                Ok(curve)
+            }
             None => LimitCurve::over_surface(limit, self.force_n, force),
         };
         let (known, unknown) = (curve(Force::Known)?, curve(Force::Unknown)?);
         let positions: Vec<Position> = known.points.iter().map(|point| point.position).collect();
+        let mut touch_n = Vec::with_capacity(positions.len());
+        for at in positions.chunks(TOGETHER) {
+            watch.counted("lightest touch", "positions", touch_n.len(), positions.len())?;
+            touch_n.extend(at.iter().map(|at| touch.forces_at(*at)));
+        }
         Ok(Told {
             alive: limit.alive(),
             known,
             unknown,
             warnings: limit_warnings(limit, self.force_n, self.force, watch)?,
             rate: touch.rate(),
-            touch_n: positions.iter().map(|at| touch.forces_at(*at)).collect(),
+            touch_n,
             touches: touch.summaries(&positions),
         })
     }

@@ -10,6 +10,7 @@ use crate::tracking::tests::{
 };
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Motion;
+use std::sync::Arc;
 
 fn rig() -> Example {
     moving_plate()
