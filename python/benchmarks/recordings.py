@@ -47,7 +47,7 @@ def scikit_learns(channels: int) -> Pipeline:
 
 
 def judged(name: str, method, recording: pp.Recording, params: dict | None) -> None:
-    truth = recording.x if recording.setup.width is None else np.column_stack([recording.x, recording.y])
+    truth = recording.positions
     begun = time.process_time()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)

@@ -53,6 +53,7 @@ from ._palpate import (
     Recording,
     Rig,
     Setup,
+    Tracker,
     Training,
     __version__,
     parse_quantity,
@@ -60,7 +61,7 @@ from ._palpate import (
 from ._sensors import Columns, Sensors, deflection, raw, reaction, slope, strain
 from ._study import Study, StudyResults
 from ._surfaces import Beam, BeamSection, Digit, Measured, Plate, Support
-from ._tracking import Motion, MovingRecording, Track, TrackedContact, simulate_moving
+from ._tracking import ContactState, Motion, MovingRecording, Track, TrackedContact, TrackState, simulate_moving
 from ._training import at, chebyshev, edge_dense, even, grid
 
 __all__ = [
@@ -72,6 +73,7 @@ __all__ = [
     "Columns",
     "Comparison",
     "ContactPrior",
+    "ContactState",
     "Digit",
     "DigitEstimator",
     "ErrorsByPosition",
@@ -110,7 +112,9 @@ __all__ = [
     "StudyResults",
     "Support",
     "Track",
+    "TrackState",
     "TrackedContact",
+    "Tracker",
     "Training",
     "TrainingPlacement",
     "UniformLoad",

@@ -16,7 +16,7 @@ from ._progress import Progress
 from ._results import Floats, Result, in_mm, position_columns
 from ._sections import LENGTH, Range, Section, key, needed
 from ._sensors import _OWN_UNIT, _UNITS
-from ._surfaces import Point, Quantity
+from ._surfaces import Memory, Point, Quantity
 
 if TYPE_CHECKING:
     from ._palpate import Recording, Rig, Setup, Training
@@ -323,6 +323,7 @@ def place_sensors(
     verify: int = 0,
     estimator: AnyEstimator | None = None,
     seed: int = 0,
+    memory_limit: Memory = None,
     progress: Progress = None,
 ) -> SensorPlacement:
     """Where to put the sensors: layouts by several methods, scored by the location error that physics allows.
@@ -370,6 +371,8 @@ def place_sensors(
         The method that is calibrated for that; a rig's own, or `Influence`.
     seed : int
         Seed of searches and simulations.
+    memory_limit : str or float, optional
+        As of `limit`.
     progress : bool or callable, optional
         As of `Estimator.fit`.
 
@@ -380,7 +383,7 @@ def place_sensors(
     Raises
     ------
     PalpateError
-        For constraints that no layout can keep, and without a model, noise or force.
+        For constraints that no layout can keep, without a model, noise or force, and for more memory than the limit.
 
     Examples
     --------
@@ -417,6 +420,7 @@ def place_sensors(
         verify=verify,
         estimator=estimator.of(setup) if isinstance(estimator, Estimator) else estimator,
         seed=seed,
+        memory_limit=memory_limit,
         progress=progress,
     )
     fields["layouts"] = [Layout(**layout) for layout in fields["layouts"]]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 from . import _palpate
 from ._progress import Progress
 from ._sections import FORCE, Section, key
-from ._surfaces import Quantity
+from ._surfaces import Memory, Quantity
 
 if TYPE_CHECKING:
     from ._palpate import Locator, Recording, Setup
@@ -19,7 +19,14 @@ if TYPE_CHECKING:
 class Estimator(Section):
     """A configured method; `fit` turns it into a locator."""
 
-    def fit(self, recording: Recording, *, seed: int = 0, progress: Progress = None) -> Locator:
+    def fit(
+        self,
+        recording: Recording,
+        *,
+        seed: int = 0,
+        memory_limit: Memory = None,
+        progress: Progress = None,
+    ) -> Locator:
         """Calibrate: fit the method to a recording.
 
         Parameters
@@ -28,6 +35,8 @@ class Estimator(Section):
             Readings with their contacts; it knows its setup.
         seed : int
             Seed of whatever the method draws at random.
+        memory_limit : str or float, optional
+            The most memory that the fit may need, as in "2 GB", or in bytes: one that is estimated to need more is refused before it begins.
         progress : bool or callable, optional
             A progress bar where a terminal or a notebook shows it (the default), `False` for none, `True` for one anywhere, or a function
             of (stage, done, total).
@@ -39,9 +48,10 @@ class Estimator(Section):
         Raises
         ------
         PalpateError
-            When the recording does not suit the setup or the method.
+            When the recording does not suit the setup or the method, and for more memory than the limit, with the estimators that need less.
         """
-        return self.of(recording.setup).fit(recording, seed=seed, progress=progress)
+        estimator = self.of(recording.setup)
+        return estimator.fit(recording, seed=seed, memory_limit=memory_limit, progress=progress)
 
     def fit_many(
         self,

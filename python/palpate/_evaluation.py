@@ -14,7 +14,7 @@ from ._estimators import Estimator
 from ._palpate import Evaluation, Recording, Rig, Setup, Training
 from ._progress import Progress
 from ._results import Floats, PathLike, Result, position_columns, write_csv
-from ._surfaces import Quantity
+from ._surfaces import Memory, Quantity
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -154,6 +154,7 @@ def cross_validate(
     folds: int = 5,
     seed: int = 0,
     tare: Tare = None,
+    memory_limit: Memory = None,
     progress: Progress = None,
 ) -> Evaluation:
     """Fit an estimator to each fold of a recording, and judge it at the positions that the fold holds out.
@@ -170,6 +171,8 @@ def cross_validate(
         Seed of the fits.
     tare : "auto", optional
         Take off held-out readings the drift that the other presses tell.
+    memory_limit : str or float, optional
+        As of `Estimator.fit`.
     progress : bool or callable, optional
         As of `Estimator.fit`.
 
@@ -192,7 +195,9 @@ def cross_validate(
     (50, True)
     """
     method = estimator.of(recording.setup) if isinstance(estimator, Estimator) else estimator
-    return _palpate.cross_validate(method, recording, folds=folds, seed=seed, tare=_is_tared(tare), progress=progress)
+    return _palpate.cross_validate(
+        method, recording, folds=folds, seed=seed, tare=_is_tared(tare), memory_limit=memory_limit, progress=progress
+    )
 
 
 def compare(
@@ -207,6 +212,7 @@ def compare(
     tolerance: Quantity = "2 mm",
     seed: int = 0,
     tare: Tare = None,
+    memory_limit: Memory = None,
     progress: Progress = None,
 ) -> Comparison:
     """Every estimator on the same folds of a recording, or on simulated calibrations, against what physics allows.
@@ -233,6 +239,8 @@ def compare(
         Seed of simulations and fits.
     tare : "auto", optional
         Take off held-out readings the drift that the other presses tell.
+    memory_limit : str or float, optional
+        As of `Estimator.fit`: an estimator that needs more is left out, or refused where it is the only one.
     progress : bool or callable, optional
         As of `Estimator.fit`.
 
@@ -274,6 +282,7 @@ def compare(
         tolerance=tolerance,
         seed=seed,
         tare=_is_tared(tare),
+        memory_limit=memory_limit,
         progress=progress,
     )
     return Comparison(**fields)

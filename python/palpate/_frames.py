@@ -20,7 +20,7 @@ def recording(recording: Recording) -> pd.DataFrame:
 
     setup = recording.setup
     columns: dict[str, Any] = {"x [m]": recording.x}
-    if setup.width is not None:
+    if recording.y is not None:
         columns["y [m]"] = recording.y
     if not np.isnan(recording.force).all():
         columns["force [N]"] = recording.force
@@ -38,7 +38,7 @@ def own_columns(frame: pd.DataFrame, setup: Setup) -> dict[str, Any] | None:
     channels = [_heading(name, _UNITS[measure]) for name, measure in zip(setup.channels, setup.measures)]
     if not {"x [m]", *channels} <= set(frame.columns):
         return None
-    arrays: dict[str, Any] = {"readings": frame[channels].to_numpy(np.float64), "x": frame["x [m]"].to_numpy()}
+    arrays: dict[str, Any] = {"readings": frame[channels].to_numpy(), "x": frame["x [m]"].to_numpy()}
     for name in ("y [m]", "force [N]", "time [s]"):
         if name in frame.columns:
             arrays[name[: name.index(" ")]] = frame[name].to_numpy()

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
 _WIDTH = 560.0
 _MARGIN = 24.0
 _ROWS = 10
+# Units of readings in tables, and how many of each the SI's has.
+_UNITS = {"deflection": ("mm", 1e3), "slope": ("mrad", 1e3), "strain": ("um/m", 1e6), "reaction": ("N", 1.0), "raw": ("", 1.0)}
+# Colours of what sensors measure: those of the figures.
+_COLOURS = {"deflection": "#009e73", "slope": "#d55e00", "strain": "#0072b2", "reaction": "#cc79a7"}
 
 
 def setup(setup: Setup) -> str:
@@ -62,11 +66,12 @@ def _cell(value: Any) -> str:
 
 def _recording_rows(recording: Recording) -> dict[str, list[str]]:
     rows = {"x [mm]": [f"{x * 1e3:.3f}" for x in recording.x[:_ROWS]]}
-    if recording.setup.width is not None:
+    if recording.y is not None:
         rows["y [mm]"] = [f"{y * 1e3:.3f}" for y in recording.y[:_ROWS]]
     rows["force [N]"] = ["" if np.isnan(force) else f"{force:.3f}" for force in recording.force[:_ROWS]]
-    for name, values in zip(recording.channels, recording.readings[:_ROWS].T):
-        rows[name] = [f"{value:.6g}" for value in values]
+    for name, measure, values in zip(recording.channels, recording.setup.measures, recording.readings[:_ROWS].T):
+        unit, factor = _UNITS[measure]
+        rows[f"{name} [{unit}]" if unit else name] = [f"{factor * value:.5g}" for value in values]
     return rows
 
 
@@ -97,15 +102,18 @@ def _drawing(setup: Setup) -> str:
         f'<rect x="{_MARGIN:.1f}" y="{top:.1f}" width="{setup.length * scale:.1f}" height="{depth:.1f}" '
         'fill="currentColor" fill-opacity="0.15" stroke="currentColor"/>'
     ]
-    for support in setup.supports:
+    for kind, support in zip(setup.support_kinds, setup.supports):
         x, y = place(support)
-        parts.append(f'<path d="M{x:.1f} {y:.1f} l-6 11 h12 z" fill="none" stroke="currentColor"/>')
+        if kind == "clamped":
+            parts.append(f'<path d="M{x:.1f} {top - 9:.1f} v{depth + 18:.1f}" stroke="currentColor" stroke-width="4"/>')
+        else:
+            parts.append(f'<path d="M{x:.1f} {y:.1f} l-6 11 h12 z" fill="none" stroke="currentColor"/>')
     if setup.kind != "measured":
         for number, position in enumerate(setup.sensor_positions, 1):
             x, y = place(position)
             y -= 0 if plane else depth
             parts.append(
-                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#1f77b4"><title>{html.escape(setup.channels[number - 1])}'
+                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{_COLOURS[setup.measures[number - 1]]}"><title>{html.escape(setup.channels[number - 1])}'
                 "</title></circle>"
             )
     size = f"{setup.length * 1e3:g} mm" + (f" × {setup.width * 1e3:g} mm" if setup.width is not None else "")

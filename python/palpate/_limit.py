@@ -12,7 +12,7 @@ from . import _palpate
 from ._progress import Progress
 from ._quantities import length_m
 from ._results import Floats, Result, position_columns
-from ._surfaces import Point, Quantity
+from ._surfaces import Memory, Point, Quantity
 
 if TYPE_CHECKING:
     from ._palpate import Locator, Rig, Setup
@@ -127,6 +127,7 @@ def limit(
     at: Sequence[Point] | Floats | None = None,
     every: Quantity | None = None,
     false_alarm_rate: float | str | None = None,
+    memory_limit: Memory = None,
     progress: Progress = None,
 ) -> Limit:
     """What physics allows on a bench: the Cramér–Rao bound of position and force, and the lightest touch that is told from noise.
@@ -145,6 +146,8 @@ def limit(
         Instead of `at`: positions so far apart.
     false_alarm_rate : float or str, optional
         Share of untouched readings that may be taken for a contact; the bench's, or 0.1 %. A locator of a surface without a model keeps its own.
+    memory_limit : str or float, optional
+        The most memory that the work may need, as in "2 GB", or in bytes: what is estimated to need more is refused before it begins.
     progress : bool or callable, optional
         As of `Estimator.fit`.
 
@@ -155,7 +158,7 @@ def limit(
     Raises
     ------
     PalpateError
-        Without a force, without noise, without a model, and for positions off the surface.
+        Without a force, without noise, without a model, for positions off the surface, and for more memory than the limit.
 
     Examples
     --------
@@ -171,6 +174,7 @@ def limit(
         at=at,
         every=every,
         false_alarm_rate=false_alarm_rate,
+        memory_limit=memory_limit,
         progress=progress,
     )
     return Limit(**fields)

@@ -11,8 +11,8 @@ from ._influence import InfluenceFunctions
 from ._load_profile import UniformLoad
 from ._progress import Progress
 from ._sensors import Columns, RawChannels, Sensors
-from ._surfaces import Point, Quantity, Surface
-from ._tracking import MovingRecording, Track
+from ._surfaces import Memory, Point, Quantity, Surface
+from ._tracking import MovingRecording, Track, TrackState
 
 _Floats = npt.NDArray[np.float64]
 _Path = str | PathLike[str]
@@ -130,7 +130,9 @@ class Recording:
     @property
     def x(self) -> _Floats: ...
     @property
-    def y(self) -> _Floats: ...
+    def y(self) -> _Floats | None: ...
+    @property
+    def positions(self) -> _Floats: ...
     @property
     def force(self) -> _Floats: ...
     @property
@@ -166,6 +168,7 @@ class Estimator:
         seed: int = 0,
         progress: Progress = None,
         auto_seconds: float = 300.0,
+        memory_limit: Memory = None,
     ) -> Locator: ...
     def fit_many(
         self,
@@ -257,7 +260,12 @@ class Locator:
     def load(path: _Path) -> Locator: ...
     def tare(self, readings: npt.ArrayLike, *, untouched: npt.ArrayLike | None = None) -> _Floats: ...
     def evaluate(
-        self, recording: Recording | None = None, *, seed: int = 0, progress: Progress = None
+        self,
+        recording: Recording | None = None,
+        *,
+        seed: int = 0,
+        tare: Literal["auto"] | int | npt.ArrayLike | None = None,
+        progress: Progress = None,
     ) -> Evaluation: ...
     def load_profile(
         self,
@@ -276,6 +284,7 @@ class Locator:
         damping: float | None = None,
         progress: Progress = None,
     ) -> Track: ...
+    def tracker(self, *, frequency: Quantity | None = None, damping: float | None = None) -> Tracker: ...
     def to_json(self) -> str: ...
     @staticmethod
     def from_json(text: str) -> Locator: ...
@@ -303,6 +312,7 @@ def limit(
     at: Sequence[Point] | _Floats | None,
     every: Quantity | None,
     false_alarm_rate: float | str | None,
+    memory_limit: Memory,
     progress: Progress,
 ) -> dict[str, Any]: ...
 
@@ -350,6 +360,7 @@ def cross_validate(
     folds: int,
     seed: int,
     tare: bool,
+    memory_limit: Memory,
     progress: Progress,
 ) -> Evaluation: ...
 def compare(
@@ -365,6 +376,7 @@ def compare(
     tolerance: Quantity,
     seed: int,
     tare: bool,
+    memory_limit: Memory,
     progress: Progress,
 ) -> dict[str, Any]: ...
 def place_sensors(
@@ -380,6 +392,7 @@ def place_sensors(
     verify: int,
     estimator: Estimator | None,
     seed: int,
+    memory_limit: Memory,
     progress: Progress,
 ) -> dict[str, Any]: ...
 def place_training(
@@ -424,6 +437,13 @@ def track(
     damping: float | None,
     progress: Progress,
 ) -> dict[str, Any]: ...
+@final
+class Tracker:
+    def __new__(
+        cls, locator: Locator, *, frequency: Quantity | None = None, damping: float | None = None
+    ) -> Tracker: ...
+    def follow(self, time: Quantity, reading: npt.ArrayLike) -> TrackState: ...
+
 def load_profile(
     bench: Setup | Rig | Locator,
     readings: npt.ArrayLike,

@@ -18,6 +18,8 @@ from ._sections import (
 )
 
 Quantity = Union[float, str]
+# The most memory that work may need: bytes, or a text such as "2 GB"; no limit where nothing is said.
+Memory = Union[float, str, None]
 """A number in SI units, or a text with a unit: ``0.4`` and ``"400 mm"`` are the same length."""
 
 Point = Union[Quantity, Sequence[Quantity]]

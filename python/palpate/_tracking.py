@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from . import _palpate
 from ._errors import PalpateError
-from ._palpate import Estimates
+from ._palpate import Estimate, Estimates
 from ._progress import Progress
 from ._results import Floats, PathLike, Result, position_columns, write_whole
 from ._sections import DENSITY, FORCE, FREQUENCY, LENGTH, SPEED, TIME, Range, key, needed, toml_value
@@ -92,8 +92,8 @@ class MovingRecording(Result):
         return self.recording.x
 
     @property
-    def y(self) -> Floats:
-        """Position of the first contact across a plane, in metres; 0 on a line: of the shape (readings)."""
+    def y(self) -> Floats | None:
+        """Position of the first contact across a plane, in metres: of the shape (readings); None on a line."""
         return self.recording.y
 
     @property
@@ -116,8 +116,7 @@ class MovingRecording(Result):
         write_whole(path, _palpate.moving_csv(self.recording, self._second()).decode())
 
     def _columns(self) -> dict[str, Any]:
-        y = None if self.recording.setup.width is None else self.y
-        columns = {"time [s]": self.time, **position_columns(self.x, y), "force [N]": self.force}
+        columns = {"time [s]": self.time, **position_columns(self.x, self.y), "force [N]": self.force}
         if self.second_x is not None:
             columns["second x [mm]"], columns["second force [N]"] = 1e3 * self.second_x, self.second_force
         return columns
@@ -237,6 +236,95 @@ class Track(Result):
         touched = f"{int(np.count_nonzero(~np.isnan(self.x)))} of {len(self)} readings touched"
         error = "" if self.errors is None else f", mean error {1e3 * self.errors['track']:.3g} mm"
         return f"<Track: {touched}{error}>"
+
+
+@dataclass(frozen=True)
+class ContactState:
+    """State of a contact that is followed, at one reading.
+
+    Attributes
+    ----------
+    x, speed, force : float
+        Position along the surface in metres, speed in m/s, and force in newtons.
+    x_sd, speed_sd, force_sd : float
+        Their standard deviations.
+    x_95 : tuple of float
+        Ends of the position's 95 % interval, in metres.
+    y, speed_y, y_sd, speed_y_sd, covariance_xy, y_95
+        The same across a plane, with the covariance of x and y in m²; None on a line.
+    """
+
+    x: float
+    speed: float
+    force: float
+    x_sd: float
+    speed_sd: float
+    force_sd: float
+    x_95: tuple[float, float]
+    y: float | None = None
+    speed_y: float | None = None
+    y_sd: float | None = None
+    speed_y_sd: float | None = None
+    covariance_xy: float | None = None
+    y_95: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class TrackState:
+    """State of all contacts at one reading, by it and those before; `Tracker.follow` tells it.
+
+    Attributes
+    ----------
+    time : float
+        Time of the reading, in seconds.
+    touching, two_touching : float
+        Probability that something touches, and that two contacts do.
+    contacts : tuple of ContactState
+        The contacts, as many as is most probable. Each keeps its place while it is followed.
+    single : Estimate
+        Estimate of the reading by itself.
+    """
+
+    time: float
+    touching: float
+    two_touching: float
+    contacts: tuple[ContactState, ...]
+    single: Estimate
+
+    @property
+    def x(self) -> float | None:
+        """Position of the first contact along the surface in metres; None while nothing touches."""
+        return self.contacts[0].x if self.contacts else None
+
+    @property
+    def y(self) -> float | None:
+        """Its position across a plane, in metres; None on a line."""
+        return self.contacts[0].y if self.contacts else None
+
+    @property
+    def speed(self) -> float | None:
+        """Its speed along the surface, in m/s."""
+        return self.contacts[0].speed if self.contacts else None
+
+    @property
+    def force(self) -> float | None:
+        """Its force in newtons."""
+        return self.contacts[0].force if self.contacts else None
+
+    @property
+    def x_95(self) -> tuple[float, float] | None:
+        """Ends of its 95 % interval, in metres."""
+        return self.contacts[0].x_95 if self.contacts else None
+
+    def __repr__(self) -> str:
+        if not self.contacts:
+            return f"<TrackState: {self.time:.4g} s, nothing touches>"
+        return f"<TrackState: {self.time:.4g} s, {' and '.join(map(_in_words, self.contacts))}>"
+
+
+def _in_words(contact: ContactState) -> str:
+    place = f"x = {1e3 * contact.x:.3f} mm" + ("" if contact.y is None else f", y = {1e3 * contact.y:.3f} mm")
+    return f"{place}, {contact.speed:.3g} m/s, {contact.force:.3f} N"
 
 
 def simulate_moving(

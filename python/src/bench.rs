@@ -633,10 +633,18 @@ impl Recording {
         self.column(py, |row| row.position.x_m)
     }
 
-    /// Position of each contact across a plane, in metres: of the shape (rows); 0 on a line.
+    /// Position of each contact across a plane, in metres: of the shape (rows); None on a line.
     #[getter]
-    fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.column(py, |row| row.position.y_m)
+    fn y<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        let plane = matches!(self.setup.surface().extent(), Extent::Plane { .. });
+        plane.then(|| self.column(py, |row| row.position.y_m))
+    }
+
+    /// Position of each contact, in metres: of the shape (rows), or (rows, 2) on a plane, as scikit-learn's estimators take targets.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let each: Vec<Position> = self.inner.rows.iter().map(|row| row.position).collect();
+        positions_array(py, &each, self.setup.surface().extent())
     }
 
     /// Force of each contact in newtons, 0 where nothing touches and NaN where nobody measured it: of the shape (rows).
@@ -732,8 +740,8 @@ impl Recording {
         let arrays = PyDict::new(py);
         arrays.set_item("readings", self.readings(py)?)?;
         arrays.set_item("x", self.x(py))?;
-        if matches!(self.setup.surface().extent(), Extent::Plane { .. }) {
-            arrays.set_item("y", self.y(py))?;
+        if let Some(y) = self.y(py) {
+            arrays.set_item("y", y)?;
         }
         let rows = &self.inner.rows;
         if rows.iter().all(|row| row.force_n.is_some()) {

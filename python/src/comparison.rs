@@ -15,9 +15,9 @@ use std::sync::Arc;
 
 use crate::bench::{Recording, Setup};
 use crate::errors::{of_work, refused};
-use crate::estimator::Estimator;
+use crate::estimator::{Estimator, check_memory};
 use crate::evaluation::{About, Evaluation, FIGURES};
-use crate::quantities::length_m;
+use crate::quantities::{self, length_m};
 use crate::training::Training;
 use crate::values::Fields;
 use crate::work;
@@ -49,7 +49,8 @@ fn in_folds(count: usize, tare: bool) -> String {
 
 /// `palpate.cross_validate`.
 #[pyfunction]
-#[pyo3(signature = (estimator, recording, *, folds, seed, tare, progress))]
+#[pyo3(signature = (estimator, recording, *, folds, seed, tare, memory_limit, progress))]
+#[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
 pub fn cross_validate(
     py: Python<'_>,
     estimator: &Estimator,
@@ -57,10 +58,12 @@ pub fn cross_validate(
     folds: usize,
     seed: u64,
     tare: bool,
+    memory_limit: Option<&Bound<'_, PyAny>>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Evaluation> {
     let count = checked_folds(folds)?;
     let (setup, method) = (&recording.setup, &estimator.inner);
+    check_memory(memory_limit, method, setup, &recording.inner)?;
     let rounds = Some(count as u64 * method.most_rounds()).filter(|most| *most > 0);
     let tried = work::run_with(py, progress, rounds, |watch| {
         let splits = self::folds(setup, &recording.inner, count, tare, watch)?;
@@ -93,7 +96,7 @@ fn in_order(
 
 /// Fields of `palpate.Comparison`.
 #[pyfunction]
-#[pyo3(signature = (setup, own, estimators, recording, training, *, only, folds, calibrations, tolerance, seed, tare, progress))]
+#[pyo3(signature = (setup, own, estimators, recording, training, *, only, folds, calibrations, tolerance, seed, tare, memory_limit, progress))]
 #[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
 pub fn compare<'py>(
     py: Python<'py>,
@@ -108,6 +111,7 @@ pub fn compare<'py>(
     tolerance: Bound<'py, PyAny>,
     seed: u64,
     tare: bool,
+    memory_limit: Option<&Bound<'py, PyAny>>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let tolerance_m = length_m(&tolerance, "tolerance")?;
@@ -154,10 +158,18 @@ pub fn compare<'py>(
         )));
     }
     contenders.retain(|contender| only.is_empty() || only.iter().any(|kind| kind == contender.kind()));
+    // Alone it is refused; among others it is left out.
+    if let ([only], Some(trial)) = (&contenders[..], trials.first()) {
+        check_memory(memory_limit, only, bench, &trial.training)?;
+    }
+    let limit = memory_limit.map(quantities::memory_limit).transpose()?;
+    let refuse = |contender: &estimator::Estimator, cost| {
+        limit.and_then(|limit| limit.check_fit(contender, cost).err()).map(|exceeded| exceeded.to_string())
+    };
     let start = Instant::now();
     let (compared, ratios) = work::run(py, progress, None, |watch| {
         let clock = || start.elapsed().as_secs_f64();
-        let options = CompareOptions { seed, clock: &clock, refuse: &|_, _| None, watch };
+        let options = CompareOptions { seed, clock: &clock, refuse: &refuse, watch };
         let compared = compare_all(bench, contenders, &trials, options)?;
         let evaluations = compared.comparisons.iter().map(|one| &one.tried.evaluation);
         let ratios: Vec<Option<f64>> = evaluations.map(|of| limit_ratio(bench, of)).collect();

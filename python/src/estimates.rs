@@ -132,6 +132,17 @@ impl Estimate {
             self.inner.contact == other.inner.contact && self.inner.status == other.inner.status
         })
     }
+
+    /// Pickled as the only row of `Estimates`.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, own) = (slf.py(), slf.get());
+        let alone = Estimates::filled(py, 1, own.extent, |mut rows| {
+            rows.set(0, &own.inner);
+            Ok(rows)
+        })?;
+        let row = py.import("operator")?.getattr("getitem")?;
+        Ok((row, (Py::new(py, alone)?, 0).into_pyobject(py)?.into_any()))
+    }
 }
 
 /// A contact as a dict.

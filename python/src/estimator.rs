@@ -9,13 +9,14 @@ use std::time::Instant;
 use palpate::estimators::estimator::{self, Choice, TimeLimit, choose};
 use palpate::estimators::fit::{Fit, FitTask, SeedQueue};
 use palpate::estimators::network::{TrainingOutcome, TrainingStatus};
-use palpate::estimators::setup;
+use palpate::estimators::{recording, setup};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::bench::{Recording, Setup};
 use crate::errors::{of_work, refused};
 use crate::locator::Locator;
+use crate::quantities::memory_limit;
 use crate::sections;
 use crate::work;
 
@@ -26,6 +27,22 @@ pub struct Estimator {
     pub inner: estimator::Estimator,
     /// The section that says it, where there is one.
     text: Option<String>,
+}
+
+/// Refuses a fit that is estimated to need more memory than the limit, where there is one.
+///
+/// # Errors
+/// `PalpateError` with the need, the limit, and the estimators that need less.
+pub fn check_memory(
+    limit: Option<&Bound<'_, PyAny>>,
+    estimator: &estimator::Estimator,
+    setup: &setup::Setup,
+    recording: &recording::Recording,
+) -> PyResult<()> {
+    let Some(limit) = limit.map(memory_limit).transpose()? else { return Ok(()) };
+    let cost = estimator.fit_cost(setup, recording);
+    let checked = limit.check_fit(estimator, cost);
+    checked.map_err(|exceeded| refused(format!("{exceeded}: {}", limit.remedy(estimator, setup, recording))))
 }
 
 impl Estimator {
@@ -68,6 +85,8 @@ impl Estimator {
     ///     (stage, done, total).
     /// auto_seconds : float
     ///     Seconds that the choice of `Auto` may take; an estimator that is not done by then is left out.
+    /// memory_limit : str or float, optional
+    ///     The most memory that the fit may need, as in "2 GB", or in bytes: one that is estimated to need more is refused before it begins.
     ///
     /// Returns
     /// -------
@@ -76,8 +95,8 @@ impl Estimator {
     /// Raises
     /// ------
     /// PalpateError
-    ///     When the recording does not suit the setup or the method.
-    #[pyo3(signature = (recording, *, seed=0, progress=None, auto_seconds=300.0))]
+    ///     When the recording does not suit the setup or the method, and for more memory than the limit, with the estimators that need less.
+    #[pyo3(signature = (recording, *, seed=0, progress=None, auto_seconds=300.0, memory_limit=None))]
     fn fit(
         &self,
         py: Python<'_>,
@@ -85,12 +104,14 @@ impl Estimator {
         seed: u64,
         progress: Option<&Bound<'_, PyAny>>,
         auto_seconds: f64,
+        memory_limit: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Locator> {
         if auto_seconds.is_nan() || auto_seconds <= 0.0 {
             return Err(refused(format!("`auto_seconds` is {auto_seconds}; it must be greater than 0")));
         }
         let needed = self.inner.positions_needed();
         recording.inner.check_distinct_positions(needed).map_err(refused)?;
+        check_memory(memory_limit, &self.inner, &self.setup, &recording.inner)?;
         let task = FitTask::new(&self.setup, &recording.inner).seed(seed);
         let choice = match &self.inner {
             estimator::Estimator::Auto => {

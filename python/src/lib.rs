@@ -55,7 +55,7 @@ mod _palpate {
         quantities::parse_quantity,
         rig::Rig,
         study::{PreparedStudy, paper_study, read_study},
-        tracking::{moving_csv, simulate_moving, track},
+        tracking::{Tracker, moving_csv, simulate_moving, track},
         training::Training,
     };
 

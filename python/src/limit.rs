@@ -10,13 +10,14 @@ use palpate::mechanics::limit::{
     limit_warnings, positions_with_spacing,
 };
 use palpate::mechanics::surface::Extent;
+use palpate::mechanics::units::format_count;
 use palpate::numerics::watch::Watch;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::{Value, json};
 
 use crate::errors::{of_work, refused};
-use crate::quantities::{force_n, length_m, share};
+use crate::quantities::{self, force_n, length_m, share};
 use crate::subject::Subject;
 use crate::training::positions;
 use crate::values::{Fields, place};
@@ -24,7 +25,7 @@ use crate::work;
 
 /// Fields of `palpate.Limit`.
 #[pyfunction]
-#[pyo3(signature = (bench, *, force, unknown_force, at, every, false_alarm_rate, progress))]
+#[pyo3(signature = (bench, *, force, unknown_force, at, every, false_alarm_rate, memory_limit, progress))]
 #[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
 pub fn limit<'py>(
     py: Python<'py>,
@@ -34,6 +35,7 @@ pub fn limit<'py>(
     at: Option<Bound<'py, PyAny>>,
     every: Option<Bound<'py, PyAny>>,
     false_alarm_rate: Option<Bound<'py, PyAny>>,
+    memory_limit: Option<&Bound<'py, PyAny>>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let subject = Subject::of(bench, "bench")?;
@@ -71,6 +73,15 @@ pub fn limit<'py>(
         force_n.ok_or_else(|| refused(format!("{}: give `force`, as in \"3 N\"", LimitError::NoForce)))?;
     let force = if unknown_force || setup.force_n().is_none() { Force::Unknown } else { Force::Known };
     let asked = Asked { force_n, force, at, rate };
+    if let (Some(limit), Some(surface)) = (memory_limit, setup.surface().model()) {
+        let listed = asked.at.as_ref().map_or(0, Vec::len);
+        let cost = CramerRaoBound::cost(surface, setup.layout(), listed);
+        let what = format!("the limit of {} sensors", format_count(setup.layout().len() as u64));
+        let checked = quantities::memory_limit(limit)?.check(&what, cost.memory_bytes);
+        checked.map_err(|error| {
+            refused(format!("{error}: raise the limit, or take fewer sensors or `elements`"))
+        })?;
+    }
     let told = work::run_with(py, progress, None, |watch| match &subject {
         Subject::Locator(locator) if let Some(linear) = locator.force_linear() => {
             asked.tell(&linear.cramer_rao_bound(extent), &linear.lightest_touch(), watch)
@@ -97,6 +108,9 @@ fn complaint(error: &LimitError) -> PyErr {
     refused(format!("{error}: {help}"))
 }
 
+/// Positions that are told between two looks for Ctrl-C.
+const TOGETHER: usize = 500;
+
 /// A question for the limit.
 struct Asked {
     force_n: f64,
@@ -121,18 +135,32 @@ impl Asked {
     fn tell(&self, limit: &CramerRaoBound, touch: &LightestTouch, watch: Watch) -> Result<Told, LimitError> {
         limit.prepare(self.at.as_deref().unwrap_or_default(), watch)?;
         let curve = |force| match &self.at {
-            Some(at) => LimitCurve::at_positions(limit, self.force_n, force, at),
+            Some(at) => {
+                let mut curve = LimitCurve::at_positions(limit, self.force_n, force, &[])?;
+                for positions in at.chunks(TOGETHER) {
+                    watch.counted("limit", "positions", curve.points.len(), at.len())?;
+                    curve
+                        .points
+                        .extend(LimitCurve::at_positions(limit, self.force_n, force, positions)?.points);
+                }
+                Ok(curve)
+            }
             None => LimitCurve::over_surface(limit, self.force_n, force),
         };
         let (known, unknown) = (curve(Force::Known)?, curve(Force::Unknown)?);
         let positions: Vec<Position> = known.points.iter().map(|point| point.position).collect();
+        let mut touch_n = Vec::with_capacity(positions.len());
+        for at in positions.chunks(TOGETHER) {
+            watch.counted("lightest touch", "positions", touch_n.len(), positions.len())?;
+            touch_n.extend(at.iter().map(|at| touch.forces_at(*at)));
+        }
         Ok(Told {
             alive: limit.alive(),
             known,
             unknown,
             warnings: limit_warnings(limit, self.force_n, self.force, watch)?,
             rate: touch.rate(),
-            touch_n: positions.iter().map(|at| touch.forces_at(*at)).collect(),
+            touch_n,
             touches: touch.summaries(&positions),
         })
     }

@@ -124,6 +124,9 @@ impl Locator {
     ///     A recording of the same sensors; where nothing is said the surface is simulated, pressed all over.
     /// seed : int
     ///     Seed of the simulation.
+    /// tare : "auto", int or array_like, optional
+    ///     Bring the recording's readings to what calibration learnt, as `tare` does: by untouched readings that are found among them
+    ///     ("auto"), by so many of the first ones, which are not judged then, or by untouched readings of the shape (readings, channels).
     /// progress : bool or callable, optional
     ///     As of `Estimator.fit`.
     ///
@@ -134,22 +137,24 @@ impl Locator {
     /// Raises
     /// ------
     /// PalpateError
-    ///     For a recording with another number of channels, and without one for a surface without a model or an unknown force.
+    ///     For a recording with another number of channels, and without one for a surface without a model or an unknown force; for a tare
+    ///     without a recording, or of more readings than it has.
     ///
     /// Warns
     /// -----
     /// UserWarning
     ///     Where the locator was fitted to this very file: at positions that it has not seen it is worse; `cross_validate` tells how much.
-    #[pyo3(signature = (recording=None, *, seed=0, progress=None))]
+    #[pyo3(signature = (recording=None, *, seed=0, tare=None, progress=None))]
     fn evaluate(
         &self,
         py: Python<'_>,
         recording: Option<&Recording>,
         seed: u64,
+        tare: Option<&Bound<'_, PyAny>>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Evaluation> {
         let extent = self.setup.surface().extent();
-        let simulated;
+        let made;
         let judged = match recording {
             Some(recording) => {
                 let digests = &recording.inner.provenance.digests;
@@ -157,20 +162,30 @@ impl Locator {
                     let message = c"the locator was fitted to this very recording; at positions that it has not seen it is worse: cross_validate tells how much";
                     PyErr::warn(py, &py.get_type::<PyUserWarning>(), message, 1)?;
                 }
-                &recording.inner
+                match tare {
+                    Some(tare) => {
+                        made = tare::tared_recording(&self.inner, &self.channels, &recording.inner, tare)?;
+                        &made
+                    }
+                    None => &recording.inner,
+                }
+            }
+            None if tare.is_some() => {
+                return Err(refused("`tare` needs a recording: simulated readings do not drift"));
             }
             None => {
-                let made = py.detach(|| simulate_at(&self.setup, &all_over(extent), 1, seed));
-                simulated =
-                    made.map_err(|error| refused(format!("{error}; give a recording to judge by")))?;
-                &simulated
+                let simulated = py.detach(|| simulate_at(&self.setup, &all_over(extent), 1, seed));
+                made =
+                    simulated.map_err(|error| refused(format!("{error}; give a recording to judge by")))?;
+                &made
             }
         };
         let evaluation = work::run(py, progress, None, |watch| {
             evaluation::Evaluation::new_watched(&self.inner, judged, watch)
         })?;
         let source = judged.provenance.source.clone();
-        let about = About { kind: self.kind().to_owned(), source, how: "located".to_owned() };
+        let located = if tare.is_some() { "located, tared" } else { "located" };
+        let about = About { kind: self.kind().to_owned(), source, how: located.to_owned() };
         Ok(Evaluation::new(evaluation, self.setup.clone(), about))
     }
 
@@ -213,6 +228,41 @@ impl Locator {
     ) -> PyResult<Bound<'py, PyAny>> {
         let arguments = (slf, times, readings, smooth, frequency, damping, progress);
         slf.py().import("palpate._tracking")?.call_method1("track", arguments)
+    }
+
+    /// Follow moving contacts reading by reading, as they come from sensors: what `track` tells of the same readings all at once.
+    ///
+    /// Parameters
+    /// ----------
+    /// frequency, damping
+    ///     As of `track`.
+    ///
+    /// Returns
+    /// -------
+    /// Tracker
+    ///
+    /// Raises
+    /// ------
+    /// PalpateError
+    ///     For a locator that cannot follow: it must be an influence locator of a surface with a model.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import palpate as pp
+    /// >>> beam = pp.Beam("400 mm", "40 mm", "1.2 mm", "200 GPa")
+    /// >>> setup = pp.Setup(beam, pp.deflection(8, noise="5 um"), force="3 N")
+    /// >>> tracker = pp.Influence().fit(setup.simulate(pp.even(10), repeats=5)).tracker()
+    /// >>> for count in range(3):
+    /// ...     now = tracker.follow(0.01 * count, setup.response([0.1 + 0.001 * count], force="3 N")[0])
+    /// >>> bool(abs(now.x - 0.102) < 1e-3)
+    /// True
+    #[pyo3(signature = (*, frequency=None, damping=None))]
+    fn tracker<'py>(
+        slf: &Bound<'py, Self>,
+        frequency: Option<&Bound<'py, PyAny>>,
+        damping: Option<f64>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        methods::tracker(slf.as_any(), frequency, damping)
     }
 
     /// Tell how force is spread over the surface; see `load_profile`.

@@ -15,3 +15,16 @@ pub fn load_profile<'py>(
     options.set_item("progress", progress)?;
     bench.py().import("palpate._load_profile")?.call_method("load_profile", (bench, readings), Some(&options))
 }
+
+/// A tracker of a locator; see `Locator.tracker`.
+pub fn tracker<'py>(
+    locator: &Bound<'py, PyAny>,
+    frequency: Option<&Bound<'py, PyAny>>,
+    damping: Option<f64>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = locator.py();
+    let keywords = PyDict::new(py);
+    keywords.set_item("frequency", frequency)?;
+    keywords.set_item("damping", damping)?;
+    py.import("palpate._palpate")?.getattr("Tracker")?.call((locator,), Some(&keywords))
+}

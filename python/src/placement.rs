@@ -11,6 +11,7 @@ use palpate::estimators::influence::Influence;
 use palpate::estimators::{estimator, setup};
 use palpate::mechanics::contact::Position;
 use palpate::mechanics::limit::Force;
+use palpate::mechanics::units::format_count;
 use palpate::numerics::watch::Watch;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -19,7 +20,7 @@ use serde_json::Value;
 use crate::bench::Setup;
 use crate::errors::{of_work, refused};
 use crate::estimator::Estimator;
-use crate::quantities::force_n;
+use crate::quantities::{self, force_n};
 use crate::sections;
 use crate::subject::Subject;
 use crate::values::Fields;
@@ -30,7 +31,7 @@ const MOST_COUNT: usize = 200;
 
 /// Fields of `palpate.SensorPlacement`.
 #[pyfunction]
-#[pyo3(signature = (bench, design, *, count, add, counts, method, force, unknown_force, verify, estimator, seed, progress))]
+#[pyo3(signature = (bench, design, *, count, add, counts, method, force, unknown_force, verify, estimator, seed, memory_limit, progress))]
 #[expect(clippy::too_many_arguments, reason = "keywords of the Python function")]
 pub fn place_sensors<'py>(
     py: Python<'py>,
@@ -45,6 +46,7 @@ pub fn place_sensors<'py>(
     verify: usize,
     estimator: Option<&Estimator>,
     seed: u64,
+    memory_limit: Option<&Bound<'py, PyAny>>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let subject = Subject::of(bench, "bench")?;
@@ -81,6 +83,14 @@ pub fn place_sensors<'py>(
         (None, Subject::Rig(rig)) => rig.estimator.clone(),
         (None, _) => estimator::Estimator::Influence(Influence::default()),
     };
+    if let Some(limit) = memory_limit {
+        let cost = SensorProblem::estimated_cost(&setup, &design).map_err(refused)?;
+        let what = format!("the design with {} candidate sensors", format_count(cost.candidates as u64));
+        let checked = quantities::memory_limit(limit)?.check(&what, cost.memory_bytes);
+        checked.map_err(|error| {
+            refused(format!("{error}: raise the limit, or set `sites` or the contacts' `every` wider apart"))
+        })?;
+    }
     let asked = Asked { setup, design, method, counts, verify, estimator, seed };
     let found = work::run_with(py, progress, None, |watch| asked.answer(watch))?;
     found.map_err(|error| of_work(&*error))?.fields(py, &asked)

@@ -1,5 +1,6 @@
 //! Quantities: numbers in SI units, or texts with units.
 
+use palpate::estimators::estimator::MemoryLimit;
 use palpate::mechanics::units::{Dimension, Quantity};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -39,6 +40,27 @@ pub fn force_n(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
 /// A frequency in hertz.
 pub fn frequency_hz(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     si(value, name, Dimension::Frequency)
+}
+
+/// A time in seconds.
+pub fn time_s(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    si(value, name, Dimension::Time)
+}
+
+/// The most memory that work may need: a number of bytes, or a text such as "2 GB".
+pub fn memory_limit(value: &Bound<'_, PyAny>) -> PyResult<MemoryLimit> {
+    let limit = match value.extract::<std::borrow::Cow<'_, str>>() {
+        Ok(text) => text.parse(),
+        Err(_) => {
+            let bytes = value.extract::<f64>().map_err(|_| {
+                PyTypeError::new_err(
+                    "`memory_limit` must be a number of bytes, or a text with a unit, as in \"2 GB\"",
+                )
+            });
+            MemoryLimit::new(bytes?)
+        }
+    };
+    limit.map_err(|error| refused(format!("`memory_limit`: {error}")))
 }
 
 /// A share: 0.05, or "5 %".

@@ -3,6 +3,7 @@
 use numpy::{PyArray1, PyArrayMethods};
 use palpate::estimators::estimator::{Locator, Tare, TareError};
 use palpate::estimators::fit::Locate;
+use palpate::estimators::recording::Recording;
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Readings};
@@ -19,9 +20,7 @@ pub fn tare<'py>(
     untouched: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = readings.py();
-    let mut tare = locator.tare().map_err(|error| {
-        refused(format!("{error}: add rows of force 0 to the recording and fit again, or fit `Influence` to a recording with forces"))
-    })?;
+    let mut tare = of_calibration(locator)?;
     let readings = arrays::readings(readings, channels)?;
     let (values, rows) = match &readings {
         Readings::One(one) => (one.as_slice()?, None),
@@ -36,13 +35,8 @@ pub fn tare<'py>(
             py.detach(|| slots().zip(tared.chunks_exact_mut(channels.len())).try_for_each(apply))
                 .map_err(refused)?;
         }
-        None if locator.false_alarm_rate().is_none() => {
-            return Err(refused(format!(
-                "a locator of kind `{}` does not tell untouched readings from contacts: give `untouched`",
-                locator.kind()
-            )));
-        }
         None => {
+            check_tells_untouched(locator, "give `untouched`")?;
             let follow = |(reading, tared): (&[f64], &mut [f64])| {
                 tare.follow(reading, tared, |tared| locator.method.locate(tared)).map(|_| ())
             };
@@ -55,6 +49,79 @@ pub fn tare<'py>(
         None => array.into_any(),
         Some(rows) => array.reshape([rows, channels.len()])?.into_any(),
     })
+}
+
+/// A recording with its readings tared: by those that are found untouched ("auto"), by so many of the first rows, which are left out, or by
+/// untouched readings.
+///
+/// # Errors
+/// `PalpateError` as of [`tare`], and for fewer rows than are to be the untouched ones.
+pub fn tared_recording(
+    locator: &Locator,
+    channels: &[String],
+    recording: &Recording,
+    tare: &Bound<'_, PyAny>,
+) -> PyResult<Recording> {
+    let mut taring = of_calibration(locator)?;
+    let mut tared = recording.clone();
+    let text = tare.extract::<std::borrow::Cow<'_, str>>().ok();
+    let first = match (text.as_deref(), tare.extract::<usize>()) {
+        (Some("auto"), _) => {
+            check_tells_untouched(
+                locator,
+                "give the number of the first untouched readings, or such readings",
+            )?;
+            for (row, tared) in recording.rows.iter().zip(&mut tared.rows) {
+                let followed =
+                    taring.follow(&row.reading, &mut tared.reading, |tared| locator.method.locate(tared));
+                followed.map_err(refused)?;
+            }
+            return Ok(tared);
+        }
+        (Some(other), _) => {
+            return Err(refused(format!(
+                "`tare` is \"{other}\"; it must be \"auto\", a number of readings, or untouched readings"
+            )));
+        }
+        (None, Ok(0)) => return Err(refused("`tare` is 0; it must be at least 1 reading")),
+        (None, Ok(first)) if first >= recording.rows.len() => {
+            let rows = recording.rows.len();
+            return Err(refused(format!(
+                "`tare` is {first}; the recording has {rows} rows, of which the first {first} are to be the untouched ones: give fewer"
+            )));
+        }
+        (None, Ok(first)) => {
+            let mut untouched = recording.rows[..first].iter();
+            untouched.try_for_each(|row| taring.add_untouched(&row.reading)).map_err(refused)?;
+            first
+        }
+        (None, Err(_)) => {
+            add_untouched(&mut taring, tare, channels)?;
+            0
+        }
+    };
+    for (row, tared) in recording.rows.iter().zip(&mut tared.rows) {
+        taring.apply(&row.reading, &mut tared.reading).map_err(refused)?;
+    }
+    Ok(tared.subset(&(first..recording.rows.len()).collect::<Vec<_>>()))
+}
+
+/// The tare by what calibration learnt that the channels read untouched.
+fn of_calibration(locator: &Locator) -> PyResult<Tare<Vec<f64>>> {
+    locator.tare().map_err(|error| {
+        refused(format!("{error}: add rows of force 0 to the recording and fit again, or fit `Influence` to a recording with forces"))
+    })
+}
+
+/// Refuses a locator that does not tell untouched readings from contacts.
+fn check_tells_untouched(locator: &Locator, remedy: &str) -> PyResult<()> {
+    match locator.false_alarm_rate() {
+        Some(_) => Ok(()),
+        None => Err(refused(format!(
+            "a locator of kind `{}` does not tell untouched readings from contacts: {remedy}",
+            locator.kind()
+        ))),
+    }
 }
 
 /// The mean of untouched readings is the baseline.

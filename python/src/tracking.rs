@@ -2,26 +2,26 @@
 
 use std::sync::Arc;
 
-use palpate::estimators::estimator::{self, SmoothTracker, Swing, Track, Tracked, Tracker, TrackerConfig};
+use palpate::estimators::estimator::{self, SmoothTracker, Swing, Track, Tracked, TrackerConfig};
 use palpate::estimators::recording::{self, TimedRecording};
 use palpate::estimators::setup;
 use palpate::estimators::simulate::{MovingContacts, simulate_moving as simulate};
 use palpate::estimators::track_errors::TrackErrors;
 use palpate::mechanics::contact::{Contact, Position};
-use palpate::mechanics::surface::SurfaceSpec;
 use palpate::mechanics::surface::modal::ModalBeam;
+use palpate::mechanics::surface::{Extent, SurfaceSpec};
 use palpate::numerics::watch::{Cancelled, Watch};
 use palpate::rig::RigSections;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict};
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use serde_json::json;
 
 use crate::arrays::{self, Readings};
 use crate::bench::{Recording, Setup};
 use crate::errors::{of_rig, of_work, refused};
-use crate::estimates::Estimates;
+use crate::estimates::{Estimate, Estimates};
 use crate::locator::Locator;
-use crate::quantities::{force_n, frequency_hz};
+use crate::quantities::{force_n, frequency_hz, time_s};
 use crate::rig::Rig;
 use crate::values::Fields;
 use crate::work;
@@ -172,15 +172,7 @@ pub fn track<'py>(
     if let Some(at) = times_s.iter().position(|time_s| !time_s.is_finite()) {
         return Err(refused(format!("times[{at}] is {}; it must be finite", times_s[at])));
     }
-    let swing = match frequency {
-        Some(frequency) => Some(Swing {
-            frequency_hz: frequency_hz(&frequency, "frequency")?,
-            damping_ratio: damping.unwrap_or(ModalBeam::USUAL_DAMPING_RATIO),
-        }),
-        None => None,
-    };
-    check_swing(swing)?;
-    let config = TrackerConfig { swing, ..TrackerConfig::default() };
+    let config = tracker_config(frequency, damping)?;
     let tracking = inner.tracking(&config).map_err(refused)?;
     let tracks = work::run_with(py, progress, None, |watch| {
         let likelihood = tracking.likelihood();
@@ -190,7 +182,7 @@ pub fn track<'py>(
             follow(&times_s, readings, watch, take)?;
             tracker.smoothed(watch).map_err(Stopped::Cancelled)
         } else {
-            let mut tracker = Tracker::new(likelihood, config);
+            let mut tracker = estimator::Tracker::new(likelihood, config);
             follow(&times_s, readings, watch, |time_s, reading| tracker.follow(time_s, reading).map(Some))
         }
     })?;
@@ -221,15 +213,136 @@ pub fn track<'py>(
     Ok(fields.into_dict())
 }
 
-fn check_swing(swing: Option<Swing>) -> PyResult<()> {
-    let Some(Swing { frequency_hz, damping_ratio }) = swing else { return Ok(()) };
+/// Configuration of a tracker, of a surface in balance where no frequency is given.
+fn tracker_config(frequency: Option<Bound<'_, PyAny>>, damping: Option<f64>) -> PyResult<TrackerConfig> {
+    let Some(frequency) = frequency else {
+        return match damping {
+            Some(_) => Err(refused("`damping` does not go without a `frequency`")),
+            None => Ok(TrackerConfig::default()),
+        };
+    };
+    let frequency_hz = frequency_hz(&frequency, "frequency")?;
+    let damping_ratio = damping.unwrap_or(ModalBeam::USUAL_DAMPING_RATIO);
     if frequency_hz <= 0.0 {
         return Err(refused(format!("`frequency` is {frequency_hz} Hz; it must be greater than 0")));
     }
     if !(0.0..1.0).contains(&damping_ratio) {
         return Err(refused(format!("`damping` is {damping_ratio}; it must be at least 0 and below 1")));
     }
-    Ok(())
+    let swing = Some(Swing { frequency_hz, damping_ratio });
+    Ok(TrackerConfig { swing, ..TrackerConfig::default() })
+}
+
+/// Follows moving contacts reading by reading; `Locator.tracker` makes it.
+#[pyclass(module = "palpate")]
+pub struct Tracker {
+    inner: estimator::Tracker,
+    channels: Vec<String>,
+    extent: Extent,
+    /// Time of the last reading, in seconds.
+    time_s: Option<f64>,
+}
+
+#[pymethods]
+impl Tracker {
+    /// A tracker that has seen nothing; see `Locator.tracker`.
+    #[new]
+    #[pyo3(signature = (locator, *, frequency=None, damping=None))]
+    fn new(locator: &Locator, frequency: Option<Bound<'_, PyAny>>, damping: Option<f64>) -> PyResult<Self> {
+        let config = tracker_config(frequency, damping)?;
+        let tracking = locator.inner.tracking(&config).map_err(refused)?;
+        Ok(Self {
+            inner: estimator::Tracker::new(tracking.likelihood(), config),
+            channels: locator.inner.layout().names(),
+            extent: locator.inner.setup.surface().extent(),
+            time_s: None,
+        })
+    }
+
+    /// Take the next reading.
+    ///
+    /// Parameters
+    /// ----------
+    /// time : float or str
+    ///     Its time in seconds or with a unit, later than that of the one before.
+    /// reading : array_like
+    ///     In SI units: of the shape (channels).
+    ///
+    /// Returns
+    /// -------
+    /// TrackState
+    ///     State of all contacts, by this reading and those before.
+    ///
+    /// Raises
+    /// ------
+    /// PalpateError
+    ///     For a time that is not later, another shape, and a value that is not finite; the reading is then as if it had not been.
+    fn follow<'py>(
+        &mut self,
+        time: &Bound<'py, PyAny>,
+        reading: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = time.py();
+        let time_s = time_s(time, "time")?;
+        let Readings::One(reading) = arrays::readings(reading, &self.channels)? else {
+            let needed = self.channels.len();
+            return Err(refused(format!(
+                "readings of two dimensions; one reading has the shape ({needed},), and `Locator.track` takes many"
+            )));
+        };
+        let reading = reading.as_slice()?;
+        estimator::ReadingError::check(reading, self.channels.len()).map_err(refused)?;
+        let track = self.inner.follow(time_s, reading).map_err(refused)?;
+        self.time_s = Some(time_s);
+        let module = py.import("palpate._tracking")?;
+        let of_contact = module.getattr("ContactState")?;
+        let contacts = track.contacts.iter().map(|contact| {
+            let fields = contact_state(py, contact)?;
+            of_contact.call((), Some(&fields))
+        });
+        let fields = Fields::new(py);
+        fields.set("time", time_s)?;
+        fields.set("touching", track.touching())?;
+        fields.set("two_touching", track.numbers[2])?;
+        fields.set("contacts", PyTuple::new(py, contacts.collect::<PyResult<Vec<_>>>()?)?)?;
+        fields.set("single", Estimate::new(track.single, self.extent))?;
+        module.getattr("TrackState")?.call((), Some(&fields.into_dict()))
+    }
+
+    fn __repr__(&self) -> String {
+        let last = self.time_s.map_or_else(|| "no reading yet".to_owned(), |time_s| format!("at {time_s} s"));
+        format!("<Tracker: {} channels, {last}>", self.channels.len())
+    }
+}
+
+/// Fields of `palpate.ContactState`.
+fn contact_state<'py>(py: Python<'py>, contact: &Tracked) -> PyResult<Bound<'py, PyDict>> {
+    let fields = Fields::new(py);
+    let [x_sd, speed_sd, force_sd] = contact.sd;
+    for (name, value) in [
+        ("x", contact.x_m),
+        ("speed", contact.speed_m_per_s),
+        ("force", contact.force_n),
+        ("x_sd", x_sd),
+        ("speed_sd", speed_sd),
+        ("force_sd", force_sd),
+    ] {
+        fields.set(name, value)?;
+    }
+    fields.set("x_95", contact.x_95_m)?;
+    if let Some(across) = contact.across {
+        for (name, value) in [
+            ("y", across.y_m),
+            ("speed_y", across.speed_m_per_s),
+            ("y_sd", across.sd[0]),
+            ("speed_y_sd", across.sd[1]),
+            ("covariance_xy", across.covariance_m2),
+        ] {
+            fields.set(name, value)?;
+        }
+        fields.set("y_95", across.y_95_m)?;
+    }
+    Ok(fields.into_dict())
 }
 
 /// True contacts of the rows whose force is known.

@@ -78,6 +78,29 @@ def test_recordings_that_cannot_be(beam):
     refused(lambda: pp.even(3, repeats=0), "`repeats` is 0")
 
 
+def test_frames_and_columns_that_cannot_be(beam, presses, locator):
+    frame = presses.to_frame()
+    texts, gaps = frame.astype({"deflection_3 [m]": object}), frame.copy()
+    texts.loc[1, "deflection_3 [m]"] = "x"
+    gaps.loc[2, "deflection_1 [m]"] = np.nan
+    words = "`readings` holds objects (dtype object), such as 'x' at (1, 2)"
+    for taken in (beam.read_frame, locator.locate):
+        refused(lambda: taken(texts), words)
+    refused(lambda: beam.read_frame(gaps), "row 2: channel 1 reads NaN")
+    refused(lambda: locator.locate(gaps), "readings[2]: channel 1 reads NaN")
+    refused(lambda: beam.read_frame(frame[:0]), "0 rows; a recording has at least 1")
+    refused(lambda: locator.locate(frame[list(frame)[2:8]]), "the frame has no column deflection_7, deflection_8")
+    zeros = np.zeros((2, 8))
+    masked = np.ma.masked_array([0.1, 0.2], mask=[False, True])
+    refused(lambda: beam.recording(np.ma.masked_array(zeros, mask=np.eye(2, 8)), [0.1, 0.2]), "`readings` is masked at (0, 0)")
+    refused(lambda: beam.recording(zeros, masked), "`x` is masked at (1,)")
+    refused(lambda: beam.recording(zeros, np.array([0.1, None])), "`x` holds objects (dtype object), such as None at (1,)")
+    refused(lambda: beam.recording(zeros, [0.1, np.nan]), "row 1: position 1 is at NaN mm")
+    refused(lambda: beam.recording(zeros, [0.1, 0.2], force="3 M"), "`force`: unknown unit `M`; a force is one of uN, mN, N, kN")
+    refused(lambda: locator.tare(presses.readings, untouched=np.zeros((0, 8))), "`untouched` has 0 readings")
+    refused(lambda: pp.limit(beam, force="3 kg"), "`force`: unknown unit `kg`")
+
+
 def test_files_that_cannot_be_read(tmp_path, beam, locator):
     refused(lambda: pp.Locator.load(tmp_path / "none.json"), "No such file", FileNotFoundError)
     refused(lambda: beam.read_csv(tmp_path / "none.csv"), "none.csv", FileNotFoundError)

@@ -138,6 +138,61 @@ def test_an_evaluation_is_kept_and_shown(beam, tmp_path):
     assert near(evaluation.coverage, np.nanmean(evaluation.covered))
 
 
+@pytest.mark.parametrize("tare", ["auto", 20, "file"])
+def test_a_tared_recording_is_judged_as_the_command_judges(command, beam, tmp_path, tare):
+    setup = beam.with_force("3 N")
+    locator = pp.Influence().fit(setup.simulate(pp.even(10), repeats=5))
+    locator.save(tmp_path / "locator.json")
+    pressed, untouched = setup.simulate(pp.even(9), repeats=3, seed=1), 5e-6 * np.random.default_rng(0).normal(size=(20, 8))
+    # Offsets of today, which calibration has not learnt.
+    readings = np.vstack([untouched, pressed.readings]) + 40e-6
+    x, force = np.r_[np.zeros(20), pressed.x], np.r_[np.zeros(20), pressed.force]
+    recording = setup.recording(readings, x, force=force)
+    recording.to_csv(tmp_path / "today.csv")
+    recording[:20].to_csv(tmp_path / "file")
+    asked = tmp_path / "file" if tare == "file" else tare
+    told = json.loads(command("evaluate", tmp_path / "locator.json", "--json", "--data", tmp_path / "today.csv", "--tare", asked))
+    evaluation = locator.evaluate(recording, tare=readings[:20] if tare == "file" else tare)
+    assert_same_errors(evaluation, told)
+    assert evaluation.how == "located, tared" and len(evaluation) == 27
+    assert evaluation.summary()["mean"] < 0.5 * locator.evaluate(recording).summary()["mean"]
+
+
+def test_a_tare_that_cannot_be_is_refused_in_words(presses, locator):
+    for tare, words in [
+        ("off", '`tare` is "off"; it must be "auto"'),
+        (0, "`tare` is 0"),
+        (100, "`tare` is 100; the recording has 100 rows"),
+        (np.zeros((3, 7)), r"readings of the shape \(3, 7\) have 7 channels"),
+    ]:
+        with pytest.raises(pp.PalpateError, match=words):
+            locator.evaluate(presses, tare=tare)
+    with pytest.raises(pp.PalpateError, match="`tare` needs a recording"):
+        locator.evaluate(tare="auto")
+
+
+def test_work_that_needs_more_memory_than_it_may_is_refused_with_the_bound(presses, plate):
+    words = "needs about .* of memory; the limit is 1 kB: raise the limit"
+    for work in [
+        lambda limit: pp.Influence().fit(presses, memory_limit=limit),
+        lambda limit: pp.cross_validate(pp.Influence(), presses, memory_limit=limit),
+        lambda limit: pp.compare(presses, only="influence", memory_limit=limit),
+        lambda limit: pp.limit(plate, memory_limit=limit),
+        lambda limit: pp.place_sensors(plate, memory_limit=limit),
+    ]:
+        for limit in ("1 kB", 1000):
+            with pytest.raises(pp.PalpateError, match=words):
+                work(limit)
+        for limit in ("1 apple", "0 GB", -1.0, float("nan")):
+            with pytest.raises(pp.PalpateError, match="`memory_limit`: "):
+                work(limit)
+        with pytest.raises(TypeError, match="`memory_limit` must be a number of bytes"):
+            work([1])
+    limited = pp.compare(presses, only=["influence", "closed-form"], memory_limit="50 kB")
+    assert limited.names == ["closed-form"] and "the limit is 50 kB" in limited.left_out["influence"]
+    assert pp.Influence().fit(presses, memory_limit="1 GB") == pp.Influence().fit(presses)
+
+
 def test_what_cannot_be_judged_is_refused_in_words(presses, locator, beam, tmp_path):
     evaluation = locator.evaluate(presses)
     with pytest.raises(pp.PalpateError, match="0–1 mm has no contact in simulation; name a portion that was pressed"):

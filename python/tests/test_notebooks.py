@@ -37,7 +37,7 @@ def run(path: Path, folder: Path, **environment: str) -> nbformat.NotebookNode:
     package = str(Path(pp.__file__).parents[1])
     environment |= {"PYTHONPATH": package, "MPLBACKEND": "module://matplotlib_inline.backend_inline", "TQDM_DISABLE": "1"}
     os.environ.update(environment)
-    NotebookClient(notebook, timeout=240, kernel_name="python3", resources={"metadata": {"path": str(folder)}}).execute()
+    NotebookClient(notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(folder)}}).execute()
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
     notebook.metadata = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}

@@ -46,6 +46,8 @@ def test_estimates_survive_pickling(beam):
     assert estimates.modes, "one sensor leaves two places for a contact"
     assert again.modes == estimates.modes and np.array_equal(again.to_numpy()["x_95"], estimates.to_numpy()["x_95"])
     assert all(again[i] == estimates[i] for i in range(len(estimates)))
+    one = pickle.loads(pickle.dumps(estimates[0]))
+    assert one == estimates[0] and one.modes == estimates[0].modes and one.x_95 == estimates[0].x_95
 
 
 def test_errors_survive_pickling():
@@ -62,6 +64,8 @@ def test_words_of_objects(beam, presses, locator):
     assert repr(locator.locate(presses.readings)).startswith("<Estimates: 100 readings; ")
     for value in (beam, presses, locator, locator.locate(presses.readings)):
         assert value._repr_html_().startswith("<div>")
+    assert "<th>deflection_1 [mm]</th>" in presses._repr_html_()
+    assert f"<td>{1e3 * presses.readings[0, 0]:.5g}</td>" in presses._repr_html_()
 
 
 def test_docstrings_run():

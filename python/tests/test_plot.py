@@ -250,6 +250,13 @@ def test_numbers_are_in_the_units_of_the_labels(bench):
     assert np.array_equal(ax.get_lines()[0].get_ydata(), 1e3 * bench.limits["line"].known_force)
 
 
+def test_the_limit_beside_median_errors_is_a_median(bench):
+    limit = bench.limits["line"]
+    line = next(line for line in plot.errors_along(bench.compared, limit=limit).get_lines() if line.get_label() == "limit")
+    errors = np.abs(np.random.default_rng(0).normal(size=100_000))
+    assert line.get_ydata() == pytest.approx(1e3 * limit.sd * np.median(errors), rel=0.02)
+
+
 def test_a_map_has_its_values_where_they_are(bench):
     limit = bench.limits["plane"]
     mesh = plot.limit(limit, setup=bench.plane).collections[0]

@@ -128,13 +128,20 @@ def test_uncertainty_is_in_the_unit_of_the_targets(board):
 
 def test_planes_have_two_targets(plate):
     presses = plate.simulate(pp.grid(5, 4), repeats=2, seed=3)
-    y = np.column_stack([presses.x, presses.y])
+    y = presses.positions
+    assert np.array_equal(y, np.column_stack([presses.x, presses.y]))
     found = InfluenceRegressor(setup=plate, source="mechanics").fit(presses.readings, y).predict(presses.readings)
     assert found.shape == y.shape and np.hypot(*(found - y).T).mean() < 5e-3
     with pytest.raises(ValueError, match=r"y has the shape \(40, 3\)"):
         GaussianProcessRegressor().fit(presses.readings, np.column_stack([y, y[:, 0]]))
     with pytest.raises(ValueError, match="a beam is a line"):
         ClosedFormRegressor().fit(presses.readings, y)
+
+
+def test_positions_of_a_recording_are_targets(presses, beam):
+    assert presses.y is None and np.array_equal(presses.positions, presses.x)
+    regressor = InfluenceRegressor(setup=beam).fit(presses.readings, presses.positions, force=presses.force)
+    assert regressor.predict(presses.readings).shape == presses.positions.shape
 
 
 def test_forces_and_data_frames(board):

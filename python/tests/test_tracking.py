@@ -111,6 +111,69 @@ def test_a_contact_on_a_plate_is_followed_as_the_command_follows_it(command, pla
     assert np.nanmean(np.hypot(track.x - moving.x, track.y - moving.y)) < 5e-3
 
 
+def assert_same_states(track, states, across=()):
+    """Readings taken one by one are followed as all of them at once."""
+    nothing = {"x_95": (np.nan, np.nan), "y_95": (np.nan, np.nan)}
+    assert close([state.time for state in states], track.time) and close([state.touching for state in states], track.touching)
+    assert close([state.two_touching for state in states], track.two_touching)
+    for at, contact in enumerate([track.first, track.second]):
+        if contact is None:
+            continue
+        each = [state.contacts[at] if len(state.contacts) > at else None for state in states]
+        for name in ("x", "speed", "force", "x_sd", "speed_sd", "force_sd", "x_95", *across):
+            ours = [nothing.get(name, np.nan) if one is None else getattr(one, name) for one in each]
+            assert np.allclose(ours, getattr(contact, name), rtol=1e-9, atol=1e-15, equal_nan=True), name
+    assert [state.single for state in states] == list(track.single)
+
+
+def test_readings_are_followed_one_by_one_as_all_at_once(beam_rig, examples, plate):
+    rig = pp.Rig(beam_rig)
+    moving = pp.simulate_moving(rig, seed=3)
+    swinging = rig.estimator.fit(rig.simulate(seed=1))
+    tracker = swinging.tracker(frequency="17.17 Hz", damping=0.02)
+    states = [tracker.follow(time, reading) for time, reading in zip(moving.time, moving.readings)]
+    assert_same_states(swinging.track(moving, frequency="17.17 Hz", damping=0.02), states)
+    for count in range(1, 100):
+        lifted = tracker.follow(moving.time[-1] + 0.005 * count, np.zeros(8))
+    assert lifted.x is None and lifted.x_95 is None and lifted.touching < 0.5 and repr(lifted).endswith("nothing touches>")
+
+    two = pp.Rig((examples / "two-moving-loads.toml").read_text().replace('rate = "1 kHz"', 'rate = "50 Hz"'))
+    moving, locator = pp.simulate_moving(two, seed=2), two.estimator.fit(two.simulate(seed=1))
+    tracker = locator.tracker()
+    states = [tracker.follow(f"{time!r} s", reading) for time, reading in zip(moving.time.tolist(), moving.readings.tolist())]
+    assert_same_states(locator.track(moving), states)
+    assert any(len(state.contacts) == 2 for state in states)
+
+    locator = pp.Influence().fit(plate.simulate(pp.grid(5, 4), repeats=20))
+    moving = pp.simulate_moving(plate, pp.Motion(["50 mm", "60 mm"], [0.25, 0.15], speed="0.3 m/s"), rate=50, seed=1)
+    tracker = locator.tracker()
+    states = [tracker.follow(time, reading) for time, reading in zip(moving.time, moving.readings)]
+    assert_same_states(locator.track(moving), states, ("y", "speed_y", "y_sd", "speed_y_sd", "covariance_xy", "y_95"))
+    assert pickle.loads(pickle.dumps(states[-1])) == states[-1]
+    assert "y = " in repr(states[-1]) and repr(tracker).endswith(f"at {moving.time[-1]} s>")
+
+
+def test_a_reading_that_is_refused_is_as_if_it_had_not_been(locator, presses):
+    reading = presses.readings[20]
+    one, other = locator.tracker(), locator.tracker()
+    assert one.follow(0.0, reading) == other.follow(0.0, reading)
+    for time, wrong, words in [
+        (0.0, reading, "the reading is of 0 s; it must be later than the one before, of 0 s"),
+        (np.nan, reading, "`time` is NaN; it must be finite"),
+        ("1 N", reading, "`time`: "),
+        (1.0, reading[:7], r"readings of the shape \(7,\) have 7 channels"),
+        (1.0, presses.readings, r"one reading has the shape \(8,\)"),
+        (1.0, np.where(np.arange(8) == 2, np.nan, reading), "channel 3 reads NaN"),
+    ]:
+        with pytest.raises(pp.PalpateError, match=words):
+            one.follow(time, wrong)
+    assert one.follow(1.0, reading) == other.follow(1.0, reading)
+    with pytest.raises(pp.PalpateError, match="an influence locator of a surface with a model"):
+        pp.Neighbours().fit(presses).tracker()
+    with pytest.raises(pp.PalpateError, match="`damping` does not go without a `frequency`"):
+        locator.tracker(damping=0.1)
+
+
 def test_tracks_are_kept_and_shown(beam_rig, tmp_path):
     rig = pp.Rig(beam_rig)
     moving = pp.simulate_moving(rig)

@@ -131,29 +131,6 @@ pub fn length(text: &str) -> Result<f64, String> {
     greater_than_0(text, Quantity::parse_as(text, Dimension::Length), |length_m| *length_m)
 }
 
-/// A size of memory in bytes, from a command line argument: "2 GB", "500 MB", "1.5 GiB".
-pub fn memory(text: &str) -> Result<f64, String> {
-    const UNITS: [(&str, f64); 7] = [
-        ("GiB", 1073741824.0),
-        ("MiB", 1048576.0),
-        ("KiB", 1024.0),
-        ("GB", 1e9),
-        ("MB", 1e6),
-        ("kB", 1e3),
-        ("B", 1.0),
-    ];
-    let wrong = || format!("`{text}` is no size of memory; it is written as in \"2 GB\" or \"500 MB\"");
-    let (number, unit) = UNITS
-        .iter()
-        .find_map(|(unit, bytes)| Some((text.trim().strip_suffix(unit)?, bytes)))
-        .ok_or_else(wrong)?;
-    let bytes = number.trim().parse::<f64>().map_err(|_| wrong())? * unit;
-    if bytes.is_finite() && bytes > 0.0 {
-        return Ok(bytes);
-    }
-    Err(format!("{text} of memory; it must be greater than 0"))
-}
-
 /// A force in newtons, from a command line argument.
 pub fn force(text: &str) -> Result<f64, String> {
     greater_than_0(text, Quantity::parse_as(text, Dimension::Force), |force_n| *force_n)

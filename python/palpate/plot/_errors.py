@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import erf, sqrt
+from statistics import NormalDist
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,6 +24,7 @@ from ._checks import check_surface, check_type, named
 _MOST_MARKERS = 80
 _STRETCHES = 40
 _MEAN_OF_NORMAL = float(np.sqrt(2 / np.pi))
+_MEDIAN_OF_NORMAL = NormalDist().inv_cdf(0.75)
 
 
 def errors(
@@ -80,7 +82,7 @@ def errors(
         draw(x, 1e3 * by_position.max, 1, "largest", **options)
         drawn.append(by_position.max)
     if limit is not None:
-        drawn.append(_limit_line(canvas, limit))
+        drawn.append(_limit_line(canvas, limit, _MEAN_OF_NORMAL))
     if tolerance is not None:
         canvas.level(1e3 * length_m(tolerance, "tolerance"), "tolerance")
     canvas.scale_by(1e3 * np.concatenate(drawn))
@@ -261,7 +263,7 @@ def errors_along(
     evaluations : Comparison, Evaluation or mapping of str to Evaluation
         Errors of several estimators on one line.
     limit : Limit, optional
-        The limit of the bench, drawn as the mean error of an estimator at the limit.
+        The limit of the bench, drawn as the median error of an estimator at the limit.
     ax : matplotlib.axes.Axes, optional
         Where to draw; new axes where nothing is said.
 
@@ -290,7 +292,7 @@ def errors_along(
         canvas.line(1e3 * x, 1e3 * median, index, name or None, marker="." if x.size < _STRETCHES / 2 else None)
         drawn.append(median)
     if limit is not None:
-        drawn.append(_limit_line(canvas, limit))
+        drawn.append(_limit_line(canvas, limit, _MEDIAN_OF_NORMAL))
     canvas.scale_by(1e3 * np.concatenate(drawn))
     canvas.along(length)
     canvas.labels("contact position, mm", "median error, mm")
@@ -352,7 +354,7 @@ def _region_probabilities(estimates: Estimates, truth: Recording) -> Floats:
     if estimates.y is None:
         known = touched & (xx > 0)
         return np.sort([_share_of_normal(off) for off in np.abs(off_x[known]) / np.sqrt(xx[known])])
-    off_y, determinant = truth.y - estimates.y, xx * yy - xy**2
+    off_y, determinant = truth.positions[:, 1] - estimates.y, xx * yy - xy**2
     known = touched & (determinant > 0)
     square = (yy * off_x**2 - 2 * xy * off_x * off_y + xx * off_y**2)[known] / determinant[known]
     probabilities: Floats = np.sort(1 - np.exp(-square / 2))
@@ -387,12 +389,12 @@ def _width(evaluation: Evaluation, setup: Setup | None) -> float:
     return float(y.min() + y.max())
 
 
-def _limit_line(canvas: Canvas, limit: Limit) -> Floats:
-    """The mean error of an estimator at the limit, along a line; and its values."""
+def _limit_line(canvas: Canvas, limit: Limit, of_normal: float) -> Floats:
+    """The error of an estimator at the limit, along a line; and its values. `of_normal` is that of a normal distribution of deviation 1."""
     check_type(limit, Limit)
     if limit.y is not None:
         raise PalpateError("limit and evaluation are of different surfaces: one is a line, the other a plane")
-    at_limit: Floats = _MEAN_OF_NORMAL * limit.sd
+    at_limit: Floats = of_normal * limit.sd
     canvas.reference(1e3 * limit.x, 1e3 * at_limit, "limit")
     return at_limit
 

@@ -80,7 +80,7 @@ def _over(canvas: Canvas, estimates: Estimates, truth: Recording | None) -> Axes
     xx, xy, _, yy, _, _ = 1e6 * estimates.covariance.T
     _ellipses(canvas, x, y, xx, xy, yy)
     if truth is not None:
-        _truth(canvas, 1e3 * truth.x[truth.touches], 1e3 * truth.y[truth.touches])
+        _truth(canvas, *(1e3 * truth.positions[truth.touches].T))
     _by_status(canvas, x, y, estimates)
     canvas.legend()
     return canvas.ax

@@ -55,17 +55,16 @@ def recording(recording: Recording, *, channels: Channels = None, ax: Axes | Non
     readings = recording.readings[touches][:, chosen]
     factor, symbol = unit_of(setup.measures[chosen[0]], readings)
     label = labelled(_noun(setup, chosen), symbol)
-    x, y = recording.x[touches], recording.y[touches]
     if setup.width is not None:
         canvas = Canvas.of_plane(ax, setup.length, setup.width, bar=True)
-        places, row = np.unique(np.column_stack([x, y]), axis=0, return_inverse=True)
+        places, row = np.unique(recording.positions[touches], axis=0, return_inverse=True)
         means = np.bincount(row.ravel(), readings[:, 0] / factor) / np.bincount(row.ravel())
         canvas.heat_map(places[:, 0], places[:, 1], means, setup.length, setup.width, label)
         sensor_dots(canvas, setup)
         return canvas.ax
     canvas = Canvas(ax)
     for index, (name, values) in enumerate(zip(_short_names(setup, chosen), readings.T)):
-        canvas.markers(1e3 * x, values / factor, index, name, "osD^v"[index // 6 % 5])
+        canvas.markers(1e3 * recording.x[touches], values / factor, index, name, "osD^v"[index // 6 % 5])
     canvas.along(setup.length)
     canvas.labels("contact position, mm", label)
     canvas.legend()

@@ -172,7 +172,8 @@ def _way(ax: Axes | None, track: Track, truth: MovingRecording | None, setup: Se
     canvas.line(x, y, 0, "track")
     if truth is not None:
         touching = truth.force > 0
-        canvas.reference(np.where(touching, 1e3 * truth.x, np.nan), np.where(touching, 1e3 * truth.y, np.nan), "true")
+        true_x, true_y = 1e3 * truth.recording.positions.T
+        canvas.reference(np.where(touching, true_x, np.nan), np.where(touching, true_y, np.nan), "true")
     canvas.legend()
     return canvas.ax
 
@@ -203,7 +204,7 @@ def _coordinates(track: Track, truth: MovingRecording | None) -> list[tuple[str,
     if track.y is not None and track.first.y_95 is not None:
         true_x, true_y = track.x, track.y
         if truth is not None:
-            true_x, true_y = (np.where(truth.force > 0, side, np.nan) for side in (truth.x, truth.y))
+            true_x, true_y = (np.where(truth.force > 0, side, np.nan) for side in truth.recording.positions.T)
         return [(" in x", track.x, track.x_95, true_x), (" in y", track.y, track.first.y_95, true_y)]
     contacts, truths = _contacts(track), _truths(truth)
     if not truths:

@@ -1,7 +1,7 @@
 //! `palpate compare`: every estimator on the same trials, against the limit.
 
 use super::evaluate::ErrorFigures;
-use crate::cost::MemoryLimit;
+use crate::cost::MemoryOption;
 use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::json::object;
@@ -49,7 +49,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    memory: MemoryLimit,
+    memory: MemoryOption,
     /// Print the comparison as JSON
     #[arg(long)]
     json: bool,

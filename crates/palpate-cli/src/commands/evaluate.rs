@@ -1,6 +1,6 @@
 //! `palpate evaluate`: how far a locator is off, or how far a rig's estimator would be.
 
-use crate::cost::MemoryLimit;
+use crate::cost::MemoryOption;
 use crate::failure::{Complaint, Failure};
 use crate::input::{RecordingFiles, RigOrLocator};
 use crate::json::object;
@@ -49,7 +49,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    memory: MemoryLimit,
+    memory: MemoryOption,
     /// Print the errors as JSON
     #[arg(long)]
     json: bool,

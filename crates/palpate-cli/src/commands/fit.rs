@@ -1,7 +1,7 @@
 //! `palpate fit`: calibrate an estimator.
 
 use super::learnt;
-use crate::cost::MemoryLimit;
+use crate::cost::MemoryOption;
 use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::json::object;
@@ -37,7 +37,7 @@ pub struct Arguments {
     #[arg(long, value_name = "SECONDS", default_value_t = 300)]
     auto_seconds: u32,
     #[command(flatten)]
-    memory: MemoryLimit,
+    memory: MemoryOption,
     /// Print the outcome as JSON
     #[arg(long)]
     json: bool,

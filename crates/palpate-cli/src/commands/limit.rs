@@ -1,6 +1,6 @@
 //! `palpate limit`: what physics allows on a bench, position by position, and the lightest touch that is told from noise.
 
-use crate::cost::MemoryLimit;
+use crate::cost::MemoryOption;
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RigOrLocator};
 use crate::json::object;
@@ -50,7 +50,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    memory: MemoryLimit,
+    memory: MemoryOption,
     /// Print the limit as JSON
     #[arg(long)]
     json: bool,

@@ -129,15 +129,15 @@ impl Arguments {
 }
 
 /// Filter, or filter with the smoother behind it, that takes the readings.
-enum Follower<'a> {
-    Filter(Tracker<'a>),
-    Smoother(SmoothTracker<'a>),
+enum Follower {
+    Filter(Tracker),
+    Smoother(SmoothTracker),
 }
 
 struct Stream<'a> {
     arguments: &'a Arguments,
     taring: Option<Taring<'a>>,
-    follower: Follower<'a>,
+    follower: Follower,
     extent: Extent,
     /// Columns of the CSV.
     columns: Columns,

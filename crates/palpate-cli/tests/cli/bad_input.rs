@@ -232,7 +232,7 @@ fn a_fit_that_needs_more_memory_than_it_may_is_refused_with_the_bound() {
     let fit = ["fit", "rig.toml", "-o", "locator.json", "--memory-limit"];
     let refused = |limit: &str| complaint(&[("rig.toml", PAPER.as_bytes())], &[&fit[..], &[limit]].concat());
     let complaint = refused("1 kB");
-    for part in ["the fit of", "of memory; --memory-limit is 1 kB", "raise the limit"] {
+    for part in ["the fit of", "of memory; the limit is 1 kB", "raise the limit"] {
         assert!(complaint.contains(part), "{part}: {complaint}");
     }
     for wrong in ["3 apples", "0 GB", "GB"] {
@@ -248,7 +248,7 @@ fn limits_and_designs_that_need_more_memory_than_they_may_are_refused_with_the_b
     ] {
         let arguments = [command, &["--memory-limit", "1 MB"]].concat();
         let complaint = complaint(&[("rig.toml", PLATE.as_bytes())], &arguments);
-        for part in [what, " MB of memory; --memory-limit is 1 MB", "raise the limit, or "] {
+        for part in [what, " MB of memory; the limit is 1 MB", "raise the limit, or "] {
             assert!(complaint.contains(part), "{part}: {complaint}");
         }
     }

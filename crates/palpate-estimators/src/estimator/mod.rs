@@ -3,6 +3,7 @@
 mod compare;
 mod cost;
 mod locator_file;
+mod memory;
 mod settings;
 
 pub use crate::fit::{LocatorProvenance, ReadingError};
@@ -14,6 +15,7 @@ pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Track
 pub use compare::{CompareOptions, Compared, Comparison, compare, contenders};
 pub use cost::FitCost;
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
+pub use memory::{MemoryExceeded, MemoryLimit, MemoryLimitError, Size};
 pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Tare, TareError, Uncertainty};
 pub use settings::Setting;
 
@@ -622,7 +624,7 @@ impl Locator {
 
 /// Likelihood of a locator, for a tracker.
 pub struct Tracking {
-    likelihood: Box<dyn Likelihood>,
+    likelihood: Arc<dyn Likelihood>,
 }
 
 /// A locator by which moving contacts cannot be followed, or not in that way.
@@ -645,8 +647,8 @@ pub enum NotTrackable {
 
 impl Tracking {
     /// The likelihood to follow contacts by.
-    pub fn likelihood(&self) -> &dyn Likelihood {
-        &*self.likelihood
+    pub fn likelihood(&self) -> Arc<dyn Likelihood> {
+        Arc::clone(&self.likelihood)
     }
 }
 
@@ -661,10 +663,10 @@ impl Locator {
         }
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
-                Ok(Tracking { likelihood: Box::new(BeamLikelihood::new(beam)) })
+                Ok(Tracking { likelihood: Arc::new(BeamLikelihood::new(beam)) })
             }
             Method::Influence(InfluenceLocator::Plane(plane)) => {
-                Ok(Tracking { likelihood: Box::new(PlateLikelihood::new(plane)) })
+                Ok(Tracking { likelihood: Arc::new(PlateLikelihood::new(plane)) })
             }
             method => Err(NotTrackable::Kind {
                 kind: self.kind(),

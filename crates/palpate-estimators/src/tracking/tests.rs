@@ -2,6 +2,7 @@
 
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
+use std::sync::Arc;
 
 mod on_plane;
 
@@ -49,7 +50,7 @@ pub(super) fn timed_readings(rig: &Example, motion: Motion, force_n: f64, seed: 
 }
 
 /// Number of readings that a tracker takes for a contact where there is none, or the other way round.
-pub(super) fn wrongly_touching(likelihood: &dyn Likelihood, readings: &[Timed]) -> usize {
+pub(super) fn wrongly_touching(likelihood: Arc<dyn Likelihood>, readings: &[Timed]) -> usize {
     let mut tracker = Tracker::new(likelihood, TrackerConfig::default());
     let mut wrong = 0;
     for (time_s, truth, reading) in readings {
@@ -68,11 +69,11 @@ fn readings(rig: &Example, motion: Motion, seed: u64) -> Vec<Timed> {
 /// Asserts that the mean error of the readings, one by one, is `filter` times that of the filter and `smoother` times that of the
 /// smoother at least, and that the filter's 95 % regions hold the contact about as often as they say.
 pub(super) fn assert_closer_than_readings(
-    likelihood: &dyn Likelihood,
+    likelihood: Arc<dyn Likelihood>,
     readings: &[Timed],
     [filter, smoother]: [f64; 2],
 ) {
-    let mut tracker = SmoothTracker::new(likelihood, TrackerConfig::default());
+    let mut tracker = SmoothTracker::new(Arc::clone(&likelihood), TrackerConfig::default());
     for (time_s, _, reading) in readings {
         tracker.follow(*time_s, reading).unwrap();
     }
@@ -91,7 +92,7 @@ fn a_track_is_several_times_closer_than_its_readings() {
     let motion = along_the_beam().with_speed(0.2).unwrap().with_passes(2).unwrap();
     let readings = readings(&rig, motion, 2);
     for (force_n, factors) in [(Some(3.0), [3.0, 5.0]), (None, [4.0, 6.0])] {
-        assert_closer_than_readings(&likelihood(&rig, force_n), &readings, factors);
+        assert_closer_than_readings(Arc::new(likelihood(&rig, force_n)), &readings, factors);
     }
 }
 
@@ -122,7 +123,7 @@ fn a_contact_that_lets_go_is_lost_and_found_again() {
     let rig = rig();
     let motion = along_the_beam().with_speed(1.0).unwrap().with_passes(2).unwrap();
     let motion = motion.with_lifts(0.2, 0.02).unwrap();
-    let wrong = wrongly_touching(&likelihood(&rig, None), &readings(&rig, motion, 3));
+    let wrong = wrongly_touching(Arc::new(likelihood(&rig, None)), &readings(&rig, motion, 3));
     // Only while the force is too small to be told from noise.
     assert!(wrong <= 15, "{wrong}");
 }
@@ -200,7 +201,7 @@ fn two_contacts_are_followed_while_one_lets_go_and_comes_down_again() {
     let task = FitTask::new(&rig.setup, &recording);
     let config = Influence { contacts: 2, ..Influence::default() };
     let likelihood = BeamLikelihood::new(&config.fit_beam(task).unwrap());
-    let mut tracker = Tracker::new(&likelihood, TrackerConfig::default());
+    let mut tracker = Tracker::new(Arc::new(likelihood), TrackerConfig::default());
     let (mut wrong, mut all) = (0, 0);
     let (mut tracked, mut alone) = (Vec::new(), Vec::new());
     for (time_s, truths, reading) in two_readings(&rig, motions, 3) {
@@ -230,13 +231,13 @@ fn off_m(touching: &[f64], mut found: Vec<f64>) -> Vec<f64> {
 #[test]
 fn readings_out_of_order_are_refused_and_change_nothing() {
     let rig = rig();
-    let likelihood = likelihood(&rig, Some(3.0));
+    let likelihood: Arc<dyn Likelihood> = Arc::new(likelihood(&rig, Some(3.0)));
     let surface = rig.setup.surface().model().unwrap();
     let contact = Contact { position: Position::along(0.1), force_n: 3.0 };
     let reading = clean_reading(surface, rig.setup.layout(), contact);
     let (mut one, mut other) = (
-        Tracker::new(&likelihood, TrackerConfig::default()),
-        Tracker::new(&likelihood, TrackerConfig::default()),
+        Tracker::new(Arc::clone(&likelihood), TrackerConfig::default()),
+        Tracker::new(likelihood, TrackerConfig::default()),
     );
     for tracker in [&mut one, &mut other] {
         tracker.follow(1.0, &reading).unwrap();
@@ -254,17 +255,17 @@ fn absurd_readings_and_gaps_leave_numbers_behind() {
     let rig = rig();
     let likelihood = likelihood(&rig, None);
     assert_numbers_after_absurd_readings(
-        &likelihood,
+        Arc::new(likelihood),
         [[0.0; 8], [1e9; 8], [-1e150; 8], [1e-3; 8], [-3e-3; 8]],
     );
 }
 
 /// Asserts that readings far beyond any contact, ever longer apart, leave finite contacts on the surface.
 pub(super) fn assert_numbers_after_absurd_readings<const C: usize>(
-    likelihood: &dyn Likelihood,
+    likelihood: Arc<dyn Likelihood>,
     absurd: [[f64; C]; 5],
 ) {
-    let mut tracker = Tracker::new(likelihood, TrackerConfig::default());
+    let mut tracker = Tracker::new(Arc::clone(&likelihood), TrackerConfig::default());
     for (i, reading) in absurd.iter().chain(&absurd).enumerate() {
         let track = tracker.follow(10f64.powi(i as i32), reading).unwrap();
         assert!(track.touching().is_finite());

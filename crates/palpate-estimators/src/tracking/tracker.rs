@@ -7,6 +7,7 @@ use super::{Track, TrackError, Tracked, TrackerConfig};
 use crate::likelihood::{Geometry, Likelihood};
 use palpate_core::Estimate;
 use palpate_numerics::watch::{Cancelled, Watch};
+use std::sync::Arc;
 
 /// The most hypotheses that are held possible at once.
 const MOST_HYPOTHESES: usize = 12;
@@ -38,8 +39,8 @@ const UNSEEN: f64 = 9.0;
 /// assert!((track.contacts[0].x_m - mm(180.0)).abs() < mm(1.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct Tracker<'a> {
-    likelihood: &'a dyn Likelihood,
+pub struct Tracker {
+    likelihood: Arc<dyn Likelihood>,
     config: TrackerConfig,
     hypotheses: Vec<Hypothesis>,
     time_s: Option<f64>,
@@ -70,9 +71,9 @@ struct LogBirthProbabilities {
     beside: f64,
 }
 
-impl<'a> Tracker<'a> {
+impl Tracker {
     /// A tracker that has seen nothing.
-    pub fn new(likelihood: &'a dyn Likelihood, config: TrackerConfig) -> Self {
+    pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
         Self { likelihood, config, hypotheses: Vec::new(), time_s: None, next_id: 0, whitened: Vec::new() }
     }
 
@@ -86,12 +87,13 @@ impl<'a> Tracker<'a> {
             Some(before_s) => return Err(TrackError::Time { time_s, before_s }),
             None => None,
         };
+        let likelihood = Arc::clone(&self.likelihood);
         let mut whitened = std::mem::take(&mut self.whitened);
-        self.likelihood.whiten(reading, &mut whitened);
-        let single = self.likelihood.single_estimate(reading);
+        likelihood.whiten(reading, &mut whitened);
+        let single = likelihood.single_estimate(reading);
         let log_births = self.predict(duration_s);
         let observation = Observation {
-            likelihood: self.likelihood,
+            likelihood: &*likelihood,
             whitened: &whitened,
             swings: self.config.swing.is_some(),
         };
@@ -267,7 +269,7 @@ impl<'a> Tracker<'a> {
             self.hypotheses.iter().zip(moments).filter(|(one, _)| one.belief.contacts() == number);
         let beliefs: Vec<(f64, Vec<Moments>)> =
             of_number.map(|(hypothesis, contacts)| (hypothesis.weight.exp(), contacts)).collect();
-        let contacts = Tracked::from_mixture(&beliefs, self.likelihood);
+        let contacts = Tracked::from_mixture(&beliefs, &*self.likelihood);
         Track { time_s, numbers, contacts, single }
     }
 }
@@ -279,16 +281,16 @@ fn are_same_contacts(a: &[Moments], b: &[Moments]) -> bool {
 }
 
 /// A [`Tracker`] that remembers, so that it can go back.
-pub struct SmoothTracker<'a> {
-    tracker: Tracker<'a>,
+pub struct SmoothTracker {
+    tracker: Tracker,
     tracks: Vec<Track>,
     /// The hypotheses with contacts at each reading, by their ids.
     past: Vec<Vec<(u64, Belief)>>,
 }
 
-impl<'a> SmoothTracker<'a> {
+impl SmoothTracker {
     /// A tracker that has seen nothing.
-    pub fn new(likelihood: &'a dyn Likelihood, config: TrackerConfig) -> Self {
+    pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
         Self { tracker: Tracker::new(likelihood, config), tracks: Vec::new(), past: Vec::new() }
     }
 
@@ -342,7 +344,7 @@ impl<'a> SmoothTracker<'a> {
             later = if number > 0 { lasting.or_else(last) } else { None };
             let moments = later.as_ref().map(|(_, belief)| belief.moments());
             smoothed[k].contacts = moments
-                .map_or_else(Vec::new, |moments| Tracked::from_belief(&moments, self.tracker.likelihood));
+                .map_or_else(Vec::new, |moments| Tracked::from_belief(&moments, &*self.tracker.likelihood));
         }
         Ok(smoothed)
     }

@@ -1,7 +1,7 @@
 //! `palpate design sensors`: which sensors where, against the even layout.
 
 use super::{changed_rig, design_complaint, say_files, to_micrometre, toml_position};
-use crate::cost::MemoryLimit;
+use crate::cost::MemoryOption;
 use crate::failure::{Complaint, Failure};
 use crate::input;
 use crate::json::{Object, fields, object};
@@ -65,7 +65,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    memory: MemoryLimit,
+    memory: MemoryOption,
     /// Print the designs as JSON
     #[arg(long)]
     json: bool,
