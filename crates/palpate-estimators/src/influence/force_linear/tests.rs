@@ -218,10 +218,10 @@ fn raw_influences(
 ) -> Influences {
     let scale = FULL_SCALE / surface.full_scale(kind);
     let gains: Vec<f64> = gauges.iter().map(|_| scale * rng.random_range(0.7..1.3)).collect();
-    // Functions borrow their surface, and solving for them anew at every contact would be most of a bench's time.
-    let surface: &'static dyn Surface = Box::leak(Box::new(surface));
-    let functions: Vec<_> = gauges.iter().map(|gauge| surface.influence_function(kind, *gauge)).collect();
-    Box::new(move |at| functions.iter().zip(&gains).map(|(function, gain)| gain * function.at(at)).collect())
+    Box::new(move |at| {
+        let functions = gauges.iter().map(|gauge| surface.influence_function(kind, *gauge));
+        functions.zip(&gains).map(|(function, gain)| gain * function.at(at)).collect()
+    })
 }
 
 /// What fifteen lines of SciPy do: the basis of a regression of reading = offset + force × Σ coefficient × basis(position), solved by
