@@ -253,7 +253,7 @@ impl TargetFolder {
     pub fn write_report(&self, files: Vec<ReportFile>) -> Result<(), Failure> {
         #[cfg(feature = "png")]
         let files = palpate_report::with_png_copies(files).map_err(Complaint::new)?;
-        files.iter().try_for_each(|file| self.write(&file.name, &file.bytes))
+        files.into_iter().try_for_each(|file| self.write(&file.name, &file.bytes))
     }
 
     fn target(&self, name: &Path) -> Target {

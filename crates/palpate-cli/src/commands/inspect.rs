@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::json::object;
 use crate::{input, output};
 use palpate_estimators::description;
+use palpate_estimators::recording::{Header, Table};
 use std::path::{Path, PathBuf};
 
 /// Say in words what a file holds: a rig, a study, a locator, a recording or a study's networks.
@@ -47,20 +48,28 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Description of a CSV file: with a rig as its recording, otherwise as a table.
 fn csv(path: &Path, text: &str, rig: Option<&Path>) -> Result<Vec<String>, Failure> {
-    let Some(rig) = rig else { return Ok(table(text)) };
+    let Some(rig) = rig else { return table(path, text) };
     let setup = input::read_rig(rig)?.setup;
     let recording = input::read_recording(&setup, path)?;
     Ok(description::recording(&recording, &setup))
 }
 
-fn table(text: &str) -> Vec<String> {
+fn table(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
     let comments = text.lines().take_while(|line| line.starts_with('#'));
     let mut lines: Vec<String> =
         comments.map(|line| line.trim_start_matches(['#', ' ']).to_owned()).collect();
-    let mut rows = text.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());
-    let columns = rows.next().unwrap_or_default();
-    lines.push(format!("a table of {} rows", rows.count()));
-    lines.push(format!("columns: {}", columns.replace(',', ", ")));
-    lines.push("--rig RIG reads it as a recording of that rig".to_owned());
-    lines
+    let table = Table::read(&path.display().to_string(), text.as_bytes(), None, None);
+    let Table { header, columns, rows } = table.map_err(|error| input::csv_complaint(&error))?;
+    lines.push(format!("a table of {rows} rows"));
+    lines.push(match header {
+        Header::Present => {
+            let headings: Vec<&str> = columns.iter().map(|column| column.heading.as_str()).collect();
+            format!("columns: {}", headings.join(", "))
+        }
+        Header::Absent => format!("{} columns without names", columns.len()),
+    });
+    lines.push(
+        "--rig RIG reads it as a recording of that rig; palpate init writes a first rig for it".to_owned(),
+    );
+    Ok(lines)
 }
