@@ -224,5 +224,8 @@ fn untouched_rows_may_have_no_position_and_be_marked_by_a_column() {
 fn inspect_reads_a_spreadsheet_export_as_init_does() {
     let folder = folder_with(&[("presses.csv", &export(&presses()))]);
     let told = said(&run(folder.path(), &["inspect", "presses.csv"]));
-    assert!(told.starts_with("a table of 42 rows\ncolumns: Nr., Zeit, Position [mm], Kraft (N), DMS 1"), "{told}");
+    assert!(
+        told.starts_with("a table of 42 rows\ncolumns: Nr., Zeit, Position [mm], Kraft (N), DMS 1"),
+        "{told}"
+    );
 }
