@@ -68,10 +68,14 @@ impl Chunks {
         }
     }
 
-    /// All bytes up to the end.
+    /// All bytes of a text up to its end. No text that palpate reads has a zero byte, and a device that never ends has.
     pub fn read_to_end(mut self) -> Result<Vec<u8>, Failure> {
         let mut bytes = Vec::new();
         while let Some(chunk) = self.next()? {
+            if let Some(at) = chunk.iter().position(|byte| *byte == 0) {
+                let complaint = format!("{} is no text: byte {} is 0", self.name, bytes.len() + at + 1);
+                return Err(Complaint::new(complaint).help("save it as UTF-8").into());
+            }
             bytes.extend(chunk);
         }
         Ok(bytes)

@@ -159,9 +159,15 @@ pub fn force(text: &str) -> Result<f64, String> {
     greater_than_0(text, Quantity::parse_as(text, Dimension::Force), |force_n| *force_n)
 }
 
-/// A frequency in hertz, from a command line argument.
+/// A frequency in hertz, from a command line argument: one whose period is a time that numbers tell apart, and any number of which have an end.
 pub fn frequency(text: &str) -> Result<f64, String> {
-    greater_than_0(text, Quantity::parse_as(text, Dimension::Frequency), |frequency_hz| *frequency_hz)
+    let frequency_hz =
+        greater_than_0(text, Quantity::parse_as(text, Dimension::Frequency), |frequency_hz| *frequency_hz)?;
+    if (1e-6..=1e9).contains(&frequency_hz) {
+        Ok(frequency_hz)
+    } else {
+        Err(format!("`{text}` must be at least 0.000001 Hz and at most 1000000000 Hz"))
+    }
 }
 
 /// A quantity greater than 0 in whatever unit, from a command line argument.

@@ -98,6 +98,7 @@ fn comment(arguments: &Arguments) -> String {
 }
 
 fn too_many(EveryError { count, .. }: EveryError) -> Complaint {
+    let count = if count < 1e15 { count.to_string() } else { format!("{count:.1e}") };
     Complaint::new(format!(
         "--every makes {count} positions; there must be at least 1 and at most {}",
         EveryError::MOST

@@ -1,6 +1,6 @@
 //! Bad input: a message with the place and the bound, exit code 2, nothing written, no panic.
 
-use crate::support::command::{complained, run, said};
+use crate::support::command::{complained, folder, run, said};
 use crate::support::examples::{FSI_WATER, NOISY_BEAM, PAPER, PAPER_STUDY, PLATE, SENSOR_KINDS_STUDY};
 use crate::support::toml::{Toml, replaced};
 use std::fs;
@@ -74,6 +74,31 @@ fn recordings_are_refused_at_the_place() {
 }
 
 #[test]
+fn what_is_no_text_is_refused_at_its_first_zero_byte() {
+    let utf16: Vec<u8> = PAPER.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    for verb in ["inspect", "limit", "init"] {
+        let told = complaint(&[("rig.toml", &utf16)], &[verb, "rig.toml"]);
+        assert!(
+            told.contains("rig.toml is no text: byte 2 is 0") && told.contains("UTF-8"),
+            "{verb}: {told}"
+        );
+    }
+    #[cfg(unix)]
+    for device in ["/dev/zero", "/dev/full"] {
+        let told = complaint(&[], &["inspect", device]);
+        assert!(told.contains("is no text: byte 1 is 0"), "{told}");
+    }
+}
+
+#[test]
+fn frequencies_beyond_all_clocks_are_refused() {
+    for rate in ["1e308 Hz", "1e-308 Hz"] {
+        let told = complaint(&[], &["track", "locator.json", "--rate", rate]);
+        assert!(told.contains("must be at least 0.000001 Hz and at most 1000000000 Hz"), "{told}");
+    }
+}
+
+#[test]
 fn missing_files_are_named() {
     let no_rig = complaint(&[], &["fit", "none.toml", "-o", "locator.json"]);
     let rig = [("rig.toml", FSI_WATER.as_bytes())];
@@ -133,6 +158,32 @@ fn numbers_of_locators_are_refused_at_the_place() {
     let messages: Vec<String> =
         cases.iter().map(|(key, number)| format!("{key} = {number}:\n{}", put(key, number))).collect();
     insta::assert_snapshot!(messages.join("\n"));
+}
+
+#[test]
+fn numbers_within_influence_locators_are_refused_at_the_place() {
+    let folder = folder(NOISY_BEAM);
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    let good = fs::read_to_string(folder.path().join("locator.json")).unwrap();
+    let digits = |text: &str, from: usize| {
+        let start = from + text[from..].find(|letter: char| letter.is_ascii_digit()).unwrap();
+        start..start + text[start..].find([',', '\n']).unwrap()
+    };
+    for (key, number) in
+        [("length_m", "-0.4"), ("noise_sd", "-5e-6"), ("variances", "-0.125"), ("gain_error", "-1e-3")]
+    {
+        let number_at = digits(&good, good.find(&format!("\"{key}\": ")).unwrap() + key.len() + 3);
+        let text = format!("{}{number}{}", &good[..number_at.start], &good[number_at.end..]);
+        let line = good[..number_at.start].matches('\n').count() + 1;
+        let column = number_at.start - good[..number_at.start].rfind('\n').unwrap();
+        let complaint = complaint(&[("locator.json", text.as_bytes())], &["inspect", "locator.json"]);
+        assert!(
+            complaint.contains(&format!("locator.json:{line}:{column}]")),
+            "{key} = {number}: {complaint}"
+        );
+        assert!(complaint.contains("must"), "{complaint}");
+        assert!(!complaint.contains(" at line "), "the place is said twice: {complaint}");
+    }
 }
 
 #[test]

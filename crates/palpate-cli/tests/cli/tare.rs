@@ -74,7 +74,14 @@ fn what_a_tare_takes_is_said_and_its_rows_stay_in_their_places() {
     fs::write(folder.path().join("few.csv"), board.recording(&[Touch::NONE, Touch::NONE, touch])).unwrap();
     let output = run(folder.path(), &["locate", "board.json", "few.csv", "--tare", "2"]);
     let lines: Vec<String> = said(&output).lines().map(str::to_owned).collect();
-    assert_eq!(lines[..3], ["line,position_mm,force_n,low_mm,high_mm,status", "2,,,,,tare", "3,,,,,tare"]);
+    assert_eq!(
+        lines[..3],
+        [
+            "line,position_mm,force_n,low_mm,high_mm,force_low_n,force_high_n,trade_off,status",
+            "2,,,,,,,,tare",
+            "3,,,,,,,,tare"
+        ]
+    );
     assert!(lines[3].ends_with(",located"), "{lines:?}");
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(told.contains("tare from the mean of 2 readings; g"), "{told}");

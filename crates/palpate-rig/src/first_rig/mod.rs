@@ -39,12 +39,21 @@ pub struct Hints {
     pub decimal: Option<Decimal>,
 }
 
+/// Columns of a file that a rig is guessed for, at most: every name is compared with every other.
+const MOST_COLUMNS: usize = 10_000;
+
 /// A recording that no rig can be guessed for.
 #[derive(Debug, thiserror::Error)]
 pub enum FirstRigError {
     /// The file cannot be read.
     #[error(transparent)]
     Csv(#[from] CsvError),
+    /// More columns than roles are sought among.
+    #[error("the file has {columns} columns; a rig is guessed for at most {MOST_COLUMNS}")]
+    TooManyColumns {
+        /// Columns of the file.
+        columns: usize,
+    },
     /// No column has the name of a position.
     #[error("no column has the name of a position; the columns are {columns}")]
     NoPosition {
@@ -181,6 +190,10 @@ impl FirstRig {
     /// [`FirstRigError`] for a file that cannot be read, and for one of which the columns cannot be told.
     pub fn guess(source: &str, bytes: &[u8], hints: &Hints) -> Result<Self, FirstRigError> {
         let table = Table::read(source, bytes, hints.separator, hints.decimal)?;
+        let columns = table.columns.len();
+        if columns > MOST_COLUMNS {
+            return Err(FirstRigError::TooManyColumns { columns });
+        }
         let roles = Roles::guess(&table, hints)?;
         let mut first = Self {
             source: source.to_owned(),

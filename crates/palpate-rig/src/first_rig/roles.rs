@@ -324,9 +324,10 @@ fn checked(table: &Table, flag: &'static str, column: usize) -> Result<usize, Fi
     }
 }
 
-/// Every column with what is in it, in words.
+/// Columns with what is in them, in words: all, or the first hundred.
 pub(super) fn described(table: &Table) -> String {
-    let words = table.columns.iter().map(|column| {
+    const MOST: usize = 100;
+    let words = table.columns.iter().take(MOST).map(|column| {
         let content = match &column.content {
             Content::Empty => "empty".to_owned(),
             Content::Times => "timestamps".to_owned(),
@@ -340,7 +341,9 @@ pub(super) fn described(table: &Table) -> String {
         };
         format!("`{}` ({content})", column.heading)
     });
-    words.collect::<Vec<_>>().join(", ")
+    let more = table.columns.len().saturating_sub(MOST);
+    let more = (more > 0).then(|| format!("and {more} more"));
+    words.chain(more).collect::<Vec<_>>().join(", ")
 }
 
 /// The least and the greatest of some numbers.
@@ -482,19 +485,23 @@ impl Guess<'_> {
         }
     }
 
-    /// The reason that no column is the position: that whose name is one's is in a unit that is no length's.
+    /// The reason that no column is the position: that whose name is one's is in a unit that is no length's, has something else than numbers, or
+    /// the same number in every row.
     fn no_position(&self, taken: &[usize]) -> FirstRigError {
-        let place = |name: &Name| {
-            let named = name.is(PLACE, &[]) || name.is(&["x", "y"], &[PLACE]);
-            named && name.foreign_unit.is_some()
+        let place = |name: &Name| name.is(PLACE, &[]) || name.is(&["x", "y"], &[PLACE]);
+        let Some(named) = self.columns(taken, place).first().copied() else {
+            return FirstRigError::NoPosition { columns: described(self.table) };
         };
-        match self.columns(taken, place).first() {
-            Some(column) => FirstRigError::ForeignUnit {
-                column: self.table.columns[*column].heading.clone(),
-                unit: self.names[*column].foreign_unit.clone().unwrap_or_default(),
-                wanted: Dimension::Length,
-            },
-            None => FirstRigError::NoPosition { columns: described(self.table) },
+        let column = self.table.columns[named].heading.clone();
+        if let Some(unit) = self.names[named].foreign_unit.clone() {
+            return FirstRigError::ForeignUnit { column, unit, wanted: Dimension::Length };
+        }
+        match (checked(self.table, "the position", named), self.numbers(named)) {
+            (Err(error), _) => error,
+            (Ok(_), Some([value, ..])) if !self.varies(named) => {
+                FirstRigError::OnePosition { column, value: *value }
+            }
+            _ => FirstRigError::NoPosition { columns: described(self.table) },
         }
     }
 

@@ -151,3 +151,31 @@ fn a_rig_that_was_guessed_is_fitted() {
     let estimate = locator.locate(&recording.rows[8].reading).unwrap();
     assert!((estimate.contact.position.x_m - recording.rows[8].position.x_m).abs() < 2e-3);
 }
+
+#[test]
+fn a_named_position_that_cannot_be_one_is_said_to_be_so() {
+    let of = |place: fn(usize) -> String| {
+        let rows = (0..30).map(|i| format!("{},{},{}\n", place(i), i, i * i));
+        summary(&format!("position_mm,S1,S2\n{}", rows.collect::<String>()))
+    };
+    assert_eq!(
+        of(|_| "10".to_owned()),
+        "column `position_mm` is 10 in every row; a rig needs presses at 2 positions or more"
+    );
+    assert_eq!(
+        of(|i| if i == 7 { "left".to_owned() } else { i.to_string() }),
+        "the position: column `position_mm` has `left` on line 9; every row must have a number"
+    );
+}
+
+#[test]
+fn very_many_columns_are_refused_and_not_all_listed() {
+    let wide = |columns: usize| {
+        let heading: Vec<String> = (0..columns).map(|i| format!("c{i}")).collect();
+        let row = vec!["1"; columns].join(",");
+        summary(&format!("{}\n{row}\n{row}\n", heading.join(",")))
+    };
+    assert_eq!(wide(200_000), "the file has 200000 columns; a rig is guessed for at most 10000");
+    let listed = wide(150);
+    assert!(listed.ends_with("`c99` (1 to 1), and 50 more"), "{listed}");
+}
