@@ -100,7 +100,7 @@ fn a_track_is_several_times_closer_than_its_readings() {
 fn smoothing_stops_when_it_is_told_to() {
     let rig = rig();
     let likelihood = likelihood(&rig, Some(3.0));
-    let mut tracker = SmoothTracker::new(&likelihood, TrackerConfig::default());
+    let mut tracker = SmoothTracker::new(Arc::new(likelihood), TrackerConfig::default());
     for (time_s, _, reading) in readings(&rig, along_the_beam(), 2).iter().take(200) {
         tracker.follow(*time_s, reading).unwrap();
     }
