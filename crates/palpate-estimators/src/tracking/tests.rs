@@ -50,8 +50,8 @@ pub(super) fn timed_readings(rig: &Example, motion: Motion, force_n: f64, seed: 
 }
 
 /// Number of readings that a tracker takes for a contact where there is none, or the other way round.
-pub(super) fn wrongly_touching(likelihood: Arc<dyn Likelihood>, readings: &[Timed]) -> usize {
-    let mut tracker = Tracker::new(likelihood, TrackerConfig::default());
+pub(super) fn wrongly_touching(likelihood: impl Likelihood + 'static, readings: &[Timed]) -> usize {
+    let mut tracker = Tracker::new(Arc::new(likelihood), TrackerConfig::default());
     let mut wrong = 0;
     for (time_s, truth, reading) in readings {
         let track = tracker.follow(*time_s, reading).unwrap();
@@ -69,10 +69,11 @@ fn readings(rig: &Example, motion: Motion, seed: u64) -> Vec<Timed> {
 /// Asserts that the mean error of the readings, one by one, is `filter` times that of the filter and `smoother` times that of the
 /// smoother at least, and that the filter's 95 % regions hold the contact about as often as they say.
 pub(super) fn assert_closer_than_readings(
-    likelihood: Arc<dyn Likelihood>,
+    likelihood: impl Likelihood + 'static,
     readings: &[Timed],
     [filter, smoother]: [f64; 2],
 ) {
+    let likelihood: Arc<dyn Likelihood> = Arc::new(likelihood);
     let mut tracker = SmoothTracker::new(Arc::clone(&likelihood), TrackerConfig::default());
     for (time_s, _, reading) in readings {
         tracker.follow(*time_s, reading).unwrap();
@@ -92,7 +93,7 @@ fn a_track_is_several_times_closer_than_its_readings() {
     let motion = along_the_beam().with_speed(0.2).unwrap().with_passes(2).unwrap();
     let readings = readings(&rig, motion, 2);
     for (force_n, factors) in [(Some(3.0), [3.0, 5.0]), (None, [4.0, 6.0])] {
-        assert_closer_than_readings(Arc::new(likelihood(&rig, force_n)), &readings, factors);
+        assert_closer_than_readings(likelihood(&rig, force_n), &readings, factors);
     }
 }
 
@@ -123,7 +124,7 @@ fn a_contact_that_lets_go_is_lost_and_found_again() {
     let rig = rig();
     let motion = along_the_beam().with_speed(1.0).unwrap().with_passes(2).unwrap();
     let motion = motion.with_lifts(0.2, 0.02).unwrap();
-    let wrong = wrongly_touching(Arc::new(likelihood(&rig, None)), &readings(&rig, motion, 3));
+    let wrong = wrongly_touching(likelihood(&rig, None), &readings(&rig, motion, 3));
     // Only while the force is too small to be told from noise.
     assert!(wrong <= 15, "{wrong}");
 }
@@ -255,16 +256,17 @@ fn absurd_readings_and_gaps_leave_numbers_behind() {
     let rig = rig();
     let likelihood = likelihood(&rig, None);
     assert_numbers_after_absurd_readings(
-        Arc::new(likelihood),
+        likelihood,
         [[0.0; 8], [1e9; 8], [-1e150; 8], [1e-3; 8], [-3e-3; 8]],
     );
 }
 
 /// Asserts that readings far beyond any contact, ever longer apart, leave finite contacts on the surface.
 pub(super) fn assert_numbers_after_absurd_readings<const C: usize>(
-    likelihood: Arc<dyn Likelihood>,
+    likelihood: impl Likelihood + 'static,
     absurd: [[f64; C]; 5],
 ) {
+    let likelihood: Arc<dyn Likelihood> = Arc::new(likelihood);
     let mut tracker = Tracker::new(Arc::clone(&likelihood), TrackerConfig::default());
     for (i, reading) in absurd.iter().chain(&absurd).enumerate() {
         let track = tracker.follow(10f64.powi(i as i32), reading).unwrap();

@@ -10,7 +10,6 @@ use crate::tracking::tests::{
 };
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Motion;
-use std::sync::Arc;
 
 fn rig() -> Example {
     moving_plate()
@@ -41,7 +40,7 @@ fn a_track_on_a_plane_is_several_times_closer_than_its_readings() {
     let motion = over_the_plate().with_speed(0.3).unwrap().with_passes(2).unwrap();
     let readings = readings(&rig, motion, 2);
     for force_n in [Some(5.0), None] {
-        assert_closer_than_readings(Arc::new(likelihood(&rig, force_n)), &readings, [2.5, 4.0]);
+        assert_closer_than_readings(likelihood(&rig, force_n), &readings, [2.5, 4.0]);
     }
 }
 
@@ -50,7 +49,7 @@ fn a_contact_on_a_plane_that_lets_go_is_lost_and_found_again() {
     let rig = rig();
     let motion = over_the_plate().with_speed(1.0).unwrap().with_passes(2).unwrap();
     let motion = motion.with_lifts(0.2, 0.02).unwrap();
-    let wrong = wrongly_touching(Arc::new(likelihood(&rig, None)), &readings(&rig, motion, 3));
+    let wrong = wrongly_touching(likelihood(&rig, None), &readings(&rig, motion, 3));
     // Only while the force is too small to be told from noise.
     assert!(wrong <= 15, "{wrong}");
 }
@@ -89,7 +88,7 @@ fn absurd_readings_and_gaps_on_a_plane_leave_numbers_behind() {
     let rig = rig();
     let likelihood = likelihood(&rig, None);
     assert_numbers_after_absurd_readings(
-        Arc::new(likelihood),
+        likelihood,
         [[0.0; 9], [1e9; 9], [-1e150; 9], [1e-3; 9], [-3e-4; 9]],
     );
 }
