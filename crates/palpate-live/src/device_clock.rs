@@ -11,10 +11,10 @@ use std::time::Duration;
 
 /// Device time that the envelope is fitted to, in seconds.
 pub const WINDOW_S: f64 = 30.0;
-/// Device time of which only the lowest and the highest point are kept, in seconds.
+/// Device time of which only the lowest and the highest point are kept, in seconds, and as a ratio of the time since the first reading: a drift of
+/// percents shows from the first readings on.
 const BIN_S: f64 = 0.25;
-/// Device time below which no drift is told from the jitter of the arrivals, in seconds.
-const DRIFT_S: f64 = 2.0;
+const BIN_RATIO: f64 = 1.0 / 16.0;
 /// Greatest drift of a clock, as a ratio: three times that of an uncalibrated oscillator of a microcontroller.
 const GREATEST_DRIFT: f64 = 0.03;
 /// Values at which clocks of 32 bits wrap around: of microseconds and of milliseconds.
@@ -82,7 +82,7 @@ impl DeviceClock {
         self.epoch.as_mut().map_or(arrival, |epoch| epoch.host_time(device, arrival))
     }
 
-    /// Seconds by which the host's clock gains on the board's in each second of the board's; `None` before any is told from jitter.
+    /// Seconds by which the host's clock gains on the board's in each second of the board's; `None` before there are two readings.
     pub fn drift(&self) -> Option<f64> {
         self.epoch.as_ref().map(|epoch| epoch.line.slope).filter(|slope| *slope != 0.0)
     }
@@ -140,7 +140,7 @@ impl Epoch {
 
     fn add(&mut self, point: Point) {
         match self.bins.back_mut() {
-            Some(bin) if point.device_s < bin.start_s + BIN_S => {
+            Some(bin) if point.device_s < bin.start_s + BIN_S.min(BIN_RATIO * point.device_s) => {
                 if point.offset_s < bin.low.offset_s {
                     bin.low = point;
                 }
@@ -179,10 +179,6 @@ fn envelope(bins: &VecDeque<Bin>) -> Line {
         let offsets = bins.iter().map(|bin| bin.low.offset_s - slope * bin.low.device_s);
         Line { offset_s: offsets.fold(f64::INFINITY, f64::min), slope }
     };
-    let span_s = bins.back().zip(bins.front()).map_or(0.0, |(last, first)| last.start_s - first.start_s);
-    if span_s < DRIFT_S {
-        return lowest(0.0);
-    }
     let middle_s = bins.iter().map(|bin| bin.low.device_s).sum::<f64>() / bins.len() as f64;
     let hull = lower_hull(bins.iter().map(|bin| bin.low));
     let edge = hull.array_windows().find(|[_, end]| end.device_s >= middle_s);
@@ -301,7 +297,7 @@ mod tests {
         let mut bench = Bench::new(2, 100e-6, 1e-3, 500.0);
         let mut clock = DeviceClock::default();
         errors_s(&mut bench, &mut clock, 0.0, 20.0, 100.0);
-        bench.start_s = -20.0;
+        bench.start_s = -19.9;
         let errors = errors_s(&mut bench, &mut clock, 20.0, 40.0, 100.0);
         assert!(errors.iter().all(|error| error.abs() < 1e-3 + TICK_S), "{errors:?}");
     }

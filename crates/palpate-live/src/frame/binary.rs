@@ -128,7 +128,7 @@ mod tests {
         assert_eq!(stuffed(&[0x11, 0x22, 0, 0x33]), [3, 0x11, 0x22, 2, 0x33]);
         assert_eq!(stuffed(&[1; 254]).len(), 255);
         assert_eq!(stuffed(&[1; 255]).len(), 257);
-        let long: Vec<u8> = (0..1042).map(|i| (i % 255 + 1) as u8).collect();
+        let long: Vec<u8> = (0..HEAD + 4 * 255 + TAIL).map(|i| (i % 255 + 1) as u8).collect();
         assert_eq!(stuffed(&long).len(), LONGEST);
     }
 
@@ -148,7 +148,7 @@ mod tests {
             time_us: u32,
             values in prop::collection::vec(-1e30_f32..1e30, 1..256),
             damaged: prop::sample::Index,
-            bit in 0..8,
+            bit in 0..8_u8,
         ) {
             let names: Vec<String> = (0..values.len()).map(|i| format!("s{i}")).collect();
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -163,7 +163,7 @@ mod tests {
             let expected: Vec<f64> = values.iter().map(|value| f64::from(*value)).collect();
             prop_assert_eq!(frame.reading, expected);
             let place = damaged.index(bytes.len());
-            bytes[place] ^= 1 << bit;
+            bytes[place] ^= 1_u8 << bit;
             prop_assume!(bytes[place] != 0);
             prop_assert!(decode(&bytes, &names, &columns, &mut Vec::new()).is_err());
         }
