@@ -49,7 +49,8 @@ static inline void palpate_put(struct palpate_writer *writer, uint8_t byte)
     uint16_t crc = (uint16_t)(writer->crc ^ ((uint16_t)byte << 8));
     int bit;
     for (bit = 0; bit < 8; bit++) {
-        crc = (uint16_t)((crc & 0x8000u) ? ((uint16_t)(crc << 1) ^ 0x1021u) : (crc << 1));
+        unsigned polynomial = (crc & 0x8000u) ? 0x1021u : 0u;
+        crc = (uint16_t)(((unsigned)crc << 1) ^ polynomial);
     }
     writer->crc = crc;
     palpate_stuff(writer, byte);

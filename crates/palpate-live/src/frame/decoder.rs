@@ -320,3 +320,159 @@ impl Decoder {
         binary::decode(stuffed, self.text.names(), self.text.columns(), &mut self.scratch)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::channels;
+    use super::*;
+    use crate::frame::encode_into;
+    use proptest::prelude::*;
+
+    fn decoder() -> Decoder {
+        Decoder::new(&channels(&["a", "b"]))
+    }
+
+    type Verdict = Result<Vec<f64>, BadFrame>;
+
+    fn received(decoder: &mut Decoder, bytes: &[u8]) -> Vec<Verdict> {
+        let mut verdicts = Vec::new();
+        decoder.receive(bytes, |frame| verdicts.push(frame.map(|frame| frame.reading)));
+        verdicts
+    }
+
+    fn binary(numbers: std::ops::Range<u16>) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        numbers.for_each(|n| encode_into(&mut bytes, n.into(), 10 * u32::from(n), &[f32::from(n), 10.0]));
+        bytes
+    }
+
+    #[test]
+    fn text_and_binary_find_themselves() {
+        assert_eq!(received(&mut decoder(), b"1,2\r\n\r\n3,x\n5,6\n7,"), [
+            Ok(vec![1.0, 2.0]),
+            Err(BadFrame::NotANumber),
+            Ok(vec![5.0, 6.0])
+        ]);
+        // Numbers of frames up to 300 have line ends among their bytes.
+        let verdicts = received(&mut decoder(), &binary(0..300));
+        let expected: Vec<Verdict> = (0..300_u16).map(|n| Ok(vec![f64::from(n), 10.0])).collect();
+        assert_eq!(verdicts, expected);
+    }
+
+    #[test]
+    fn a_torn_start_is_not_counted() {
+        let mut decoder = decoder();
+        decoder.join();
+        // "12.5,1" without its first digit is a frame like any other.
+        assert_eq!(received(&mut decoder, b"2.5,1\n3,4\n"), [Ok(vec![3.0, 4.0])]);
+        decoder.join();
+        assert_eq!(received(&mut decoder, b"\xFF\x80,1\n3,4\nx\n"), [Ok(vec![3.0, 4.0]), Err(BadFrame::NotANumber)]);
+        decoder.join();
+        assert_eq!(received(&mut decoder, b"a:1,b:2\n"), [Ok(vec![1.0, 2.0])]);
+        for cut in 1..18 {
+            decoder.join();
+            let verdicts = received(&mut decoder, &binary(0..20)[cut..]);
+            assert_eq!(verdicts.len(), 19, "{cut}: {verdicts:?}");
+            assert!(verdicts.iter().all(Result::is_ok), "{cut}: {verdicts:?}");
+        }
+    }
+
+    #[test]
+    fn a_damaged_binary_frame_costs_itself_only() {
+        let mut decoder = decoder();
+        let mut bytes = binary(0..3);
+        let size = bytes.len() / 3;
+        bytes[size + 4] ^= 0x40;
+        let verdicts = received(&mut decoder, &bytes);
+        assert!(matches!(verdicts[..], [Ok(_), Err(BadFrame::Checksum | BadFrame::Malformed), Ok(_)]), "{verdicts:?}");
+    }
+
+    #[test]
+    fn a_board_that_turns_from_one_form_to_the_other_is_followed() {
+        let mut decoder = decoder();
+        let bytes = [b"1,2\n".as_slice(), &binary(0..60), b"\0", &b"3,4\n".repeat(1000)].concat();
+        let verdicts = received(&mut decoder, &bytes);
+        let good = |value: f64| verdicts.iter().filter(|is| matches!(is, Ok(is) if is[1] == value)).count();
+        assert_eq!(good(2.0), 1);
+        assert!(good(10.0) >= 58, "{}", good(10.0));
+        // As many bytes as no binary frame has are lost.
+        assert!(good(4.0) >= 1000 - binary::LONGEST / 4 - 2, "{}", good(4.0));
+    }
+
+    #[test]
+    fn a_line_without_an_end_is_too_long_once() {
+        let mut decoder = decoder();
+        let bytes = [b"1,2\n".as_slice(), &vec![b'7'; 3 * LONGEST_LINE], b"\n3,4\n"].concat();
+        assert_eq!(received(&mut decoder, &bytes), [
+            Ok(vec![1.0, 2.0]),
+            Err(BadFrame::TooLong),
+            Ok(vec![3.0, 4.0])
+        ]);
+    }
+
+    #[test]
+    fn messages_are_whole() {
+        let mut decoder = decoder();
+        let mut verdicts = Vec::new();
+        for message in [b"1,2".as_slice(), b"3,4\n5,6\n", b"[7,8]", &binary(9..11), &binary(11..12)[..19]] {
+            decoder.receive_message(message, |frame| verdicts.push(frame.unwrap().reading[0]));
+        }
+        assert_eq!(verdicts, [1.0, 3.0, 5.0, 7.0, 9.0, 10.0, 11.0]);
+    }
+
+    #[test]
+    fn the_end_of_a_stream_ends_its_last_line() {
+        let mut decoder = decoder();
+        assert_eq!(received(&mut decoder, b"1,2\n3,4"), [Ok(vec![1.0, 2.0])]);
+        let mut last = Vec::new();
+        decoder.end(|frame| last.push(frame.unwrap().reading));
+        assert_eq!(last, [[3.0, 4.0]]);
+    }
+
+    #[test]
+    fn columns_name_every_channel_once() {
+        let columns = |names: &str| names.split(',').map(str::to_owned).collect::<Vec<_>>();
+        let mut decoder = decoder();
+        let missing = decoder.set_columns(&columns("a,t")).unwrap_err();
+        assert!(missing.to_string().contains("a,t have no channel `b`"), "{missing}");
+        let twice = decoder.set_columns(&columns("a,b,S1")).unwrap_err();
+        assert!(twice.to_string().contains("a channel twice"), "{twice}");
+        decoder.set_columns(&columns("n,B,x,a")).unwrap();
+        assert_eq!(received(&mut decoder, b"7,2,99,1\n"), [Ok(vec![1.0, 2.0])]);
+    }
+
+    proptest! {
+        #[test]
+        fn how_bytes_are_cut_changes_nothing(
+            parts in prop::collection::vec(
+                prop_oneof![
+                    Just(b"1.5,2\n".to_vec()),
+                    Just(b"b:1;a:2\r\n".to_vec()),
+                    Just(b"t,a,b\n".to_vec()),
+                    (0..400_u16).prop_map(|n| binary(n..n + 1)),
+                    prop::collection::vec(any::<u8>(), 0..40),
+                    Just(vec![b'9'; LONGEST_LINE - 1]),
+                ],
+                0..12,
+            ),
+            cuts in prop::collection::vec(any::<prop::sample::Index>(), 0..20),
+            joins in any::<bool>(),
+        ) {
+            let bytes = parts.concat();
+            let (mut whole, mut cut) = (decoder(), decoder());
+            if joins {
+                whole.join();
+                cut.join();
+            }
+            let mut places: Vec<usize> = cuts.iter().map(|cut| cut.index(bytes.len() + 1)).collect();
+            places.sort_unstable();
+            let mut verdicts = Vec::new();
+            let mut start = 0;
+            for place in places.into_iter().chain([bytes.len()]) {
+                verdicts.extend(received(&mut cut, &bytes[start..place]));
+                start = place;
+            }
+            prop_assert_eq!(verdicts, received(&mut whole, &bytes));
+        }
+    }
+}
