@@ -182,9 +182,8 @@ fn envelope(bins: &VecDeque<Bin>) -> Line {
     let middle_s = bins.iter().map(|bin| bin.low.device_s).sum::<f64>() / bins.len() as f64;
     let hull = lower_hull(bins.iter().map(|bin| bin.low));
     let edge = hull.array_windows().find(|[_, end]| end.device_s >= middle_s);
-    let slope = edge.map_or(0.0, |[start, end]| {
-        (end.offset_s - start.offset_s) / (end.device_s - start.device_s)
-    });
+    let slope =
+        edge.map_or(0.0, |[start, end]| (end.offset_s - start.offset_s) / (end.device_s - start.device_s));
     lowest(slope.clamp(-GREATEST_DRIFT, GREATEST_DRIFT))
 }
 
@@ -235,7 +234,13 @@ mod tests {
     }
 
     /// Errors of the mapped time of readings at `rate_hz`, in seconds.
-    fn errors_s(bench: &mut Bench, clock: &mut DeviceClock, from_s: f64, to_s: f64, rate_hz: f64) -> Vec<f64> {
+    fn errors_s(
+        bench: &mut Bench,
+        clock: &mut DeviceClock,
+        from_s: f64,
+        to_s: f64,
+        rate_hz: f64,
+    ) -> Vec<f64> {
         let taken = (0..).map(|i| from_s + f64::from(i) / rate_hz).take_while(|taken_s| *taken_s < to_s);
         taken
             .map(|taken_s| {

@@ -204,7 +204,8 @@ impl Broker {
 /// The program of the broker, where there is one.
 fn mosquitto() -> Option<std::path::PathBuf> {
     let named = std::env::var_os("PALPATE_MOSQUITTO").map(Into::into);
-    Some(named.unwrap_or_else(|| "/usr/sbin/mosquitto".into())).filter(|path: &std::path::PathBuf| path.is_file())
+    Some(named.unwrap_or_else(|| "/usr/sbin/mosquitto".into()))
+        .filter(|path: &std::path::PathBuf| path.is_file())
 }
 
 #[test]
@@ -251,7 +252,9 @@ impl Board {
             for event in connection.iter() {
                 match event {
                     Ok(Event::Incoming(Packet::SubAck(_))) => ready.send(()).unwrap(),
-                    Ok(Event::Incoming(Packet::Publish(message))) => to.send(message.payload.to_vec()).unwrap(),
+                    Ok(Event::Incoming(Packet::Publish(message))) => {
+                        to.send(message.payload.to_vec()).unwrap()
+                    }
                     Ok(_) => {}
                     Err(_) => return,
                 }

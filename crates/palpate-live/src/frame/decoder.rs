@@ -42,7 +42,9 @@ enum Form {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ColumnsError {
     /// A channel that has no column.
-    #[error("the columns {columns} have no channel `{channel}`; name every channel, and anything else that a line has")]
+    #[error(
+        "the columns {columns} have no channel `{channel}`; name every channel, and anything else that a line has"
+    )]
     Missing {
         /// The columns.
         columns: String,
@@ -204,7 +206,9 @@ impl Decoder {
 
     /// Reads a line of a stream of text; one with zeros may be binary frames, of which the last has a line end in it.
     fn end_line(&mut self, line: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
-        let Some(last) = line.iter().rposition(|byte| *byte == 0) else { return self.read_line(line, hand_on) };
+        let Some(last) = line.iter().rposition(|byte| *byte == 0) else {
+            return self.read_line(line, hand_on);
+        };
         let mut is_binary = false;
         for frame in line[..last].split(|byte| *byte == 0).filter(|frame| !frame.is_empty()) {
             if let Ok(frame) = self.decode_binary(frame) {
@@ -232,8 +236,7 @@ impl Decoder {
     }
 
     fn receive_unknown(&mut self, bytes: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) -> usize {
-        let (taken, ends) =
-            self.hold(bytes, LONGEST_LINE, |byte| matches!(byte, b'\n' | 0), hand_on);
+        let (taken, ends) = self.hold(bytes, LONGEST_LINE, |byte| matches!(byte, b'\n' | 0), hand_on);
         if ends {
             match bytes[taken - 1] {
                 0 => self.judge_binary(hand_on),
@@ -348,11 +351,10 @@ mod tests {
 
     #[test]
     fn text_and_binary_find_themselves() {
-        assert_eq!(received(&mut decoder(), b"1,2\r\n\r\n3,x\n5,6\n7,"), [
-            Ok(vec![1.0, 2.0]),
-            Err(BadFrame::NotANumber),
-            Ok(vec![5.0, 6.0])
-        ]);
+        assert_eq!(
+            received(&mut decoder(), b"1,2\r\n\r\n3,x\n5,6\n7,"),
+            [Ok(vec![1.0, 2.0]), Err(BadFrame::NotANumber), Ok(vec![5.0, 6.0])]
+        );
         // Numbers of frames up to 300 have line ends among their bytes.
         let verdicts = received(&mut decoder(), &binary(0..300));
         let expected: Vec<Verdict> = (0..300_u16).map(|n| Ok(vec![f64::from(n), 10.0])).collect();
@@ -366,7 +368,10 @@ mod tests {
         // "12.5,1" without its first digit is a frame like any other.
         assert_eq!(received(&mut decoder, b"2.5,1\n3,4\n"), [Ok(vec![3.0, 4.0])]);
         decoder.join();
-        assert_eq!(received(&mut decoder, b"\xFF\x80,1\n3,4\nx\n"), [Ok(vec![3.0, 4.0]), Err(BadFrame::NotANumber)]);
+        assert_eq!(
+            received(&mut decoder, b"\xFF\x80,1\n3,4\nx\n"),
+            [Ok(vec![3.0, 4.0]), Err(BadFrame::NotANumber)]
+        );
         decoder.join();
         assert_eq!(received(&mut decoder, b"a:1,b:2\n"), [Ok(vec![1.0, 2.0])]);
         for cut in 1..18 {
@@ -384,7 +389,10 @@ mod tests {
         let size = bytes.len() / 3;
         bytes[size + 4] ^= 0x40;
         let verdicts = received(&mut decoder, &bytes);
-        assert!(matches!(verdicts[..], [Ok(_), Err(BadFrame::Checksum | BadFrame::Malformed), Ok(_)]), "{verdicts:?}");
+        assert!(
+            matches!(verdicts[..], [Ok(_), Err(BadFrame::Checksum | BadFrame::Malformed), Ok(_)]),
+            "{verdicts:?}"
+        );
     }
 
     #[test]
@@ -403,11 +411,10 @@ mod tests {
     fn a_line_without_an_end_is_too_long_once() {
         let mut decoder = decoder();
         let bytes = [b"1,2\n".as_slice(), &vec![b'7'; 3 * LONGEST_LINE], b"\n3,4\n"].concat();
-        assert_eq!(received(&mut decoder, &bytes), [
-            Ok(vec![1.0, 2.0]),
-            Err(BadFrame::TooLong),
-            Ok(vec![3.0, 4.0])
-        ]);
+        assert_eq!(
+            received(&mut decoder, &bytes),
+            [Ok(vec![1.0, 2.0]), Err(BadFrame::TooLong), Ok(vec![3.0, 4.0])]
+        );
     }
 
     #[test]

@@ -14,11 +14,7 @@ pub fn array(line: &[u8], names: &Names, columns: &[Role]) -> Result<Frame, BadF
 }
 
 /// Reads an object; `role` tells what the name of the `i`-th value is.
-pub fn object(
-    line: &[u8],
-    names: &Names,
-    role: impl FnMut(usize, &[u8]) -> Role,
-) -> Result<Frame, BadFrame> {
+pub fn object(line: &[u8], names: &Names, role: impl FnMut(usize, &[u8]) -> Role) -> Result<Frame, BadFrame> {
     let mut frame = Filling::new(names);
     verdict(line, |json| json.deserialize_map(Members { frame: &mut frame, role }))?;
     frame.finish()

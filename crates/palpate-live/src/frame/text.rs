@@ -294,10 +294,31 @@ mod tests {
     #[test]
     fn values_are_separated_by_commas_semicolons_tabs_or_blanks() {
         let lines = [
-            "1.5,-2", "1.5, -2", " 1.5 , -2 \r", "1.5,-2,", "1.5;-2", "1,5;-2", "1,5;-2,0;", "1.5\t-2", "1,5\t-2\t",
-            "1.5 -2", "1,5 -2", "1,5   -2,0", "\u{FEFF}1.5,-2", "+1.5,-2e0", "a:1.5,b:-2", "b:-2,a:1.5", "A:1.5\tB:-2",
-            "a=1.5 b=-2", "a = 1.5, b = -2", "a:1,5;b:-2,0", "a:1,5 b:-2", "x:text,a:1.5,b:-2", "[1.5, -2]",
-            r#"{"b": -2, "A": 1.5}"#, r#"{"a":1.5,"more":{"a":[7]},"b":-2,"s":"x","z":null}"#,
+            "1.5,-2",
+            "1.5, -2",
+            " 1.5 , -2 \r",
+            "1.5,-2,",
+            "1.5;-2",
+            "1,5;-2",
+            "1,5;-2,0;",
+            "1.5\t-2",
+            "1,5\t-2\t",
+            "1.5 -2",
+            "1,5 -2",
+            "1,5   -2,0",
+            "\u{FEFF}1.5,-2",
+            "+1.5,-2e0",
+            "a:1.5,b:-2",
+            "b:-2,a:1.5",
+            "A:1.5\tB:-2",
+            "a=1.5 b=-2",
+            "a = 1.5, b = -2",
+            "a:1,5;b:-2,0",
+            "a:1,5 b:-2",
+            "x:text,a:1.5,b:-2",
+            "[1.5, -2]",
+            r#"{"b": -2, "A": 1.5}"#,
+            r#"{"a":1.5,"more":{"a":[7]},"b":-2,"s":"x","z":null}"#,
         ];
         for line in lines {
             assert_eq!(reading(line), Ok(vec![1.5, -2.0]), "{line}");
@@ -361,7 +382,15 @@ mod tests {
             Ok(Line::Whole(frame)) => frame,
             other => panic!("{other:?}"),
         };
-        for line in ["t:2,a:1,b:2", "time:2,a:1,b:2", "time_s:2,a:1,b:2", "ms:2000,a:1,b:2", "Time_ms:2000,a:1,b:2", "us:2000000,a:1,b:2", "micros:2e6,a:1,b:2"] {
+        for line in [
+            "t:2,a:1,b:2",
+            "time:2,a:1,b:2",
+            "time_s:2,a:1,b:2",
+            "ms:2000,a:1,b:2",
+            "Time_ms:2000,a:1,b:2",
+            "us:2000000,a:1,b:2",
+            "micros:2e6,a:1,b:2",
+        ] {
             assert_eq!(frame(line).device_time, Some(std::time::Duration::from_secs(2)), "{line}");
         }
         assert_eq!(frame("n:4294967297,a:1,b:2").sequence, Some(1));

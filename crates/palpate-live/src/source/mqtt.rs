@@ -3,7 +3,8 @@
 use super::{Address, BackOff, CONNECT, LOOK, Outlet, forget};
 use crate::input::Arrival;
 use rumqttc::{
-    AsyncClient, ConnectionError, Event, EventLoop, MqttOptions, NetworkOptions, Packet, QoS, SubscribeReasonCode,
+    AsyncClient, ConnectionError, Event, EventLoop, MqttOptions, NetworkOptions, Packet, QoS,
+    SubscribeReasonCode,
 };
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;

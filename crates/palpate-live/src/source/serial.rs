@@ -22,7 +22,9 @@ fn complaint(path: &Path, error: serialport::Error) -> io::Error {
     let error = io::Error::from(error);
     let remedy = match error.kind() {
         io::ErrorKind::NotFound => "; it is opened as soon as it is plugged in",
-        io::ErrorKind::PermissionDenied => "; add yourself to the group that owns it, often `dialout`, and log in again",
+        io::ErrorKind::PermissionDenied => {
+            "; add yourself to the group that owns it, often `dialout`, and log in again"
+        }
         _ => "",
     };
     io::Error::new(error.kind(), format!("cannot open {}: {error}{remedy}", path.display()))

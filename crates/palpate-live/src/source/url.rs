@@ -118,10 +118,18 @@ impl SourceUrl {
             if port.is_empty() {
                 return Err("the port is missing; write `serial:///dev/ttyACM0`".to_owned());
             }
-            let baud = query.take("baud", BAUD, |baud| (1..=GREATEST_BAUD).contains(baud), "a whole number of 1 to 20000000")?;
+            let baud = query.take(
+                "baud",
+                BAUD,
+                |baud| (1..=GREATEST_BAUD).contains(baud),
+                "a whole number of 1 to 20000000",
+            )?;
             Self::Serial { port: port.into(), baud, columns: query.columns()? }
         } else if let Some(server) = body.strip_prefix("tcp://") {
-            Self::Tcp { server: address(server, None, Some("`tcp://192.168.1.20:5000`"))?, columns: query.columns()? }
+            Self::Tcp {
+                server: address(server, None, Some("`tcp://192.168.1.20:5000`"))?,
+                columns: query.columns()?,
+            }
         } else if let Some(at) = body.strip_prefix("udp://") {
             Self::Udp { at: address(at, None, None)?, columns: query.columns()? }
         } else if let Some(rest) = body.strip_prefix("mqtt://") {
@@ -193,7 +201,9 @@ impl<'a> Query<'a> {
         let columns: Vec<String> = columns.split(',').map(str::to_owned).collect();
         if columns.iter().any(String::is_empty) {
             let columns = columns.join(",");
-            return Err(format!("columns `{columns}` has an empty name; write names separated by commas, as in `a,b,t`"));
+            return Err(format!(
+                "columns `{columns}` has an empty name; write names separated by commas, as in `a,b,t`"
+            ));
         }
         Ok(columns)
     }
@@ -223,7 +233,10 @@ fn address(text: &str, port: Option<u16>, example: Option<&str>) -> Result<Addre
     };
     let port = match given {
         Some(given) => {
-            let number = given.parse().ok().filter(|port| *port > 0 && given.bytes().all(|byte| byte.is_ascii_digit()));
+            let number = given
+                .parse()
+                .ok()
+                .filter(|port| *port > 0 && given.bytes().all(|byte| byte.is_ascii_digit()));
             number.ok_or_else(|| format!("port `{given}` must be a whole number of 1 to 65535"))?
         }
         None => port.ok_or_else(|| format!("`{text}` has no port; write `{text}:5000`"))?,
@@ -241,7 +254,9 @@ fn address(text: &str, port: Option<u16>, example: Option<&str>) -> Result<Addre
     }
     let odd = |c: char| !(c.is_alphanumeric() || matches!(c, '.' | '-' | '_'));
     if let (None, Some(odd)) = (bare, host.chars().find(|c| odd(*c))) {
-        return Err(format!("host `{host}` has `{odd}`; a host is a name, or an address, of IPv6 in brackets"));
+        return Err(format!(
+            "host `{host}` has `{odd}`; a host is a name, or an address, of IPv6 in brackets"
+        ));
     }
     Ok(Address { host: host.to_owned(), port })
 }
@@ -345,14 +360,23 @@ mod tests {
         let topic = "[^?+#\\pC]{1,20}";
         prop_oneof![
             Just(SourceUrl::Stdin),
-            (path(), 1..=GREATEST_BAUD, columns())
-                .prop_map(|(port, baud, columns)| SourceUrl::Serial { port, baud, columns }),
+            (path(), 1..=GREATEST_BAUD, columns()).prop_map(|(port, baud, columns)| SourceUrl::Serial {
+                port,
+                baud,
+                columns
+            }),
             (address(), columns()).prop_map(|(server, columns)| SourceUrl::Tcp { server, columns }),
             (address(), columns()).prop_map(|(at, columns)| SourceUrl::Udp { at, columns }),
-            (address(), topic, columns())
-                .prop_map(|(broker, topic, columns)| SourceUrl::Mqtt { broker, topic, columns }),
-            (path(), 1e-3..1e5, any::<u64>())
-                .prop_map(|(rig, rate_hz, seed)| SourceUrl::Simulated { rig, rate_hz, seed }),
+            (address(), topic, columns()).prop_map(|(broker, topic, columns)| SourceUrl::Mqtt {
+                broker,
+                topic,
+                columns
+            }),
+            (path(), 1e-3..1e5, any::<u64>()).prop_map(|(rig, rate_hz, seed)| SourceUrl::Simulated {
+                rig,
+                rate_hz,
+                seed
+            }),
         ]
     }
 
