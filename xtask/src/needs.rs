@@ -61,7 +61,7 @@ pub const PYTHON: Need = Need {
     },
 };
 
-const NEEDS: [Need; 4] = [
+const NEEDS: [Need; 6] = [
     NEXTEST,
     PYTHON,
     Need {
@@ -82,6 +82,26 @@ const NEEDS: [Need; 4] = [
         without: Without::Skips {
             tests: &["crates/palpate-cli/tests/cli/browser.rs"],
             remedy: "install Debian's chromium, or name the program in PALPATE_CHROMIUM",
+        },
+    },
+    Need {
+        name: "the MQTT broker mosquitto",
+        variable: Some("PALPATE_MOSQUITTO"),
+        found: |_, named| named.unwrap_or(Path::new("/usr/sbin/mosquitto")).is_file(),
+        packages: &["mosquitto"],
+        without: Without::Skips {
+            tests: &["crates/palpate-live/tests/sources.rs"],
+            remedy: "install Debian's mosquitto, or name the program in PALPATE_MOSQUITTO",
+        },
+    },
+    Need {
+        name: "a C compiler",
+        variable: None,
+        found: |_, _| run::answers("cc", &["--version"]),
+        packages: &["gcc", "libc6-dev"],
+        without: Without::Skips {
+            tests: &["crates/palpate-live/tests/firmware.rs"],
+            remedy: "install Debian's gcc",
         },
     },
 ];

@@ -16,8 +16,10 @@ pub enum Input {
 /// What a source brings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Arrival {
-    /// The device is there; its name.
+    /// The device is there, and its bytes begin with a frame; its name.
     Opened(String),
+    /// The device is there, and sends already: its bytes may begin amid a frame; its name.
+    Joined(String),
     /// Bytes of a stream, in order, cut anywhere.
     Bytes(Vec<u8>),
     /// Bytes of a message, as of UDP and MQTT: whole frames.

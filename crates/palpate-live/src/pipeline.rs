@@ -23,7 +23,7 @@ pub fn run(session: &mut Session, clock: HostClock, inputs: &Receiver<Input>, si
         match inputs.recv_timeout(next_state.saturating_duration_since(Instant::now())) {
             Ok(Input::Arrived(arrived)) => {
                 match &arrived.arrival {
-                    Arrival::Opened(name) => source = Some(name.clone()),
+                    Arrival::Opened(name) | Arrival::Joined(name) => source = Some(name.clone()),
                     Arrival::Lost(_) => source = None,
                     Arrival::Ended => goes_on = false,
                     Arrival::Bytes(_) | Arrival::Message(_) => {}

@@ -1,43 +1,17 @@
 //! Frames: the bytes that a board sends for one reading.
 
+mod binary;
+mod channel;
+mod decoder;
+mod json;
+mod names;
 mod text;
 
-pub use text::TextDecoder;
+pub use binary::encode_into;
+pub use channel::Channel;
+pub use decoder::{ColumnsError, Decoder};
 
-use palpate_estimators::recording::Column;
-use palpate_estimators::setup::Setup;
-use palpate_mechanics::units::Unit;
 use std::time::Duration;
-
-/// Channel of a frame.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Channel {
-    /// Name of its sensor.
-    pub name: String,
-    /// Name by which a board calls it: the column of the recordings that the locator learnt from, where that has a name.
-    pub label: String,
-    /// Unit of the board's numbers: that of the recordings.
-    pub unit: Unit,
-}
-
-impl Channel {
-    /// Channels of the boards of a setup, in the order of its sensors.
-    pub fn all_of(setup: &Setup) -> Vec<Self> {
-        let columns = setup.recording_columns().channels;
-        let sensors = setup.layout().sensors().iter();
-        sensors
-            .zip(columns)
-            .map(|(sensor, column)| Self {
-                name: sensor.name.clone(),
-                label: match column.column {
-                    Column::Name(label) => label,
-                    Column::Number(_) => sensor.name.clone(),
-                },
-                unit: column.unit,
-            })
-            .collect()
-    }
-}
 
 /// A frame that has been decoded.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,5 +67,21 @@ impl BadFrame {
             Self::Checksum => "the checksum is wrong",
             Self::Malformed => "not a frame",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Channel;
+    use palpate_mechanics::units::Unit;
+
+    /// Raw channels of these labels, of sensors s1, s2, …
+    pub fn channels(labels: &[&str]) -> Vec<Channel> {
+        let channel = |(i, label): (usize, &&str)| Channel {
+            name: format!("s{}", i + 1),
+            label: (*label).to_owned(),
+            unit: Unit::NONE,
+        };
+        labels.iter().enumerate().map(channel).collect()
     }
 }

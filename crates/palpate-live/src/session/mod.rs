@@ -8,7 +8,7 @@ mod timeline;
 pub use health::ChannelHealth;
 
 use crate::event::{Event, EventRecord};
-use crate::frame::{BadFrame, Channel, Frame, TextDecoder};
+use crate::frame::{BadFrame, Channel, ColumnsError, Decoder, Frame};
 use crate::input::{Arrival, Arrived, Command};
 use crate::sample::Sample;
 use crate::stamp::Stamp;
@@ -65,7 +65,7 @@ pub struct Session<'a> {
     locator: &'a Locator,
     channels: Vec<Channel>,
     extent: Extent,
-    decoder: TextDecoder,
+    decoder: Decoder,
     timeline: Timeline,
     taring: Taring,
     contact: ContactWatch,
@@ -81,7 +81,7 @@ impl<'a> Session<'a> {
         Self {
             locator,
             extent,
-            decoder: TextDecoder::new(&channels),
+            decoder: Decoder::new(&channels),
             timeline: Timeline::default(),
             taring: Taring::new(locator, config.tare),
             contact: ContactWatch::new(extent),
@@ -89,6 +89,15 @@ impl<'a> Session<'a> {
             counters: Counters::default(),
             channels,
         }
+    }
+
+    /// Names the values of frames that have no names: every channel, time (`t`, `ms`, `us`), number of the frame (`n`), and others, which are left
+    /// out.
+    ///
+    /// # Errors
+    /// [`ColumnsError`] unless every channel is named once.
+    pub fn set_columns(&mut self, columns: &[String]) -> Result<(), ColumnsError> {
+        self.decoder.set_columns(columns)
     }
 
     /// Channels of its frames.
@@ -118,24 +127,26 @@ impl<'a> Session<'a> {
             self.tell(at, Event::ClockSet { by_s }, out);
         }
         match &arrived.arrival {
-            Arrival::Opened(name) => self.tell(at, Event::SourceOpened { name: name.clone() }, out),
+            Arrival::Opened(name) => {
+                self.decoder.open();
+                self.tell(at, Event::SourceOpened { name: name.clone() }, out);
+            }
+            Arrival::Joined(name) => {
+                self.decoder.join();
+                self.tell(at, Event::SourceOpened { name: name.clone() }, out);
+            }
             Arrival::Lost(why) => {
-                self.decoder.reset();
+                self.decoder.open();
                 self.tell(at, Event::SourceLost { why: why.clone() }, out);
             }
             Arrival::Ended => {
-                self.decode(at, |decoder, hand_on| decoder.end_message(hand_on), out);
+                self.decode(at, |decoder, hand_on| decoder.end(hand_on), out);
                 self.tell(at, Event::SourceEnded, out);
             }
             Arrival::Bytes(bytes) => self.decode(at, |decoder, hand_on| decoder.receive(bytes, hand_on), out),
-            Arrival::Message(bytes) => self.decode(
-                at,
-                |decoder, hand_on| {
-                    decoder.receive(bytes, &mut *hand_on);
-                    decoder.end_message(hand_on);
-                },
-                out,
-            ),
+            Arrival::Message(bytes) => {
+                self.decode(at, |decoder, hand_on| decoder.receive_message(bytes, hand_on), out);
+            }
         }
     }
 
@@ -150,7 +161,7 @@ impl<'a> Session<'a> {
     fn decode(
         &mut self,
         at: Stamp,
-        decode: impl FnOnce(&mut TextDecoder, &mut dyn FnMut(Result<Frame, BadFrame>)),
+        decode: impl FnOnce(&mut Decoder, &mut dyn FnMut(Result<Frame, BadFrame>)),
         out: &mut Vec<Output>,
     ) {
         let mut frames = Vec::new();

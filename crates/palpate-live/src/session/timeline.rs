@@ -1,5 +1,6 @@
 //! Times of readings, and stretches without any.
 
+use crate::device_clock::DeviceClock;
 use crate::frame::Frame;
 use crate::stamp::Stamp;
 use std::time::Duration;
@@ -14,6 +15,7 @@ pub struct Timeline {
     last_ns: u64,
     last_arrival: Option<Duration>,
     last_sequence: Option<u32>,
+    device_clock: DeviceClock,
     /// Start of the second that is counted, and readings in it.
     second: (Duration, u32),
     rate_hz: f64,
@@ -59,7 +61,9 @@ impl Timeline {
         self.count(at.elapsed);
         self.last_arrival = Some(at.elapsed);
         self.last_sequence = frame.sequence;
-        self.last_ns = self.unix_ns(at).max(self.last_ns);
+        let elapsed =
+            frame.device_time.map_or(at.elapsed, |device| self.device_clock.host_time(device, at.elapsed));
+        self.last_ns = self.unix_ns(Stamp { elapsed, ..at }).max(self.last_ns);
         (self.last_ns, gap)
     }
 
@@ -70,8 +74,13 @@ impl Timeline {
 
     fn gap(&self, now: Duration, sequence: Option<u32>) -> Option<Gap> {
         let seconds = now.saturating_sub(self.last_arrival?).as_secs_f64();
-        let lost_frames =
-            self.last_sequence.zip(sequence).map(|(last, next)| next.wrapping_sub(last).saturating_sub(1));
+        // A number that goes back is that of a board that has begun anew.
+        let lost_frames = self
+            .last_sequence
+            .zip(sequence)
+            .map(|(last, next)| next.wrapping_sub(last))
+            .filter(|step| *step < 1 << 31)
+            .map(|step| step.saturating_sub(1));
         let longest_s =
             if self.rate_hz > 0.0 { GAP_S.max(GAP_PERIODS / self.rate_hz) } else { f64::INFINITY };
         (seconds > longest_s || lost_frames.is_some_and(|lost| lost > 0))
@@ -91,4 +100,36 @@ impl Timeline {
 
 fn offset_ns(at: Stamp) -> i128 {
     i128::from(at.unix_ns) - at.elapsed.as_nanos() as i128
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn next(timeline: &mut Timeline, ms: u64, sequence: u32, device_ms: u64) -> (u64, Option<Gap>) {
+        let elapsed = Duration::from_millis(ms);
+        let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
+        timeline.look_at_clock(at);
+        let device_time = Some(Duration::from_millis(device_ms));
+        timeline.next(at, &Frame { reading: vec![], sequence: Some(sequence), device_time })
+    }
+
+    #[test]
+    fn times_are_those_of_the_board() {
+        let mut timeline = Timeline::default();
+        let start_ns = next(&mut timeline, 1000, 0, 50).0;
+        // Late by 7 ms, then at its time.
+        assert_eq!(next(&mut timeline, 1017, 1, 60).0, start_ns + 10_000_000);
+        assert_eq!(next(&mut timeline, 1020, 2, 70).0, start_ns + 20_000_000);
+        assert_eq!(next(&mut timeline, 1037, 3, 80).0, start_ns + 30_000_000);
+    }
+
+    #[test]
+    fn frames_that_are_lost_are_counted_around_the_wrap_and_not_over_a_reset() {
+        let mut timeline = Timeline::default();
+        next(&mut timeline, 0, u32::MAX - 1, 0);
+        assert_eq!(next(&mut timeline, 10, 2, 10).1.and_then(|gap| gap.lost_frames), Some(3));
+        assert_eq!(next(&mut timeline, 20, 0, 0).1, None);
+        assert_eq!(next(&mut timeline, 30, 2, 10).1.and_then(|gap| gap.lost_frames), Some(1));
+    }
 }

@@ -1,17 +1,33 @@
 //! Sources of bytes: boards, networks, files, and a board that is simulated.
 
+mod mqtt;
+mod port;
+mod serial;
 mod simulated;
 mod stdin;
+mod tcp;
+mod udp;
 mod url;
 
-pub use url::{SourceUrl, SourceUrlError};
+pub use url::{Address, SourceUrl, SourceUrlError};
 
 use crate::input::{Arrival, Arrived, Input};
 use crate::stamp::HostClock;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::SyncSender;
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Longest time in which a source's thread does not look for commands, or its end.
+const LOOK: Duration = Duration::from_millis(10);
+/// First and longest pause before a device is looked for again; each is twice the one before.
+const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(5)];
+/// Longest time that a host is given to take a connection.
+const CONNECT: Duration = Duration::from_secs(2);
+/// Commands that wait for a device at most.
+const COMMANDS: usize = 16;
 
 /// A source that cannot be opened at all; one that merely is not there is waited for.
 #[derive(Debug, thiserror::Error)]
@@ -32,10 +48,26 @@ pub enum SourceError {
     Thread(#[from] std::io::Error),
 }
 
-/// An open source: a thread that brings arrivals until it is dropped.
+/// A command that is not sent to a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SendError {
+    /// The source has no way back.
+    #[error("the source takes no commands; serial ports, TCP and MQTT with a topic without `+` and `#` do")]
+    OneWay,
+    /// The device is not there.
+    #[error("the device is not there; the command was not sent")]
+    Away,
+    /// The device takes commands too slowly.
+    #[error("{COMMANDS} commands wait for the device already; the command was not sent")]
+    Full,
+}
+
+/// An open source: a thread that brings arrivals until it is dropped, within 100 ms of which it ends.
 #[derive(Debug)]
 pub struct Source {
     stop: Arc<AtomicBool>,
+    open: Arc<AtomicBool>,
+    commands: Option<SyncSender<Vec<u8>>>,
 }
 
 impl Drop for Source {
@@ -49,17 +81,41 @@ pub(crate) struct Outlet {
     to: SyncSender<Input>,
     clock: HostClock,
     stop: Arc<AtomicBool>,
+    open: Arc<AtomicBool>,
 }
 
 impl Outlet {
-    /// Hands an arrival on, stamped now; false once nobody wants more.
+    /// Hands an arrival on, stamped now; false once nobody wants more. While the session is behind it waits, and what the device sends gathers in
+    /// the buffers of the system.
     pub(crate) fn send(&self, arrival: Arrival) -> bool {
-        !self.is_stopped() && self.to.send(Input::Arrived(Arrived { at: self.clock.now(), arrival })).is_ok()
+        match arrival {
+            Arrival::Opened(_) | Arrival::Joined(_) => self.open.store(true, Ordering::Relaxed),
+            Arrival::Lost(_) | Arrival::Ended => self.open.store(false, Ordering::Relaxed),
+            Arrival::Bytes(_) | Arrival::Message(_) => {}
+        }
+        let mut input = Input::Arrived(Arrived { at: self.clock.now(), arrival });
+        while !self.is_stopped() {
+            match self.to.try_send(input) {
+                Ok(()) => return true,
+                Err(TrySendError::Disconnected(_)) => return false,
+                Err(TrySendError::Full(back)) => input = back,
+            }
+            thread::sleep(Duration::from_millis(1));
+        }
+        false
     }
 
     /// True once the source is to end.
     pub(crate) fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Waits, unless the source is to end.
+    fn pause(&self, pause: Duration) {
+        let end = Instant::now() + pause;
+        while !self.is_stopped() && Instant::now() < end {
+            thread::sleep(LOOK);
+        }
     }
 }
 
@@ -74,14 +130,73 @@ impl Source {
         clock: HostClock,
         to: SyncSender<Input>,
     ) -> Result<Self, SourceError> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let outlet = Outlet { to, clock, stop: Arc::clone(&stop) };
-        match url {
-            SourceUrl::Stdin => stdin::open(outlet)?,
+        let (stop, open) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+        let outlet = Outlet { to, clock, stop: Arc::clone(&stop), open: Arc::clone(&open) };
+        let (commands, for_device) = sync_channel(COMMANDS);
+        let mut takes_commands = true;
+        match url.clone() {
+            SourceUrl::Stdin => {
+                takes_commands = false;
+                stdin::open(outlet)?;
+            }
+            SourceUrl::Serial { port, baud, .. } => {
+                spawn(move || serial::run(&outlet, &for_device, &port, baud))?;
+            }
+            SourceUrl::Tcp { server, .. } => spawn(move || tcp::run(&outlet, &for_device, &server))?,
+            SourceUrl::Udp { at, .. } => {
+                takes_commands = false;
+                spawn(move || udp::run(&outlet, &for_device, &at))?;
+            }
+            SourceUrl::Mqtt { broker, topic, .. } => {
+                takes_commands = !topic.contains(['+', '#']);
+                spawn(move || mqtt::run(&outlet, &for_device, &broker, &topic))?;
+            }
             SourceUrl::Simulated { rig, rate_hz, seed } => {
-                simulated::open(outlet, &folder.join(rig), *rate_hz, *seed)?;
+                takes_commands = false;
+                simulated::open(outlet, &folder.join(rig), rate_hz, seed)?;
             }
         }
-        Ok(Self { stop })
+        Ok(Self { stop, open, commands: takes_commands.then_some(commands) })
     }
+
+    /// Sends a command to the device: bytes to a serial port or a TCP server, a message to the topic of an MQTT board with `/command` behind it.
+    /// Returns at once; the source's thread sends it.
+    ///
+    /// # Errors
+    /// [`SendError`] where the source has no way back, the device is away, or too many commands wait for it.
+    pub fn send(&self, command: &[u8]) -> Result<(), SendError> {
+        let commands = self.commands.as_ref().ok_or(SendError::OneWay)?;
+        if !self.open.load(Ordering::Relaxed) {
+            return Err(SendError::Away);
+        }
+        commands.try_send(command.to_vec()).map_err(|error| match error {
+            TrySendError::Full(_) => SendError::Full,
+            TrySendError::Disconnected(_) => SendError::Away,
+        })
+    }
+}
+
+fn spawn(run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    thread::Builder::new().name("source".to_owned()).spawn(run).map(|_| ())
+}
+
+/// Pauses before a device is looked for again.
+struct BackOff(Duration);
+
+impl BackOff {
+    fn new() -> Self {
+        Self(PAUSES[0])
+    }
+
+    /// The next pause.
+    fn next(&mut self) -> Duration {
+        let pause = self.0;
+        self.0 = (2 * pause).min(PAUSES[1]);
+        pause
+    }
+}
+
+/// Leaves out commands that were meant for a device as it was before it went away.
+fn forget(commands: &Receiver<Vec<u8>>) {
+    while commands.try_recv().is_ok() {}
 }

@@ -9,6 +9,38 @@ use std::str::FromStr;
 pub enum SourceUrl {
     /// `-`: the standard input.
     Stdin,
+    /// `serial:///dev/ttyACM0?baud=115200`: a serial port.
+    Serial {
+        /// Path, on Windows name, of the port.
+        port: PathBuf,
+        /// Bits a second.
+        baud: u32,
+        /// Names of the values of frames that have no names; none where they are the channels in their order.
+        columns: Vec<String>,
+    },
+    /// `tcp://host:port`: a server that sends frames to whoever connects.
+    Tcp {
+        /// The server.
+        server: Address,
+        /// Names of the values of frames that have no names.
+        columns: Vec<String>,
+    },
+    /// `udp://:port`: datagrams that come to a port of this machine.
+    Udp {
+        /// The port, and the address of this machine that it is opened at; all of IPv4 where the host is empty.
+        at: Address,
+        /// Names of the values of frames that have no names.
+        columns: Vec<String>,
+    },
+    /// `mqtt://host[:port]/topic`: messages of an MQTT broker.
+    Mqtt {
+        /// The broker.
+        broker: Address,
+        /// The topic, or a filter of topics.
+        topic: String,
+        /// Names of the values of frames that have no names.
+        columns: Vec<String>,
+    },
     /// `simulated:rig.toml?rate=1000&seed=0`: a simulated board.
     Simulated {
         /// The rig that it has on its bench.
@@ -20,16 +52,42 @@ pub enum SourceUrl {
     },
 }
 
+/// A host and a port.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Address {
+    /// Name or address of the host; an address of IPv6 without brackets.
+    pub host: String,
+    /// The port, from 1.
+    pub port: u16,
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { host, port } = self;
+        if host.contains(':') { write!(f, "[{host}]:{port}") } else { write!(f, "{host}:{port}") }
+    }
+}
+
+/// Bits a second of a serial port, unless the URL says others.
+const BAUD: u32 = 115_200;
+/// Greatest number of bits a second.
+const GREATEST_BAUD: u32 = 20_000_000;
+/// Port of MQTT, unless the URL says another.
+const MQTT_PORT: u16 = 1883;
+
 /// Text that is no URL of a source.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SourceUrlError {
     /// A scheme that no source has.
-    #[error("`{text}` is no source; sources are `-` and `simulated:rig.toml?rate=1000`")]
+    #[error(
+        "`{text}` is no source; sources are `-`, `serial:///dev/ttyACM0?baud=115200`, `tcp://host:port`, `udp://:port`, \
+         `mqtt://host/topic` and `simulated:rig.toml?rate=1000`"
+    )]
     Scheme {
         /// The text.
         text: String,
     },
-    /// A parameter that the source does not have, or a value that it cannot take.
+    /// A part that the source does not have, or a value that it cannot take.
     #[error("`{text}`: {problem}")]
     Parameter {
         /// The URL.
@@ -39,48 +97,293 @@ pub enum SourceUrlError {
     },
 }
 
+impl SourceUrl {
+    /// Names of the values of frames that have no names; none where they are the channels in their order.
+    pub fn columns(&self) -> &[String] {
+        match self {
+            Self::Serial { columns, .. }
+            | Self::Tcp { columns, .. }
+            | Self::Udp { columns, .. }
+            | Self::Mqtt { columns, .. } => columns,
+            Self::Stdin | Self::Simulated { .. } => &[],
+        }
+    }
+
+    fn parse(text: &str) -> Result<Option<Self>, String> {
+        let (body, query) = text.split_once('?').unwrap_or((text, ""));
+        let mut query = Query(query.split('&').filter(|pair| !pair.is_empty()).collect());
+        let url = if body == "-" {
+            Self::Stdin
+        } else if let Some(port) = body.strip_prefix("serial://") {
+            if port.is_empty() {
+                return Err("the port is missing; write `serial:///dev/ttyACM0`".to_owned());
+            }
+            let baud = query.take(
+                "baud",
+                BAUD,
+                |baud| (1..=GREATEST_BAUD).contains(baud),
+                "a whole number of 1 to 20000000",
+            )?;
+            Self::Serial { port: port.into(), baud, columns: query.columns()? }
+        } else if let Some(server) = body.strip_prefix("tcp://") {
+            Self::Tcp {
+                server: address(server, None, Some("`tcp://192.168.1.20:5000`"))?,
+                columns: query.columns()?,
+            }
+        } else if let Some(at) = body.strip_prefix("udp://") {
+            Self::Udp { at: address(at, None, None)?, columns: query.columns()? }
+        } else if let Some(rest) = body.strip_prefix("mqtt://") {
+            let missing = "the topic is missing; write `mqtt://host/topic`";
+            let (broker, topic) = rest.split_once('/').ok_or(missing)?;
+            if topic.is_empty() {
+                return Err(missing.to_owned());
+            }
+            let broker = address(broker, Some(MQTT_PORT), Some("`mqtt://192.168.1.20/topic`"))?;
+            Self::Mqtt { broker, topic: checked_topic(topic)?, columns: query.columns()? }
+        } else if let Some(rig) = body.strip_prefix("simulated:") {
+            let allowed = "a number greater than 0 and at most 100000 Hz";
+            let rate_hz = query.take("rate", 100.0, |rate| *rate > 0.0 && *rate <= 1e5, allowed)?;
+            let seed = query.take("seed", 0, |_| true, "a whole number of at least 0")?;
+            Self::Simulated { rig: rig.into(), rate_hz, seed }
+        } else {
+            return Ok(None);
+        };
+        query.end(&url)?;
+        Ok(Some(url))
+    }
+
+    /// Parameters that its kind takes.
+    fn parameters(&self) -> &'static str {
+        match self {
+            Self::Stdin => "none",
+            Self::Serial { .. } => "`baud` and `columns`",
+            Self::Tcp { .. } | Self::Udp { .. } | Self::Mqtt { .. } => "`columns`",
+            Self::Simulated { .. } => "`rate` and `seed`",
+        }
+    }
+}
+
 impl FromStr for SourceUrl {
     type Err = SourceUrlError;
 
     fn from_str(text: &str) -> Result<Self, SourceUrlError> {
-        if text == "-" {
-            return Ok(Self::Stdin);
+        match Self::parse(text) {
+            Ok(Some(url)) => Ok(url),
+            Ok(None) => Err(SourceUrlError::Scheme { text: text.to_owned() }),
+            Err(problem) => Err(SourceUrlError::Parameter { text: text.to_owned(), problem }),
         }
-        let Some(rest) = text.strip_prefix("simulated:") else {
-            return Err(SourceUrlError::Scheme { text: text.to_owned() });
-        };
-        let (path, query) = rest.split_once('?').unwrap_or((rest, ""));
-        let (mut rate_hz, mut seed) = (100.0, 0);
-        for pair in query.split('&').filter(|pair| !pair.is_empty()) {
-            let problem = |problem: String| SourceUrlError::Parameter { text: text.to_owned(), problem };
-            match pair.split_once('=') {
-                Some(("rate", value)) => {
-                    rate_hz =
-                        value.parse().ok().filter(|rate| *rate > 0.0 && *rate <= 1e5).ok_or_else(|| {
-                            problem(format!(
-                                "rate `{value}` must be a number greater than 0 and at most 100000 Hz"
-                            ))
-                        })?;
-                }
-                Some(("seed", value)) => {
-                    seed = value.parse().map_err(|_| {
-                        problem(format!("seed `{value}` must be a whole number of at least 0"))
-                    })?;
-                }
-                _ => return Err(problem(format!("`{pair}` is no parameter; known are `rate` and `seed`"))),
+    }
+}
+
+/// Parameters that were not taken yet, as `name=value`.
+struct Query<'a>(Vec<&'a str>);
+
+impl<'a> Query<'a> {
+    /// Takes a parameter that may be given once.
+    fn take<T: FromStr>(
+        &mut self,
+        name: &str,
+        default: T,
+        allows: impl Fn(&T) -> bool,
+        allowed: &str,
+    ) -> Result<T, String> {
+        match self.value(name)? {
+            None => Ok(default),
+            Some(value) => {
+                let problem = || format!("{name} `{value}` must be {allowed}");
+                value.parse().ok().filter(allows).ok_or_else(problem)
             }
         }
-        Ok(Self::Simulated { rig: path.into(), rate_hz, seed })
     }
+
+    fn columns(&mut self) -> Result<Vec<String>, String> {
+        let Some(columns) = self.value("columns")? else { return Ok(Vec::new()) };
+        let columns: Vec<String> = columns.split(',').map(str::to_owned).collect();
+        if columns.iter().any(String::is_empty) {
+            let columns = columns.join(",");
+            return Err(format!(
+                "columns `{columns}` has an empty name; write names separated by commas, as in `a,b,t`"
+            ));
+        }
+        Ok(columns)
+    }
+
+    fn value(&mut self, name: &str) -> Result<Option<&'a str>, String> {
+        let is = |pair: &&str| pair.split_once('=').is_some_and(|(key, _)| key == name);
+        let Some(place) = self.0.iter().position(is) else { return Ok(None) };
+        let pair = self.0.remove(place);
+        if self.0.iter().any(is) {
+            return Err(format!("{name} is given twice; give it once"));
+        }
+        Ok(pair.split_once('=').map(|(_, value)| value))
+    }
+
+    fn end(&self, url: &SourceUrl) -> Result<(), String> {
+        let known = url.parameters();
+        self.0.first().map_or(Ok(()), |pair| Err(format!("`{pair}` is no parameter; known are {known}")))
+    }
+}
+
+/// Reads `host:port`; without a default the port is needed, and with an example the host.
+fn address(text: &str, port: Option<u16>, example: Option<&str>) -> Result<Address, String> {
+    let ends = text.rfind(']').map_or(0, |end| end + 1);
+    let (host, given) = match text[ends..].rfind(':') {
+        Some(colon) => (&text[..ends + colon], Some(&text[ends + colon + 1..])),
+        None => (text, None),
+    };
+    let port = match given {
+        Some(given) => {
+            let number = given
+                .parse()
+                .ok()
+                .filter(|port| *port > 0 && given.bytes().all(|byte| byte.is_ascii_digit()));
+            number.ok_or_else(|| format!("port `{given}` must be a whole number of 1 to 65535"))?
+        }
+        None => port.ok_or_else(|| format!("`{text}` has no port; write `{text}:5000`"))?,
+    };
+    let bare = host.strip_prefix('[').and_then(|host| host.strip_suffix(']'));
+    let host = match bare {
+        Some(bare) if bare.parse::<std::net::Ipv6Addr>().is_err() => {
+            return Err(format!("`{bare}` must be an address of IPv6, as it stands in brackets"));
+        }
+        Some(bare) => bare,
+        None => host,
+    };
+    if let (true, Some(example)) = (host.is_empty(), example) {
+        return Err(format!("the host is missing; write {example}"));
+    }
+    let odd = |c: char| !(c.is_alphanumeric() || matches!(c, '.' | '-' | '_'));
+    if let (None, Some(odd)) = (bare, host.chars().find(|c| odd(*c))) {
+        return Err(format!(
+            "host `{host}` has `{odd}`; a host is a name, or an address, of IPv6 in brackets"
+        ));
+    }
+    Ok(Address { host: host.to_owned(), port })
+}
+
+/// A topic filter by section 4.7 of MQTT 3.1.1.
+fn checked_topic(topic: &str) -> Result<String, String> {
+    let last = topic.split('/').count() - 1;
+    for (i, level) in topic.split('/').enumerate() {
+        let wild = level.contains(['+', '#']) && level.len() > 1;
+        if wild || (level == "#" && i < last) || topic.contains('\0') || topic.len() > 65_535 {
+            return Err(format!(
+                "topic `{topic}` must have `+` as a whole level, `#` as the last, and at most 65535 bytes"
+            ));
+        }
+    }
+    Ok(topic.to_owned())
 }
 
 impl fmt::Display for SourceUrl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = '?';
         match self {
             Self::Stdin => f.write_str("-"),
+            Self::Serial { port, baud, .. } => {
+                separator = '&';
+                write!(f, "serial://{}?baud={baud}", port.display())
+            }
+            Self::Tcp { server, .. } => write!(f, "tcp://{server}"),
+            Self::Udp { at, .. } => write!(f, "udp://{at}"),
+            Self::Mqtt { broker, topic, .. } => write!(f, "mqtt://{broker}/{topic}"),
             Self::Simulated { rig, rate_hz, seed } => {
                 write!(f, "simulated:{}?rate={rate_hz}&seed={seed}", rig.display())
             }
+        }?;
+        match self.columns() {
+            [] => Ok(()),
+            columns => write!(f, "{separator}columns={}", columns.join(",")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn problem(text: &str) -> String {
+        text.parse::<SourceUrl>().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn urls_have_their_defaults() {
+        let shown = |text: &str| text.parse::<SourceUrl>().unwrap().to_string();
+        for (text, full) in [
+            ("-", "-"),
+            ("serial:///dev/ttyACM0", "serial:///dev/ttyACM0?baud=115200"),
+            ("serial://COM3?columns=a,t&baud=9600", "serial://COM3?baud=9600&columns=a,t"),
+            ("tcp://[::1]:5000", "tcp://[::1]:5000"),
+            ("udp://:5000?columns=n,a", "udp://:5000?columns=n,a"),
+            ("mqtt://broker/lab/+/values", "mqtt://broker:1883/lab/+/values"),
+            ("simulated:rig.toml", "simulated:rig.toml?rate=100&seed=0"),
+        ] {
+            assert_eq!(shown(text), full);
+        }
+    }
+
+    #[test]
+    fn an_error_names_the_value_and_what_is_allowed() {
+        for (text, words) in [
+            ("http://a:1", "sources are `-`"),
+            ("serial://", "write `serial:///dev/ttyACM0`"),
+            ("serial:///dev/x?baud=0", "baud `0` must be a whole number of 1 to 20000000"),
+            ("serial:///dev/x?baud=1&baud=2", "baud is given twice"),
+            ("serial:///dev/x?parity=odd", "`parity=odd` is no parameter; known are `baud` and `columns`"),
+            ("tcp://host", "`host` has no port; write `host:5000`"),
+            ("tcp://:5000", "the host is missing; write `tcp://"),
+            ("tcp://host:70000", "port `70000` must be a whole number of 1 to 65535"),
+            ("tcp://a b:1", "host `a b` has ` `"),
+            ("tcp://[x]:1", "`x` must be an address of IPv6"),
+            ("udp://:5000?columns=a,,b", "columns `a,,b` has an empty name"),
+            ("mqtt://host", "write `mqtt://host/topic`"),
+            ("mqtt://host/a/#/b", "topic `a/#/b` must have"),
+            ("mqtt://me@host/a", "host `me@host` has `@`"),
+            ("simulated:rig.toml?rate=-1", "rate `-1` must be a number greater than 0"),
+        ] {
+            assert!(problem(text).contains(words), "{text}: {}", problem(text));
+        }
+    }
+
+    fn address() -> impl Strategy<Value = Address> {
+        let host = prop_oneof![
+            "[a-z0-9][a-z0-9.-]{0,20}",
+            any::<std::net::Ipv6Addr>().prop_map(|host| host.to_string()),
+        ];
+        (host, 1..=u16::MAX).prop_map(|(host, port)| Address { host, port })
+    }
+
+    fn url() -> impl Strategy<Value = SourceUrl> {
+        let columns = || prop::collection::vec("[^,&?\\pC]{1,8}", 0..4);
+        let path = || "[^?&\\pC]{1,20}".prop_map(PathBuf::from);
+        let topic = "[^?+#\\pC]{1,20}";
+        prop_oneof![
+            Just(SourceUrl::Stdin),
+            (path(), 1..=GREATEST_BAUD, columns()).prop_map(|(port, baud, columns)| SourceUrl::Serial {
+                port,
+                baud,
+                columns
+            }),
+            (address(), columns()).prop_map(|(server, columns)| SourceUrl::Tcp { server, columns }),
+            (address(), columns()).prop_map(|(at, columns)| SourceUrl::Udp { at, columns }),
+            (address(), topic, columns()).prop_map(|(broker, topic, columns)| SourceUrl::Mqtt {
+                broker,
+                topic,
+                columns
+            }),
+            (path(), 1e-3..1e5, any::<u64>()).prop_map(|(rig, rate_hz, seed)| SourceUrl::Simulated {
+                rig,
+                rate_hz,
+                seed
+            }),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn a_url_reads_back_as_it_is_shown(url in url()) {
+            prop_assert_eq!(url.to_string().parse::<SourceUrl>(), Ok(url));
         }
     }
 }

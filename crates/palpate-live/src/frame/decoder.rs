@@ -1,0 +1,485 @@
+//! Frames of a stream or of messages, text or binary.
+
+use super::binary;
+use super::names::{Names, Role};
+use super::text::{Line, TextReader, is_text};
+use super::{BadFrame, Channel, Frame};
+
+/// Most bytes of a line.
+const LONGEST_LINE: usize = 1 << 16;
+
+/// Decoder of the frames of a source: text or binary, whichever it sends.
+///
+/// A stream is text once a line is a frame or a header, and binary once the bytes between two zeros are a frame with its checksum. What it is does
+/// not depend on how its bytes are cut.
+#[derive(Debug)]
+pub struct Decoder {
+    text: TextReader,
+    form: Form,
+    /// Bytes since the last line end (text), the last zero (binary), or the last that is judged (unknown).
+    held: Vec<u8>,
+    /// Unknown form: start of the last line in `held`.
+    line_start: usize,
+    /// Unknown form: lines in `held` that are no text.
+    not_text: u64,
+    /// The start of the present line, or binary frame, is not there.
+    torn_line: bool,
+    torn_binary: bool,
+    /// Bytes are left out until a frame ends, for there were too many.
+    skips: bool,
+    scratch: Vec<u8>,
+}
+
+/// Form of a stream's frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    Unknown,
+    Text,
+    Binary,
+}
+
+/// Names of unnamed values that do not name every channel.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ColumnsError {
+    /// A channel that has no column.
+    #[error(
+        "the columns {columns} have no channel `{channel}`; name every channel, and anything else that a line has"
+    )]
+    Missing {
+        /// The columns.
+        columns: String,
+        /// The channel.
+        channel: String,
+    },
+    /// Two columns of one channel.
+    #[error("the columns {columns} have a channel twice; there are {channels} channels")]
+    Twice {
+        /// The columns.
+        columns: String,
+        /// Number of channels.
+        channels: usize,
+    },
+}
+
+impl Decoder {
+    /// A decoder of frames of these channels, at the start of a stream.
+    pub fn new(channels: &[Channel]) -> Self {
+        Self {
+            text: TextReader::new(Names::new(channels)),
+            form: Form::Unknown,
+            held: Vec::new(),
+            line_start: 0,
+            not_text: 0,
+            torn_line: false,
+            torn_binary: false,
+            skips: false,
+            scratch: Vec::new(),
+        }
+    }
+
+    /// Names the values of frames that have no names: channels, time, number of the frame, and others, which are left out.
+    ///
+    /// # Errors
+    /// [`ColumnsError`] unless every channel is named once.
+    pub fn set_columns(&mut self, columns: &[String]) -> Result<(), ColumnsError> {
+        let names = self.text.names();
+        let roles: Vec<Role> = columns.iter().map(|column| names.role(column)).collect();
+        let columns = columns.join(",");
+        if let Some(channel) = names.lacking(&roles) {
+            return Err(ColumnsError::Missing { columns, channel: channel.label.clone() });
+        }
+        if roles.iter().filter(|role| matches!(role, Role::Channel(_))).count() > names.len() {
+            return Err(ColumnsError::Twice { columns, channels: names.len() });
+        }
+        self.text.set_columns(roles);
+        Ok(())
+    }
+
+    /// Begins a stream; names that a header gave are kept, for a board that was merely unplugged from the host does not say them again.
+    pub fn open(&mut self) {
+        self.form = Form::Unknown;
+        self.clear();
+        (self.torn_line, self.torn_binary, self.skips) = (false, false, false);
+    }
+
+    /// Begins a stream amid its frames: what comes before the first end of a frame is left out, unless it is a frame for certain.
+    pub fn join(&mut self) {
+        self.open();
+        (self.torn_line, self.torn_binary) = (true, true);
+    }
+
+    /// Takes the next bytes of a stream, and hands on the frames that they end.
+    pub fn receive(&mut self, mut bytes: &[u8], mut hand_on: impl FnMut(Result<Frame, BadFrame>)) {
+        while !bytes.is_empty() {
+            let taken = if self.skips {
+                self.skip(bytes)
+            } else {
+                match self.form {
+                    Form::Unknown => self.receive_unknown(bytes, &mut hand_on),
+                    Form::Text => self.receive_text(bytes, &mut hand_on),
+                    Form::Binary => self.receive_binary(bytes, &mut hand_on),
+                }
+            };
+            bytes = &bytes[taken..];
+        }
+    }
+
+    /// Takes a message: lines of text, or binary frames, all whole.
+    pub fn receive_message(&mut self, bytes: &[u8], mut hand_on: impl FnMut(Result<Frame, BadFrame>)) {
+        if is_text(bytes) {
+            bytes.split(|byte| *byte == b'\n').for_each(|line| self.read_line(line, &mut hand_on));
+        } else {
+            let frames = bytes.split(|byte| *byte == 0).filter(|frame| !frame.is_empty());
+            frames.for_each(|frame| hand_on(self.decode_binary(frame)));
+        }
+    }
+
+    /// Ends a stream: what it leaves without an end is a frame of its own.
+    pub fn end(&mut self, mut hand_on: impl FnMut(Result<Frame, BadFrame>)) {
+        let held = std::mem::take(&mut self.held);
+        if !held.is_empty() && !self.skips {
+            match self.form {
+                Form::Binary => hand_on(self.decode_binary(&held)),
+                Form::Text => self.read_line(&held, &mut hand_on),
+                Form::Unknown => {
+                    (0..self.not_text).for_each(|_| hand_on(Err(BadFrame::Encoding)));
+                    self.read_line(&held[self.line_start..], &mut hand_on);
+                }
+            }
+        }
+        self.open();
+    }
+
+    fn clear(&mut self) {
+        self.held.clear();
+        (self.line_start, self.not_text) = (0, 0);
+    }
+
+    /// Leaves out bytes up to the end of a frame.
+    fn skip(&mut self, bytes: &[u8]) -> usize {
+        let end = bytes.iter().position(|byte| matches!(byte, b'\n' | 0));
+        self.skips = end.is_none();
+        end.map_or(bytes.len(), |end| end + 1)
+    }
+
+    /// Adds bytes up to the next `end` to what is held; the bytes taken, and whether the end is there. Hands on the cause where there are too many.
+    fn hold(
+        &mut self,
+        bytes: &[u8],
+        longest: usize,
+        is_end: impl Fn(u8) -> bool,
+        hand_on: &mut impl FnMut(Result<Frame, BadFrame>),
+    ) -> (usize, bool) {
+        let room = longest.saturating_sub(self.held.len());
+        let end = bytes.iter().take(room + 1).position(|byte| is_end(*byte));
+        if end.is_none() && bytes.len() > room {
+            hand_on(Err(BadFrame::TooLong));
+            self.open();
+            self.skips = true;
+            return (room + 1, false);
+        }
+        let content = &bytes[..end.unwrap_or(bytes.len())];
+        self.held.extend_from_slice(content);
+        (content.len() + usize::from(end.is_some()), end.is_some())
+    }
+
+    fn receive_text(&mut self, bytes: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) -> usize {
+        // Most lines are whole in the bytes, and need no copy.
+        if self.held.is_empty()
+            && let Some(end) = bytes.iter().take(LONGEST_LINE + 1).position(|byte| *byte == b'\n')
+        {
+            self.end_line(&bytes[..end], hand_on);
+            return end + 1;
+        }
+        let (taken, ends) = self.hold(bytes, LONGEST_LINE, |byte| byte == b'\n', hand_on);
+        if ends {
+            let line = std::mem::take(&mut self.held);
+            self.end_line(&line, hand_on);
+            if self.held.is_empty() {
+                // Kept for the next line.
+                self.held = line;
+                self.held.clear();
+            }
+        }
+        taken
+    }
+
+    /// Reads a line of a stream of text; one with zeros may be binary frames, of which the last has a line end in it.
+    fn end_line(&mut self, line: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
+        let Some(last) = line.iter().rposition(|byte| *byte == 0) else {
+            return self.read_line(line, hand_on);
+        };
+        let mut is_binary = false;
+        for frame in line[..last].split(|byte| *byte == 0).filter(|frame| !frame.is_empty()) {
+            if let Ok(frame) = self.decode_binary(frame) {
+                is_binary = true;
+                hand_on(Ok(frame));
+            }
+        }
+        if is_binary {
+            self.form = Form::Binary;
+            self.held = [&line[last + 1..], b"\n"].concat();
+        } else {
+            hand_on(Err(BadFrame::Encoding));
+        }
+    }
+
+    fn receive_binary(&mut self, bytes: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) -> usize {
+        let (taken, ends) = self.hold(bytes, binary::LONGEST, |byte| byte == 0, hand_on);
+        if ends && !self.held.is_empty() {
+            let frame = std::mem::take(&mut self.held);
+            hand_on(self.decode_binary(&frame));
+            self.held = frame;
+            self.held.clear();
+        }
+        taken
+    }
+
+    fn receive_unknown(&mut self, bytes: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) -> usize {
+        let (taken, ends) = self.hold(bytes, LONGEST_LINE, |byte| matches!(byte, b'\n' | 0), hand_on);
+        if ends {
+            match bytes[taken - 1] {
+                0 => self.judge_binary(hand_on),
+                _ => self.judge_line(hand_on),
+            }
+        }
+        taken
+    }
+
+    /// Judges the bytes that a zero ended.
+    fn judge_binary(&mut self, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
+        let held = std::mem::take(&mut self.held);
+        self.clear();
+        let torn = std::mem::take(&mut self.torn_binary);
+        if held.is_empty() {
+            return;
+        }
+        match self.decode_binary(&held) {
+            Ok(frame) => {
+                self.form = Form::Binary;
+                self.torn_line = false;
+                hand_on(Ok(frame));
+            }
+            Err(_) if torn => {}
+            Err(cause) => hand_on(Err(cause)),
+        }
+    }
+
+    /// Judges the bytes that a line end ended, which may as well stand within a binary frame.
+    fn judge_line(&mut self, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
+        let mut held = std::mem::take(&mut self.held);
+        let torn = std::mem::take(&mut self.torn_line);
+        let line = &held[self.line_start..];
+        let read = if is_text(line) { self.text.read(line) } else { Err(BadFrame::Encoding) };
+        let is_first = self.line_start == 0;
+        match read {
+            Ok(Line::Unnamed(_)) if torn => {}
+            Ok(Line::Unnamed(frame) | Line::Whole(frame)) => {
+                self.begin_text(hand_on);
+                hand_on(Ok(frame));
+                return;
+            }
+            Ok(Line::Header) => return self.begin_text(hand_on),
+            Ok(Line::Nothing) => {}
+            Err(BadFrame::Encoding) => {
+                // Judged anew with all that follows, up to a zero.
+                self.not_text += u64::from(!torn);
+                held.push(b'\n');
+                self.line_start = held.len();
+                self.held = held;
+                return;
+            }
+            Err(_) if torn => {}
+            Err(cause) => hand_on(Err(cause)),
+        }
+        if !is_first {
+            // Behind bytes that may be the start of a binary frame.
+            held.push(b'\n');
+            self.line_start = held.len();
+            self.held = held;
+        }
+    }
+
+    /// Knows the stream for text; lines before that were no text are counted now.
+    fn begin_text(&mut self, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
+        (0..self.not_text).for_each(|_| hand_on(Err(BadFrame::Encoding)));
+        self.clear();
+        self.form = Form::Text;
+        self.torn_binary = false;
+    }
+
+    fn read_line(&mut self, line: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
+        match self.text.read(line) {
+            Ok(Line::Unnamed(frame) | Line::Whole(frame)) => hand_on(Ok(frame)),
+            Ok(Line::Nothing | Line::Header) => {}
+            Err(cause) => hand_on(Err(cause)),
+        }
+    }
+
+    fn decode_binary(&mut self, stuffed: &[u8]) -> Result<Frame, BadFrame> {
+        if stuffed.len() > binary::LONGEST {
+            return Err(BadFrame::TooLong);
+        }
+        binary::decode(stuffed, self.text.names(), self.text.columns(), &mut self.scratch)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::channels;
+    use super::*;
+    use crate::frame::encode_into;
+    use proptest::prelude::*;
+
+    fn decoder() -> Decoder {
+        Decoder::new(&channels(&["a", "b"]))
+    }
+
+    type Verdict = Result<Vec<f64>, BadFrame>;
+
+    fn received(decoder: &mut Decoder, bytes: &[u8]) -> Vec<Verdict> {
+        let mut verdicts = Vec::new();
+        decoder.receive(bytes, |frame| verdicts.push(frame.map(|frame| frame.reading)));
+        verdicts
+    }
+
+    fn binary(numbers: std::ops::Range<u16>) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        numbers.for_each(|n| encode_into(&mut bytes, n.into(), 10 * u32::from(n), &[f32::from(n), 10.0]));
+        bytes
+    }
+
+    #[test]
+    fn text_and_binary_find_themselves() {
+        assert_eq!(
+            received(&mut decoder(), b"1,2\r\n\r\n3,x\n5,6\n7,"),
+            [Ok(vec![1.0, 2.0]), Err(BadFrame::NotANumber), Ok(vec![5.0, 6.0])]
+        );
+        // Numbers of frames up to 300 have line ends among their bytes.
+        let verdicts = received(&mut decoder(), &binary(0..300));
+        let expected: Vec<Verdict> = (0..300_u16).map(|n| Ok(vec![f64::from(n), 10.0])).collect();
+        assert_eq!(verdicts, expected);
+    }
+
+    #[test]
+    fn a_torn_start_is_not_counted() {
+        let mut decoder = decoder();
+        decoder.join();
+        // "12.5,1" without its first digit is a frame like any other.
+        assert_eq!(received(&mut decoder, b"2.5,1\n3,4\n"), [Ok(vec![3.0, 4.0])]);
+        decoder.join();
+        assert_eq!(
+            received(&mut decoder, b"\xFF\x80,1\n3,4\nx\n"),
+            [Ok(vec![3.0, 4.0]), Err(BadFrame::NotANumber)]
+        );
+        decoder.join();
+        assert_eq!(received(&mut decoder, b"a:1,b:2\n"), [Ok(vec![1.0, 2.0])]);
+        for cut in 1..18 {
+            decoder.join();
+            let verdicts = received(&mut decoder, &binary(0..20)[cut..]);
+            assert_eq!(verdicts.len(), 19, "{cut}: {verdicts:?}");
+            assert!(verdicts.iter().all(Result::is_ok), "{cut}: {verdicts:?}");
+        }
+    }
+
+    #[test]
+    fn a_damaged_binary_frame_costs_itself_only() {
+        let mut decoder = decoder();
+        let mut bytes = binary(0..3);
+        let size = bytes.len() / 3;
+        bytes[size + 4] ^= 0x40;
+        let verdicts = received(&mut decoder, &bytes);
+        assert!(
+            matches!(verdicts[..], [Ok(_), Err(BadFrame::Checksum | BadFrame::Malformed), Ok(_)]),
+            "{verdicts:?}"
+        );
+    }
+
+    #[test]
+    fn a_board_that_turns_from_one_form_to_the_other_is_followed() {
+        let mut decoder = decoder();
+        let bytes = [b"1,2\n".as_slice(), &binary(0..60), b"\0", &b"3,4\n".repeat(1000)].concat();
+        let verdicts = received(&mut decoder, &bytes);
+        let good = |value: f64| verdicts.iter().filter(|is| matches!(is, Ok(is) if is[1] == value)).count();
+        assert_eq!(good(2.0), 1);
+        assert!(good(10.0) >= 58, "{}", good(10.0));
+        // As many bytes as no binary frame has are lost.
+        assert!(good(4.0) >= 1000 - binary::LONGEST / 4 - 2, "{}", good(4.0));
+    }
+
+    #[test]
+    fn a_line_without_an_end_is_too_long_once() {
+        let mut decoder = decoder();
+        let bytes = [b"1,2\n".as_slice(), &vec![b'7'; 3 * LONGEST_LINE], b"\n3,4\n"].concat();
+        assert_eq!(
+            received(&mut decoder, &bytes),
+            [Ok(vec![1.0, 2.0]), Err(BadFrame::TooLong), Ok(vec![3.0, 4.0])]
+        );
+    }
+
+    #[test]
+    fn messages_are_whole() {
+        let mut decoder = decoder();
+        let mut verdicts = Vec::new();
+        for message in [b"1,2".as_slice(), b"3,4\n5,6\n", b"[7,8]", &binary(9..11), &binary(11..12)[..19]] {
+            decoder.receive_message(message, |frame| verdicts.push(frame.unwrap().reading[0]));
+        }
+        assert_eq!(verdicts, [1.0, 3.0, 5.0, 7.0, 9.0, 10.0, 11.0]);
+    }
+
+    #[test]
+    fn the_end_of_a_stream_ends_its_last_line() {
+        let mut decoder = decoder();
+        assert_eq!(received(&mut decoder, b"1,2\n3,4"), [Ok(vec![1.0, 2.0])]);
+        let mut last = Vec::new();
+        decoder.end(|frame| last.push(frame.unwrap().reading));
+        assert_eq!(last, [[3.0, 4.0]]);
+    }
+
+    #[test]
+    fn columns_name_every_channel_once() {
+        let columns = |names: &str| names.split(',').map(str::to_owned).collect::<Vec<_>>();
+        let mut decoder = decoder();
+        let missing = decoder.set_columns(&columns("a,t")).unwrap_err();
+        assert!(missing.to_string().contains("a,t have no channel `b`"), "{missing}");
+        let twice = decoder.set_columns(&columns("a,b,S1")).unwrap_err();
+        assert!(twice.to_string().contains("a channel twice"), "{twice}");
+        decoder.set_columns(&columns("n,B,x,a")).unwrap();
+        assert_eq!(received(&mut decoder, b"7,2,99,1\n"), [Ok(vec![1.0, 2.0])]);
+    }
+
+    proptest! {
+        #[test]
+        fn how_bytes_are_cut_changes_nothing(
+            parts in prop::collection::vec(
+                prop_oneof![
+                    Just(b"1.5,2\n".to_vec()),
+                    Just(b"b:1;a:2\r\n".to_vec()),
+                    Just(b"t,a,b\n".to_vec()),
+                    (0..400_u16).prop_map(|n| binary(n..n + 1)),
+                    prop::collection::vec(any::<u8>(), 0..40),
+                    Just(vec![b'9'; LONGEST_LINE - 1]),
+                ],
+                0..12,
+            ),
+            cuts in prop::collection::vec(any::<prop::sample::Index>(), 0..20),
+            joins in any::<bool>(),
+        ) {
+            let bytes = parts.concat();
+            let (mut whole, mut cut) = (decoder(), decoder());
+            if joins {
+                whole.join();
+                cut.join();
+            }
+            let mut places: Vec<usize> = cuts.iter().map(|cut| cut.index(bytes.len() + 1)).collect();
+            places.sort_unstable();
+            let mut verdicts = Vec::new();
+            let mut start = 0;
+            for place in places.into_iter().chain([bytes.len()]) {
+                verdicts.extend(received(&mut cut, &bytes[start..place]));
+                start = place;
+            }
+            prop_assert_eq!(verdicts, received(&mut whole, &bytes));
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! `mqtt://host/topic`: messages of an MQTT broker.
+
+use super::{Address, BackOff, CONNECT, LOOK, Outlet, forget};
+use crate::input::Arrival;
+use rumqttc::{
+    AsyncClient, ConnectionError, Event, EventLoop, MqttOptions, NetworkOptions, Packet, QoS,
+    SubscribeReasonCode,
+};
+use std::collections::hash_map::RandomState;
+use std::hash::BuildHasher;
+use std::pin::pin;
+use std::sync::mpsc::Receiver;
+use std::time::Duration;
+
+/// Most bytes of a packet.
+const LARGEST: usize = 1 << 17;
+/// Silence after which the broker is asked for a sign of life; after twice as much it is gone. The least that the client allows is 1 s.
+const KEEP_ALIVE: Duration = Duration::from_secs(5);
+
+pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, broker: &Address, topic: &str) {
+    match tokio::runtime::Builder::new_current_thread().enable_all().build() {
+        Ok(runtime) => {
+            runtime.block_on(bring(outlet, commands, broker, topic));
+            // A name that is being looked up is not waited for.
+            runtime.shutdown_background();
+        }
+        Err(error) => {
+            outlet.send(Arrival::Lost(error.to_string()));
+        }
+    }
+}
+
+async fn bring(outlet: &Outlet, commands: &Receiver<Vec<u8>>, broker: &Address, topic: &str) {
+    let (client, mut events) = connection(broker);
+    let command_topic = format!("{topic}/command");
+    let mut back_off = BackOff::new();
+    let mut said = String::new();
+    while let Some(event) = next(outlet, &mut events, || {
+        while let Ok(command) = commands.try_recv() {
+            // The client's queue is longer than that of commands.
+            let _ = client.try_publish(&command_topic, QoS::AtMostOnce, false, command);
+        }
+    })
+    .await
+    {
+        let why = match event {
+            Ok(Event::Incoming(Packet::ConnAck(_))) => {
+                // A broker that has begun anew knows no subscriptions.
+                let asked = client.try_subscribe(topic, QoS::AtMostOnce);
+                asked.err().map(|error| error.to_string())
+            }
+            Ok(Event::Incoming(Packet::SubAck(answer))) => {
+                if answer.return_codes.contains(&SubscribeReasonCode::Failure) {
+                    Some(format!("the broker {broker} refuses the topic {topic}"))
+                } else {
+                    said.clear();
+                    forget(commands);
+                    if !outlet.send(Arrival::Opened(format!("mqtt://{broker}/{topic}"))) {
+                        return;
+                    }
+                    None
+                }
+            }
+            // A retained message is an old reading.
+            Ok(Event::Incoming(Packet::Publish(message))) if !message.retain => {
+                back_off = BackOff::new();
+                if !outlet.send(Arrival::Message(message.payload.to_vec())) {
+                    return;
+                }
+                None
+            }
+            Ok(_) => None,
+            Err(error) => Some(format!("the broker {broker} is not there: {error}")),
+        };
+        if let Some(why) = why {
+            // One that stays away for one reason is reported once.
+            if why != said && !outlet.send(Arrival::Lost(why.clone())) {
+                return;
+            }
+            said = why;
+            outlet.pause(back_off.next());
+        }
+    }
+}
+
+fn connection(broker: &Address) -> (AsyncClient, EventLoop) {
+    // Two clients of one name would take the connection from each other.
+    let name = format!("palpate-{:016x}", RandomState::new().hash_one(0));
+    let mut options = MqttOptions::new(name, &broker.host, broker.port);
+    options.set_keep_alive(KEEP_ALIVE).set_max_packet_size(LARGEST, LARGEST);
+    let (client, mut events) = AsyncClient::new(options, 64);
+    let mut network = NetworkOptions::new();
+    network.set_tcp_nodelay(true);
+    network.set_connection_timeout(CONNECT.as_secs());
+    events.set_network_options(network);
+    (client, events)
+}
+
+/// What the broker says next, while `look` is called now and then; `None` once the source is to end.
+async fn next(
+    outlet: &Outlet,
+    events: &mut EventLoop,
+    look: impl Fn(),
+) -> Option<Result<Event, ConnectionError>> {
+    // One future through all looks: a connection that is being made is lost with it.
+    let mut event = pin!(events.poll());
+    loop {
+        if outlet.is_stopped() {
+            return None;
+        }
+        look();
+        if let Ok(event) = tokio::time::timeout(LOOK, &mut event).await {
+            return Some(event);
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! What serial ports, TCP and UDP share: they are opened, read until they go away, and opened again.
+
+use super::{BackOff, LOOK, Outlet, forget};
+use crate::input::Arrival;
+use std::io::{self, ErrorKind, Read, Write};
+use std::sync::mpsc::Receiver;
+use std::time::Instant;
+
+/// Most bytes of an arrival.
+pub const CHUNK: usize = 1 << 16;
+/// Longest time that a device is given to take a command.
+const WRITE: std::time::Duration = std::time::Duration::from_millis(50);
+
+/// An open device.
+pub trait Port {
+    /// Waits for what comes next, for [`LOOK`] at most.
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<Arrival>>;
+
+    /// Sends a command.
+    fn send(&mut self, command: &[u8]) -> io::Result<()>;
+}
+
+/// Opens a device again and again, and brings what it sends. `opened` is what is said once it is there.
+pub fn run<P: Port>(
+    outlet: &Outlet,
+    commands: &Receiver<Vec<u8>>,
+    opened: &Arrival,
+    mut open: impl FnMut() -> io::Result<P>,
+) {
+    let mut back_off = BackOff::new();
+    let mut said = String::new();
+    while !outlet.is_stopped() {
+        let error = match open() {
+            Ok(mut port) => {
+                said.clear();
+                forget(commands);
+                if !outlet.send(opened.clone()) {
+                    return;
+                }
+                match bring(outlet, commands, &mut port, &mut back_off) {
+                    Ok(()) => return,
+                    Err(error) => error,
+                }
+            }
+            Err(error) => error,
+        };
+        let why = error.to_string();
+        // A device that stays away for one reason is reported once.
+        if why != said && !outlet.send(Arrival::Lost(why.clone())) {
+            return;
+        }
+        said = why;
+        outlet.pause(back_off.next());
+    }
+}
+
+/// Brings what an open device sends; ends where the source is to end, with the error where the device goes away.
+fn bring(
+    outlet: &Outlet,
+    commands: &Receiver<Vec<u8>>,
+    port: &mut impl Port,
+    back_off: &mut BackOff,
+) -> io::Result<()> {
+    let mut buffer = vec![0; CHUNK];
+    while !outlet.is_stopped() {
+        while let Ok(command) = commands.try_recv() {
+            port.send(&command)?;
+        }
+        match port.receive(&mut buffer) {
+            Ok(Some(arrival)) => {
+                // A device that sends is there; one that is gone at once is not asked ten times a second.
+                *back_off = BackOff::new();
+                if !outlet.send(arrival) {
+                    return Ok(());
+                }
+            }
+            Ok(None) => {}
+            Err(error) if is_wait(&error) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+/// True for the error of a read or a write that is to be tried again.
+fn is_wait(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
+}
+
+/// A stream of bytes whose reads and writes wait for [`LOOK`] at most.
+pub struct Stream<T> {
+    /// The stream.
+    pub stream: T,
+    /// What its end means.
+    pub end: &'static str,
+}
+
+impl<T: Read + Write> Port for Stream<T> {
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<Arrival>> {
+        match self.stream.read(buffer)? {
+            0 => Err(io::Error::new(ErrorKind::UnexpectedEof, self.end)),
+            count => Ok(Some(Arrival::Bytes(buffer[..count].to_vec()))),
+        }
+    }
+
+    fn send(&mut self, command: &[u8]) -> io::Result<()> {
+        let end = Instant::now() + WRITE;
+        let mut rest = command;
+        while !rest.is_empty() {
+            match self.stream.write(rest) {
+                Ok(0) => return Err(io::Error::new(ErrorKind::WriteZero, self.end)),
+                Ok(count) => rest = &rest[count..],
+                Err(error) if is_wait(&error) && Instant::now() < end => {}
+                Err(error) if is_wait(&error) => {
+                    let words = "it does not take commands: half of one may have arrived";
+                    return Err(io::Error::new(ErrorKind::TimedOut, words));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+}
+
+const _: () = assert!(LOOK.as_millis() + WRITE.as_millis() < 100);

@@ -1,0 +1,63 @@
+//! `tcp://host:port`: a server that sends frames.
+
+use super::port::{self, Stream};
+use super::{Address, CONNECT, LOOK, Outlet};
+use crate::input::Arrival;
+use socket2::{SockRef, TcpKeepalive};
+use std::io;
+use std::net::{TcpStream, ToSocketAddrs};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::thread;
+use std::time::Duration;
+
+/// Silence after which a server is asked for a sign of life, time between two questions, and unanswered ones after which it is gone: a board that
+/// loses its power does not say so.
+const ALIVE: (Duration, Duration, u32) = (Duration::from_secs(2), Duration::from_secs(1), 3);
+
+pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, server: &Address) {
+    // A bridge to a serial port sends on from where the board is, so that the first line may be the end of one.
+    let opened = Arrival::Joined(format!("tcp://{server}"));
+    port::run(outlet, commands, &opened, || {
+        let stream = connect(outlet, server)?;
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(LOOK))?;
+        stream.set_write_timeout(Some(LOOK))?;
+        let (after, every, times) = ALIVE;
+        let alive = TcpKeepalive::new().with_time(after).with_interval(every).with_retries(times);
+        SockRef::from(&stream).set_tcp_keepalive(&alive)?;
+        Ok(Stream { stream, end: "the server has closed the connection" })
+    });
+}
+
+/// A connection to a server. Looking its name up and waiting for it is done in a thread of its own, which is left to itself where the source is to
+/// end meanwhile.
+fn connect(outlet: &Outlet, server: &Address) -> io::Result<TcpStream> {
+    let (to, from) = sync_channel(1);
+    let address = server.clone();
+    thread::Builder::new().name("connect".to_owned()).spawn(move || {
+        let _ = to.send(connect_first(&address));
+    })?;
+    loop {
+        match from.recv_timeout(LOOK) {
+            Ok(connected) => {
+                let complaint = |error: io::Error| {
+                    io::Error::new(error.kind(), format!("cannot connect to {server}: {error}"))
+                };
+                return connected.map_err(complaint);
+            }
+            Err(RecvTimeoutError::Timeout) if !outlet.is_stopped() => {}
+            Err(_) => return Err(io::ErrorKind::Interrupted.into()),
+        }
+    }
+}
+
+fn connect_first(server: &Address) -> io::Result<TcpStream> {
+    let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
+    for address in (server.host.as_str(), server.port).to_socket_addrs()? {
+        match TcpStream::connect_timeout(&address, CONNECT) {
+            Ok(stream) => return Ok(stream),
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
+}
