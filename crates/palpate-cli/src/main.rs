@@ -51,6 +51,9 @@ enum Command {
     Limit(commands::limit::Arguments),
     Inspect(commands::inspect::Arguments),
     Profile(commands::profile::Arguments),
+    Record(commands::record::Arguments),
+    Replay(commands::replay::Arguments),
+    SimulatedBoard(commands::simulated_board::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -73,6 +76,9 @@ fn main() -> ExitCode {
         Command::Limit(arguments) => commands::limit::run(&arguments),
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
         Command::Profile(arguments) => commands::profile::run(&arguments),
+        Command::Record(arguments) => commands::record::run(&arguments),
+        Command::Replay(arguments) => commands::replay::run(&arguments),
+        Command::SimulatedBoard(arguments) => commands::simulated_board::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -7,6 +7,8 @@ pub mod event;
 pub mod frame;
 pub mod input;
 pub mod pipeline;
+pub mod recording;
+pub mod rules;
 pub mod sample;
 pub mod session;
 pub mod simulated_board;

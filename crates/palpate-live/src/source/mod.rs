@@ -1,9 +1,11 @@
 //! Sources of bytes: boards, networks, files, and a board that is simulated.
 
+mod file;
 mod simulated;
 mod stdin;
 mod url;
 
+pub use file::line;
 pub use url::{SourceUrl, SourceUrlError};
 
 use crate::input::{Arrival, Arrived, Input};
@@ -27,6 +29,9 @@ pub enum SourceError {
     /// The rig of a simulated board cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] palpate_estimators::simulate::SimulateError),
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] crate::recording::RecordingError),
     /// There is no thread for it.
     #[error("no thread for the source: {0}")]
     Thread(#[from] std::io::Error),
@@ -78,6 +83,7 @@ impl Source {
         let outlet = Outlet { to, clock, stop: Arc::clone(&stop) };
         match url {
             SourceUrl::Stdin => stdin::open(outlet)?,
+            SourceUrl::File { path, speed } => file::open(outlet, &folder.join(path), *speed)?,
             SourceUrl::Simulated { rig, rate_hz, seed } => {
                 simulated::open(outlet, &folder.join(rig), *rate_hz, *seed)?;
             }

@@ -9,6 +9,13 @@ use std::str::FromStr;
 pub enum SourceUrl {
     /// `-`: the standard input.
     Stdin,
+    /// `file:recording.mcap?speed=1`: the readings of a recording.
+    File {
+        /// The recording.
+        path: PathBuf,
+        /// Its pace over that at which it was recorded; 0 for as fast as can be.
+        speed: f64,
+    },
     /// `simulated:rig.toml?rate=1000&seed=0`: a simulated board.
     Simulated {
         /// The rig that it has on its bench.
@@ -24,7 +31,9 @@ pub enum SourceUrl {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SourceUrlError {
     /// A scheme that no source has.
-    #[error("`{text}` is no source; sources are `-` and `simulated:rig.toml?rate=1000`")]
+    #[error(
+        "`{text}` is no source; sources are `-`, `file:recording.mcap?speed=1` and `simulated:rig.toml?rate=1000`"
+    )]
     Scheme {
         /// The text.
         text: String,
@@ -45,6 +54,9 @@ impl FromStr for SourceUrl {
     fn from_str(text: &str) -> Result<Self, SourceUrlError> {
         if text == "-" {
             return Ok(Self::Stdin);
+        }
+        if let Some(rest) = text.strip_prefix("file:") {
+            return file(text, rest);
         }
         let Some(rest) = text.strip_prefix("simulated:") else {
             return Err(SourceUrlError::Scheme { text: text.to_owned() });
@@ -74,10 +86,29 @@ impl FromStr for SourceUrl {
     }
 }
 
+/// What follows `file:`.
+fn file(text: &str, rest: &str) -> Result<SourceUrl, SourceUrlError> {
+    let problem = |problem: String| SourceUrlError::Parameter { text: text.to_owned(), problem };
+    let (path, query) = rest.split_once('?').unwrap_or((rest, ""));
+    let mut speed = 1.0;
+    for pair in query.split('&').filter(|pair| !pair.is_empty()) {
+        let Some(("speed", value)) = pair.split_once('=') else {
+            return Err(problem(format!("`{pair}` is no parameter; known is `speed`")));
+        };
+        speed = super::file::parse_speed(value).ok_or_else(|| {
+            problem(format!(
+                "speed `{value}` must be a number from 0, which is as fast as can be, to 1000000"
+            ))
+        })?;
+    }
+    Ok(SourceUrl::File { path: path.into(), speed })
+}
+
 impl fmt::Display for SourceUrl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Stdin => f.write_str("-"),
+            Self::File { path, speed } => write!(f, "file:{}?speed={speed}", path.display()),
             Self::Simulated { rig, rate_hz, seed } => {
                 write!(f, "simulated:{}?rate={rate_hz}&seed={seed}", rig.display())
             }
