@@ -164,7 +164,10 @@ impl Rule {
                 }
                 if !EVENTS.contains(&event.get_ref().as_str()) {
                     let known = EVENTS.join(", ");
-                    return Err(at(event.span(), format!("`event` is `{}`; known are {known}", event.get_ref())));
+                    return Err(at(
+                        event.span(),
+                        format!("`event` is `{}`; known are {known}", event.get_ref()),
+                    ));
                 }
                 Condition::Event(event.into_inner())
             }
@@ -377,8 +380,11 @@ mod tests {
             (r#"x = ["5 mm", "1 mm"]"#, r#"["5 mm", "1 mm"]"#),
             (r#"x = ["5 N", "1 mm"]"#, r#""5 N""#),
             (r#"event = "touchdown""#, r#""touchdown""#),
-            (r#"force = ["1 N", "2 N"]
-                hold = "-1 s""#, r#""-1 s""#),
+            (
+                r#"force = ["1 N", "2 N"]
+                hold = "-1 s""#,
+                r#""-1 s""#,
+            ),
             (r#"colour = 3"#, "colour"),
         ];
         for (line, meant) in cases {

@@ -9,6 +9,7 @@ use palpate_live::event::Event;
 use palpate_live::input::Input;
 use palpate_live::pipeline;
 use palpate_live::recording::{RecordingStatus, RecordingSwitch};
+use palpate_live::rules::Rules;
 use palpate_live::session::{Counters, Session, SessionConfig};
 use palpate_live::sink::{Batch, JsonLines, MqttSink, MqttUrl, Sink};
 use palpate_live::source::{Source, SourceUrl};
@@ -40,6 +41,9 @@ pub struct Arguments {
     /// Publish them to a broker, too: mqtt://host/topic
     #[arg(long, value_name = "URL")]
     mqtt: Option<MqttUrl>,
+    /// Publish the messages of a rule file there, too
+    #[arg(long, value_name = "FILE.toml", requires = "mqtt")]
+    rules: Option<PathBuf>,
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -61,14 +65,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut session = Session::new(&locator, &SessionConfig::default());
     let mut sinks: Vec<Box<dyn Sink>> = vec![Box::new(Words)];
     if let Some(url) = &arguments.mqtt {
-        let sink = MqttSink::new(url, session.channels(), session.extent(), to.clone());
+        let rules = arguments.rules.as_deref().map(read_rules).transpose()?;
+        let sink = MqttSink::new(url, session.channels(), session.extent(), rules, to.clone());
         sinks.push(Box::new(sink.map_err(Complaint::new)?));
     }
     if arguments.json {
         sinks.push(Box::new(JsonLines::new(std::io::stdout(), session.channels(), session.extent())));
     }
-    let source =
-        Source::open(&arguments.from, Path::new(""), clock, to.clone()).map_err(Complaint::new)?;
+    let source = Source::open(&arguments.from, Path::new(""), clock, to.clone()).map_err(Complaint::new)?;
     let recording = RecordingSwitch::new(&locator, &arguments.from.to_string(), to.clone());
     let recording = recording.map_err(Complaint::new)?;
     recording.begin(&arguments.out).map_err(Complaint::new)?;
@@ -78,6 +82,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     drop((source, stop, sinks));
     let status = recording.end().unwrap_or_default();
     finish(arguments, &status, session.counters())
+}
+
+fn read_rules(path: &Path) -> Result<Rules, Failure> {
+    let text = input::read_text(path)?;
+    Rules::from_toml(&text).map_err(|error| {
+        let span = error.span.clone().unwrap_or(0..0);
+        Complaint::new(error).at_span(&path.display().to_string(), &text, span).into()
+    })
 }
 
 /// Says what was recorded.

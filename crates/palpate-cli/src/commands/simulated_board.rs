@@ -78,9 +78,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
     let mut finger = Finger::random(&rig, arguments.seed);
     if let Some(path) = &arguments.finger {
-        finger = finger
-            .with_script(&input::read_text(path)?)
-            .map_err(|error| Complaint::about(path, error))?;
+        finger =
+            finger.with_script(&input::read_text(path)?).map_err(|error| Complaint::about(path, error))?;
     }
     let config = BoardConfig { rate_hz: arguments.rate, seed: arguments.seed };
     let faults = FaultConfig {

@@ -3,8 +3,8 @@
 use super::RecordingError;
 use super::head::{Head, LOCATOR, METADATA};
 use super::schemas::TOPICS;
-use mcap::read::ChunkReader;
 use mcap::records::{Record, op};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -178,29 +178,51 @@ impl McapFile {
         if header.uncompressed_size > MOST {
             return Ok(messages);
         }
-        let Ok(records) = ChunkReader::new(header, &data) else { return Ok(messages) };
-        for record in records {
-            match record {
-                Ok(Record::Channel(channel)) => {
-                    if let Some(topic) = TOPICS.iter().position(|(name, ..)| *name == channel.topic) {
-                        self.topics[topic] = Some(channel.id);
-                    }
+        drop(data);
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_validate_chunk_crcs(true)
+            .with_record_length_limit(MOST as usize);
+        let mut records = LinearReader::new_with_options(options);
+        // A file of one record, the chunk: MCAP's reader of chunks alone allocates whatever length a damaged record says.
+        let mut file = vec![op::CHUNK];
+        file.extend(chunk.length.to_le_bytes());
+        file.extend(body.iter());
+        let mut rest = file.as_slice();
+        while let Some(event) = records.next_event() {
+            match event {
+                Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                    let (next, later) = rest.split_at(wanted.min(rest.len()));
+                    records.insert(next.len()).copy_from_slice(next);
+                    records.notify_read(next.len());
+                    rest = later;
                 }
-                Ok(Record::Message { header, data }) => {
-                    let topic = self.topics.iter().position(|id| *id == Some(header.channel_id));
-                    if let Some(topic) = topic {
-                        messages.push(RawMessage {
-                            topic,
-                            unix_ns: header.log_time,
-                            data: data.into_owned(),
-                        });
-                    }
-                }
-                Ok(_) => {}
+                Ok(LinearReadEvent::Record { data, opcode }) => match mcap::parse_record(opcode, data) {
+                    Ok(record) => self.take(record, &mut messages),
+                    Err(_) => break,
+                },
                 Err(_) => break,
             }
         }
         Ok(messages)
+    }
+
+    /// Takes a record of a chunk: a channel, or a message of one that is known.
+    fn take(&mut self, record: Record, messages: &mut Vec<RawMessage>) {
+        match record {
+            Record::Channel(channel) => {
+                if let Some(topic) = TOPICS.iter().position(|(name, ..)| *name == channel.topic) {
+                    self.topics[topic] = Some(channel.id);
+                }
+            }
+            Record::Message { header, data } => {
+                if let Some(topic) = self.topics.iter().position(|id| *id == Some(header.channel_id)) {
+                    messages.push(RawMessage { topic, unix_ns: header.log_time, data: data.into_owned() });
+                }
+            }
+            _ => {}
+        }
     }
 
     fn locator(&mut self, place: &RecordPlace) -> Result<Option<String>, RecordingError> {

@@ -87,7 +87,8 @@ pub fn summary(path: &Path) -> Result<RecordingSummary, RecordingError> {
 pub fn read(path: &Path, from_s: f64, to_s: f64, points: usize) -> Result<Excerpt, RecordingError> {
     let mut file = McapFile::open(path)?;
     let (start_s, seconds) = span_s(&file.chunks);
-    let start_ns = file.chunks.iter().map(|chunk| chunk.span_ns.0).min().unwrap_or(0);
+    let start_ns =
+        file.chunks.iter().map(|chunk| chunk.span_ns.0).filter(|start| *start > 0).min().unwrap_or(0);
     let at_ns = |after_s: f64| start_ns.saturating_add((after_s.max(0.0) * 1e9) as u64);
     let (from_ns, to_ns) = (at_ns(from_s), at_ns(to_s));
     let chunks = file.chunks.iter().filter(|chunk| chunk.span_ns.0 <= to_ns && chunk.span_ns.1 >= from_ns);

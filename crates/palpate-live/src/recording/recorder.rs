@@ -303,8 +303,12 @@ impl<'a> Recording<'a> {
         match (self.tail.write(), self.health) {
             (Ok(()), Health::Full) => {
                 self.health = Health::Well;
-                let lost = std::mem::take(&mut lock(&self.status).problem).map(|_| lock(&self.status).lost);
-                self.report(&format!("is written again; it lacks {} readings", lost.unwrap_or(0)));
+                let lost = {
+                    let mut status = lock(&self.status);
+                    status.problem = None;
+                    status.lost
+                };
+                self.report(&format!("is written again; it lacks {lost} readings"));
             }
             (Err(error), Health::Well) => {
                 self.health = Health::Full;

@@ -3,6 +3,7 @@
 use super::{Batch, Sink};
 use crate::frame::Channel;
 use crate::input::{Command, Input};
+use crate::rules::{Rule, RuleWatch, Rules};
 use crate::sample::SampleRecord;
 use crate::session::Output;
 use palpate_mechanics::surface::Extent;
@@ -111,7 +112,7 @@ pub struct MqttSink {
 }
 
 impl MqttSink {
-    /// A client of a broker, which need not be there yet. Troubles are told to the session through `reports`.
+    /// A client of a broker, which need not be there yet. Rules publish their messages beside; troubles are told to the session through `reports`.
     ///
     /// # Errors
     /// Where there is no thread for it.
@@ -119,13 +120,15 @@ impl MqttSink {
         url: &MqttUrl,
         channels: &[Channel],
         extent: Extent,
+        rules: Option<Rules>,
         reports: SyncSender<Input>,
     ) -> std::io::Result<Self> {
         let (to, from) = sync_channel(WAITING);
         let lost = Arc::new(AtomicU64::new(0));
         let publisher = Publisher::open(url, reports, Arc::clone(&lost))?;
         let channels = channels.to_vec();
-        let work = move || publisher.run(&from, &channels, extent);
+        let rules = rules.map(RuleWatch::new);
+        let work = move || publisher.run(&from, &channels, extent, rules);
         let thread = std::thread::Builder::new().name("mqtt-sink".to_owned()).spawn(work)?;
         Ok(Self { to: Some(to), lost, thread: Some(thread) })
     }
@@ -183,7 +186,13 @@ impl Publisher {
         Ok(Self { client, topic: url.topic.clone(), online, done, lost })
     }
 
-    fn run(self, batches: &Receiver<Arc<Batch>>, channels: &[Channel], extent: Extent) {
+    fn run(
+        self,
+        batches: &Receiver<Arc<Batch>>,
+        channels: &[Channel],
+        extent: Extent,
+        mut rules: Option<RuleWatch>,
+    ) {
         loop {
             let batch = match batches.recv_timeout(AGAIN_AFTER) {
                 Ok(batch) => batch,
@@ -191,6 +200,9 @@ impl Publisher {
                 Err(RecvTimeoutError::Disconnected) => break,
             };
             for output in &batch.outputs {
+                if let Some(rules) = &mut rules {
+                    rules.add(output, |rule| self.act(rule));
+                }
                 match output {
                     Output::Sample(sample) => {
                         self.publish("estimate", &SampleRecord::new(sample, channels, extent));
@@ -210,6 +222,14 @@ impl Publisher {
                     .is_ok()
             });
         if !sent {
+            self.lost.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Publishes a rule's message: even while the broker is away, for when it comes back.
+    fn act(&self, rule: &Rule) {
+        let message = rule.message.as_bytes();
+        if self.client.try_publish(&rule.topic, QoS::AtLeastOnce, false, message).is_err() {
             self.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
