@@ -262,7 +262,7 @@ fn damaged_files_are_read_without_a_panic() {
     let chunks_at = 1000 + Playback::open(&path).unwrap().head().locator.len();
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(9);
     let (mut opened, mut refused) = (0, 0);
-    for round in 0..1500 {
+    for round in 0..300 {
         let mut damaged = bytes.clone();
         // Half of the damage goes to the head of the file, half to its chunks.
         let range = if round % 2 == 0 { 8..2000 } else { chunks_at..damaged.len() };
@@ -279,5 +279,5 @@ fn damaged_files_are_read_without_a_panic() {
         while let Ok(Some(_)) = playback.next_recorded() {}
         recording::read(&path, 0.0, 1e9, 50).unwrap();
     }
-    assert!(opened > 300 && refused > 100, "{opened} {refused}");
+    assert!(opened > 60 && refused > 60, "{opened} {refused}");
 }
