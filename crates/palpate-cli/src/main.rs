@@ -53,6 +53,9 @@ enum Command {
     Inspect(commands::inspect::Arguments),
     Profile(commands::profile::Arguments),
     Serve(commands::serve::Arguments),
+    Record(commands::record::Arguments),
+    Replay(commands::replay::Arguments),
+    SimulatedBoard(commands::simulated_board::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -77,6 +80,9 @@ fn main() -> ExitCode {
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
         Command::Profile(arguments) => commands::profile::run(&arguments),
         Command::Serve(arguments) => commands::serve::run(&arguments),
+        Command::Record(arguments) => commands::record::run(&arguments),
+        Command::Replay(arguments) => commands::replay::run(&arguments),
+        Command::SimulatedBoard(arguments) => commands::simulated_board::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

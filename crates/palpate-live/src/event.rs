@@ -76,11 +76,38 @@ pub enum Event {
     },
     /// The baseline was taken anew.
     Tared,
+    /// Something beside the session does not work, or works again: a recording, a broker.
+    Trouble {
+        /// What, and why.
+        text: String,
+    },
     /// Somebody's mark.
     Mark {
         /// Its text.
         text: String,
     },
+}
+
+impl Event {
+    /// Its name, as records have it.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::SourceOpened { .. } => "source_opened",
+            Self::SourceLost { .. } => "source_lost",
+            Self::SourceEnded => "source_ended",
+            Self::Gap { .. } => "gap",
+            Self::ClockSet { .. } => "clock_set",
+            Self::TouchDown { .. } => "touch_down",
+            Self::Move { .. } => "move",
+            Self::LiftOff { .. } => "lift_off",
+            Self::OutsideModel => "outside_model",
+            Self::SecondContact { .. } => "second_contact",
+            Self::Channel { .. } => "channel",
+            Self::Tared => "tared",
+            Self::Trouble { .. } => "trouble",
+            Self::Mark { .. } => "mark",
+        }
+    }
 }
 
 /// State of a channel.

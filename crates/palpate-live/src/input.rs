@@ -46,4 +46,6 @@ pub enum Command {
     Tare,
     /// Set a mark.
     Mark(String),
+    /// Tell that something beside the session does not work, or works again.
+    Trouble(String),
 }

@@ -9,6 +9,8 @@ pub mod event;
 pub mod frame;
 pub mod input;
 pub mod pipeline;
+pub mod recording;
+pub mod rules;
 pub mod sample;
 pub mod server;
 pub mod session;

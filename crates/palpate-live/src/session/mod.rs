@@ -155,6 +155,7 @@ impl<'a> Session<'a> {
         match command {
             Command::Tare => self.taring.begin(),
             Command::Mark(text) => self.tell(at, Event::Mark { text }, out),
+            Command::Trouble(text) => self.tell(at, Event::Trouble { text }, out),
         }
     }
 

@@ -1,8 +1,10 @@
 //! Sinks: where the outputs of a session go.
 
 mod json_lines;
+mod mqtt;
 
 pub use json_lines::JsonLines;
+pub use mqtt::{MqttSink, MqttUrl, MqttUrlError};
 
 use crate::event::{ChannelState, EventRecord};
 use crate::sample::Sample;

@@ -1,5 +1,6 @@
 //! Sources of bytes: boards, networks, files, and a board that is simulated.
 
+mod file;
 mod mqtt;
 mod port;
 mod serial;
@@ -9,6 +10,7 @@ mod tcp;
 mod udp;
 mod url;
 
+pub use file::line;
 pub use url::{Address, SourceUrl, SourceUrlError};
 
 use crate::input::{Arrival, Arrived, Input};
@@ -45,6 +47,9 @@ pub enum SourceError {
     /// The rig of a simulated board cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] palpate_estimators::simulate::SimulateError),
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] crate::recording::RecordingError),
     /// There is no thread for it.
     #[error("no thread for the source: {0}")]
     Thread(#[from] std::io::Error),
@@ -140,6 +145,10 @@ impl Source {
             SourceUrl::Stdin => {
                 takes_commands = false;
                 stdin::open(outlet)?;
+            }
+            SourceUrl::File { path, speed } => {
+                takes_commands = false;
+                file::open(outlet, &folder.join(path), speed)?;
             }
             SourceUrl::Serial { port, baud, .. } => {
                 spawn(move || serial::run(&outlet, &for_device, &port, baud))?;

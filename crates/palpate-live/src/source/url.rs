@@ -9,6 +9,13 @@ use std::str::FromStr;
 pub enum SourceUrl {
     /// `-`: the standard input.
     Stdin,
+    /// `file:recording.mcap?speed=1`: the readings of a recording.
+    File {
+        /// The recording.
+        path: PathBuf,
+        /// Its pace over that at which it was recorded; 0 for as fast as can be.
+        speed: f64,
+    },
     /// `serial:///dev/ttyACM0?baud=115200`: a serial port.
     Serial {
         /// Path, on Windows name, of the port.
@@ -72,6 +79,8 @@ impl fmt::Display for Address {
 const BAUD: u32 = 115_200;
 /// Greatest number of bits a second.
 const GREATEST_BAUD: u32 = 20_000_000;
+/// Greatest pace of a recording.
+const FASTEST: f64 = 1e6;
 /// Port of MQTT, unless the URL says another.
 const MQTT_PORT: u16 = 1883;
 
@@ -81,7 +90,7 @@ pub enum SourceUrlError {
     /// A scheme that no source has.
     #[error(
         "`{text}` is no source; sources are `-`, `serial:///dev/ttyACM0?baud=115200`, `tcp://host:port`, `udp://:port`, \
-         `mqtt://host/topic` and `simulated:rig.toml?rate=1000`"
+         `mqtt://host/topic`, `file:recording.mcap?speed=1` and `simulated:rig.toml?rate=1000`"
     )]
     Scheme {
         /// The text.
@@ -105,7 +114,7 @@ impl SourceUrl {
             | Self::Tcp { columns, .. }
             | Self::Udp { columns, .. }
             | Self::Mqtt { columns, .. } => columns,
-            Self::Stdin | Self::Simulated { .. } => &[],
+            Self::Stdin | Self::File { .. } | Self::Simulated { .. } => &[],
         }
     }
 
@@ -140,6 +149,10 @@ impl SourceUrl {
             }
             let broker = address(broker, Some(MQTT_PORT), Some("`mqtt://192.168.1.20/topic`"))?;
             Self::Mqtt { broker, topic: checked_topic(topic)?, columns: query.columns()? }
+        } else if let Some(path) = body.strip_prefix("file:") {
+            let allowed = "a number from 0, which is as fast as can be, to 1000000";
+            let speed = query.take("speed", 1.0, |speed| (0.0..=FASTEST).contains(speed), allowed)?;
+            Self::File { path: path.into(), speed }
         } else if let Some(rig) = body.strip_prefix("simulated:") {
             let allowed = "a number greater than 0 and at most 100000 Hz";
             let rate_hz = query.take("rate", 100.0, |rate| *rate > 0.0 && *rate <= 1e5, allowed)?;
@@ -156,6 +169,7 @@ impl SourceUrl {
     fn parameters(&self) -> &'static str {
         match self {
             Self::Stdin => "none",
+            Self::File { .. } => "`speed`",
             Self::Serial { .. } => "`baud` and `columns`",
             Self::Tcp { .. } | Self::Udp { .. } | Self::Mqtt { .. } => "`columns`",
             Self::Simulated { .. } => "`rate` and `seed`",
@@ -280,6 +294,7 @@ impl fmt::Display for SourceUrl {
         let mut separator = '?';
         match self {
             Self::Stdin => f.write_str("-"),
+            Self::File { path, speed } => write!(f, "file:{}?speed={speed}", path.display()),
             Self::Serial { port, baud, .. } => {
                 separator = '&';
                 write!(f, "serial://{}?baud={baud}", port.display())

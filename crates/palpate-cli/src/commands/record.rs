@@ -1,0 +1,179 @@
+//! `palpate record`: a session into a file.
+
+use crate::failure::{Complaint, Failure};
+use crate::progress::{self, interrupted};
+use crate::remark::remark;
+use crate::target::{Inputs, Target};
+use crate::{input, output};
+use palpate_live::event::Event;
+use palpate_live::input::Input;
+use palpate_live::pipeline;
+use palpate_live::recording::{RecordingStatus, RecordingSwitch};
+use palpate_live::rules::Rules;
+use palpate_live::session::{Counters, Session, SessionConfig};
+use palpate_live::sink::{Batch, JsonLines, MqttSink, MqttUrl, Sink};
+use palpate_live::source::{Source, SourceUrl};
+use palpate_live::stamp::HostClock;
+use palpate_mechanics::units::format_count;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::time::{Duration, Instant};
+
+/// Record a board's readings, with their estimates and the locator, in an MCAP file.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The locator
+    locator: PathBuf,
+    /// The source of the readings
+    #[arg(long, value_name = "URL")]
+    from: SourceUrl,
+    /// The file, which must not be there yet
+    #[arg(long, value_name = "FILE.mcap")]
+    out: PathBuf,
+    /// End after so long
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    seconds: Option<f64>,
+    /// Print samples and events as lines of JSON, too
+    #[arg(long)]
+    json: bool,
+    /// Publish them to a broker, too: mqtt://host/topic
+    #[arg(long, value_name = "URL")]
+    mqtt: Option<MqttUrl>,
+    /// Publish the messages of a rule file there, too
+    #[arg(long, value_name = "FILE.toml", requires = "mqtt")]
+    rules: Option<PathBuf>,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(seconds),
+        _ => Err(format!("`{text}` must be a number of seconds greater than 0")),
+    }
+}
+
+/// Time between two looks for a signal.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    // Complains of what is no place for a file; the recorder itself makes it, and writes over nothing.
+    Target::new(&arguments.out, &Inputs::new([arguments.locator.as_path()]))?;
+    let locator = input::read_locator(&arguments.locator)?;
+    let clock = HostClock::new();
+    let (to, from) = sync_channel(pipeline::WAITING);
+    let mut session = Session::new(&locator, &SessionConfig::default());
+    let mut sinks: Vec<Box<dyn Sink>> = vec![Box::new(Words)];
+    if let Some(url) = &arguments.mqtt {
+        let rules = arguments.rules.as_deref().map(read_rules).transpose()?;
+        let sink = MqttSink::new(url, session.channels(), session.extent(), rules, to.clone());
+        sinks.push(Box::new(sink.map_err(Complaint::new)?));
+    }
+    if arguments.json {
+        sinks.push(Box::new(JsonLines::new(std::io::stdout(), session.channels(), session.extent())));
+    }
+    let source = Source::open(&arguments.from, Path::new(""), clock, to.clone()).map_err(Complaint::new)?;
+    let recording = RecordingSwitch::new(&locator, &arguments.from.to_string(), to.clone());
+    let recording = recording.map_err(Complaint::new)?;
+    recording.begin(&arguments.out).map_err(Complaint::new)?;
+    sinks.push(Box::new(recording.clone()));
+    let stop = Stop::after(arguments.seconds, to)?;
+    pipeline::run(&mut session, clock, &from, &mut sinks);
+    drop((source, stop, sinks));
+    let status = recording.end().unwrap_or_default();
+    finish(arguments, &status, session.counters())
+}
+
+fn read_rules(path: &Path) -> Result<Rules, Failure> {
+    let text = input::read_text(path)?;
+    Rules::from_toml(&text).map_err(|error| {
+        let span = error.span.clone().unwrap_or(0..0);
+        Complaint::new(error).at_span(&path.display().to_string(), &text, span).into()
+    })
+}
+
+/// Says what was recorded.
+fn finish(arguments: &Arguments, status: &RecordingStatus, counters: &Counters) -> Result<(), Failure> {
+    let bad: u64 = counters.bad_frames.values().sum();
+    let summary = format!(
+        "{}: {} readings in {:.1} s, {:.2} MB; {} bad frames, {} lost by the board's count, {} gaps",
+        arguments.out.display(),
+        format_count(status.readings),
+        status.seconds,
+        status.bytes as f64 / 1e6,
+        format_count(bad),
+        format_count(counters.lost_frames),
+        format_count(counters.gaps),
+    );
+    if let Some(problem) = &status.problem {
+        return Err(Failure::DataLost(format!("{summary}; {problem}")));
+    }
+    if status.lost > 0 {
+        let lost = format_count(status.lost);
+        return Err(Failure::DataLost(format!("{summary}; {lost} readings could not be recorded")));
+    }
+    if interrupted() {
+        return Err(Failure::Interrupted(summary));
+    }
+    if arguments.json {
+        remark!("{summary}");
+        return Ok(());
+    }
+    output::say(summary)
+}
+
+/// Ends a session at a signal, or after a time.
+pub struct Stop(Arc<AtomicBool>);
+
+impl Stop {
+    /// Sends [`Input::Stop`] at a signal, or after so many seconds.
+    pub fn after(seconds: Option<f64>, to: SyncSender<Input>) -> Result<Self, Failure> {
+        let done = Arc::new(AtomicBool::new(false));
+        let watched = Arc::clone(&done);
+        let end = seconds.map(|seconds| Instant::now() + Duration::from_secs_f64(seconds));
+        let wait = move || {
+            while !watched.load(Ordering::Relaxed) {
+                if progress::interrupted() || end.is_some_and(|end| Instant::now() >= end) {
+                    // A session that has ended by itself wants no more.
+                    let _ = to.send(Input::Stop);
+                    return;
+                }
+                std::thread::sleep(LOOK_EVERY);
+            }
+        };
+        std::thread::Builder::new().name("stop".to_owned()).spawn(wait).map_err(Complaint::new)?;
+        Ok(Self(done))
+    }
+}
+
+impl Drop for Stop {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Says on stderr what goes wrong with the source, and with what stands beside the session.
+pub struct Words;
+
+impl Sink for Words {
+    fn batch(&mut self, batch: &Arc<Batch>) {
+        for record in batch.events() {
+            match &record.event {
+                Event::SourceOpened { name } => remark!("reading {name}"),
+                Event::SourceLost { why } => remark!("the source is lost: {why}"),
+                Event::Trouble { text } => remark!("{text}"),
+                Event::Channel { name, state } => remark!("channel {name} is {}", state_in_words(*state)),
+                _ => {}
+            }
+        }
+    }
+}
+
+fn state_in_words(state: palpate_live::event::ChannelState) -> &'static str {
+    use palpate_live::event::ChannelState::{Dead, Saturated, Well};
+    match state {
+        Well => "well again",
+        Dead => "dead",
+        Saturated => "saturated",
+    }
+}

@@ -1,0 +1,202 @@
+//! `palpate replay`: the readings of a recording, located again.
+
+use crate::failure::{Complaint, Failure};
+use crate::progress::interrupted;
+use crate::remark::remark;
+use crate::{input, output};
+use palpate_estimators::estimate_record::EstimateRecord;
+use palpate_estimators::estimator::Locator;
+use palpate_estimators::recording::csv_row;
+use palpate_live::frame::Channel;
+use palpate_live::input::{Arrival, Arrived};
+use palpate_live::recording::{Head, Playback, Recorded};
+use palpate_live::session::{Output, Session, SessionConfig};
+use palpate_live::stamp::Stamp;
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::format_count;
+use serde::Serialize;
+use serde_json::{Map, Value};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Locate the readings of a recording again, by the locator that it holds or by another.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The recording, whole or cut off
+    recording: PathBuf,
+    /// Locate by this locator, from the raw readings
+    #[arg(long, value_name = "LOCATOR")]
+    locator: Option<PathBuf>,
+    /// Print one JSON object a line instead of CSV
+    #[arg(long)]
+    json: bool,
+}
+
+/// An estimate of a recorded reading.
+#[derive(Serialize)]
+struct Line {
+    number: u64,
+    time_s: f64,
+    #[serde(flatten)]
+    estimate: EstimateRecord,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let playback = Playback::open(&arguments.recording).map_err(Complaint::new)?;
+    if !playback.is_whole() {
+        remark!("{} was cut off, or is being written; it is read up to there", arguments.recording.display());
+    }
+    let mut out = std::io::stdout().lock();
+    match &arguments.locator {
+        None => {
+            let locator = input::parse_locator(&arguments.recording, &playback.head().locator)?;
+            by_the_same(arguments, &locator, playback, &mut out)
+        }
+        Some(path) => {
+            let locator = input::read_locator(path)?;
+            check_channels(playback.head(), &locator)?;
+            by_another(arguments, &locator, playback, &mut out)
+        }
+    }
+}
+
+/// Locates what was located, and says whether every estimate is the same.
+fn by_the_same(
+    arguments: &Arguments,
+    locator: &Locator,
+    mut playback: Playback,
+    out: &mut impl std::io::Write,
+) -> Result<(), Failure> {
+    let extent = locator.setup.surface().extent();
+    begin(arguments, extent, out)?;
+    let (mut count, mut others) = (0_u64, 0_u64);
+    while let Some(recorded) = playback.next_recorded().map_err(Complaint::new)? {
+        let Recorded::Estimate { number, unix_ns, located, estimate: before } = recorded else { continue };
+        let estimate = locator.locate(&located).map_err(Complaint::new)?;
+        let line =
+            Line { number, time_s: unix_ns as f64 * 1e-9, estimate: EstimateRecord::new(&estimate, extent) };
+        count += 1;
+        others += u64::from(!is_the_same(&line.estimate, &before));
+        print(arguments, &line, extent, out)?;
+        if interrupted() {
+            return Err(Failure::Interrupted("stopped".to_owned()));
+        }
+    }
+    output::flush(out)?;
+    say_bad(&playback)?;
+    let all = format_count(count);
+    match others {
+        0 => remark!("{all} estimates, each as recorded to the last bit"),
+        _ => remark!(
+            "{all} estimates, of which {} are not as recorded, by palpate {}",
+            format_count(others),
+            playback.head().version
+        ),
+    }
+    Ok(())
+}
+
+/// Takes the raw readings through a session of another locator.
+fn by_another(
+    arguments: &Arguments,
+    locator: &Locator,
+    mut playback: Playback,
+    out: &mut impl std::io::Write,
+) -> Result<(), Failure> {
+    let mut session = Session::new(locator, &SessionConfig::default());
+    let extent = session.extent();
+    begin(arguments, extent, out)?;
+    let mut first_ns = None;
+    let mut outputs = Vec::new();
+    while let Some(recorded) = playback.next_recorded().map_err(Complaint::new)? {
+        let Recorded::Reading { unix_ns, values, .. } = recorded else { continue };
+        let elapsed_ns = unix_ns.saturating_sub(*first_ns.get_or_insert(unix_ns));
+        let at = Stamp { elapsed: Duration::from_nanos(elapsed_ns), unix_ns };
+        let bytes = palpate_live::source::line(&values).into_bytes();
+        session.receive(&Arrived { at, arrival: Arrival::Bytes(bytes) }, &mut outputs);
+        for output in outputs.drain(..) {
+            let Output::Sample(sample) = output else { continue };
+            let line = Line {
+                number: sample.number,
+                time_s: sample.unix_ns as f64 * 1e-9,
+                estimate: EstimateRecord::new(&sample.estimate, extent),
+            };
+            print(arguments, &line, extent, out)?;
+        }
+        if interrupted() {
+            return Err(Failure::Interrupted("stopped".to_owned()));
+        }
+    }
+    output::flush(out)?;
+    say_bad(&playback)
+}
+
+fn say_bad(playback: &Playback) -> Result<(), Failure> {
+    match playback.bad_messages {
+        0 => Ok(()),
+        bad => Err(Failure::DataLost(format!("{} messages are damaged", format_count(bad)))),
+    }
+}
+
+fn check_channels(head: &Head, locator: &Locator) -> Result<(), Failure> {
+    let wanted: Vec<(String, String)> = Channel::all_of(&locator.setup)
+        .into_iter()
+        .map(|channel| (channel.name, channel.unit.to_string()))
+        .collect();
+    let there: Vec<(String, String)> =
+        head.channels.iter().map(|channel| (channel.name.clone(), channel.unit.clone())).collect();
+    if wanted == there {
+        return Ok(());
+    }
+    let shown = |channels: &[(String, String)]| {
+        channels.iter().map(|(name, unit)| format!("{name} ({unit})")).collect::<Vec<_>>().join(", ")
+    };
+    let complaint =
+        format!("the recording has the channels {}; the locator wants {}", shown(&there), shown(&wanted));
+    Err(Complaint::new(complaint).into())
+}
+
+fn is_the_same(estimate: &EstimateRecord, before: &Map<String, Value>) -> bool {
+    serde_json::to_value(estimate).is_ok_and(|now| now.as_object() == Some(before))
+}
+
+fn begin(arguments: &Arguments, extent: Extent, out: &mut impl std::io::Write) -> Result<(), Failure> {
+    let heading = match (arguments.json, extent) {
+        (true, _) => "",
+        (_, Extent::Line { .. }) => "number,time_s,x_mm,force_n,x_low_mm,x_high_mm,status\n",
+        (_, Extent::Plane { .. }) => {
+            "number,time_s,x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,status\n"
+        }
+    };
+    output::print(out, heading.as_bytes())
+}
+
+fn print(
+    arguments: &Arguments,
+    line: &Line,
+    extent: Extent,
+    out: &mut impl std::io::Write,
+) -> Result<(), Failure> {
+    let text = if arguments.json {
+        serde_json::to_string(line).map_err(Complaint::new)? + "\n"
+    } else {
+        csv(line, extent)
+    };
+    output::print(out, text.as_bytes())
+}
+
+fn csv(line: &Line, extent: Extent) -> String {
+    let contact = &line.estimate.contact;
+    let mm = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.4}"));
+    let low_high = |ends: Option<[f64; 2]>| [mm(ends.map(|ends| ends[0])), mm(ends.map(|ends| ends[1]))];
+    let is_plane = matches!(extent, Extent::Plane { .. });
+    let mut cells = vec![line.number.to_string(), format!("{:.6}", line.time_s), mm(Some(contact.x_mm))];
+    cells.extend(is_plane.then(|| mm(contact.y_mm)));
+    cells.push(mm(contact.force_n));
+    cells.extend(low_high(contact.x_95_mm));
+    if is_plane {
+        cells.extend(low_high(contact.y_95_mm));
+    }
+    cells.push(line.estimate.status.to_owned());
+    csv_row(cells)
+}

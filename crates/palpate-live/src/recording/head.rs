@@ -1,0 +1,83 @@
+//! The head of a recording: what its readings are of.
+
+use super::RecordingError;
+use crate::frame::Channel;
+use palpate_estimators::estimator::Locator;
+use palpate_mechanics::surface::Extent;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Head of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Head {
+    /// Version of palpate that wrote it.
+    pub version: String,
+    /// The source of the readings, as its URL.
+    pub source: String,
+    /// Channels of a reading, in their order.
+    pub channels: Vec<RecordedChannel>,
+    /// The locator, as its file has it.
+    pub locator: String,
+}
+
+/// Channel of a recording.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecordedChannel {
+    /// Name of its sensor.
+    pub name: String,
+    /// Name by which the board calls it.
+    pub label: String,
+    /// Symbol of the unit of its numbers.
+    pub unit: String,
+}
+
+/// What a recorder must know to record a session.
+#[derive(Clone, Debug)]
+pub(super) struct Subject {
+    pub head: Head,
+    pub channels: Vec<Channel>,
+    pub extent: Extent,
+}
+
+impl Subject {
+    pub fn new(locator: &Locator, source: &str) -> Result<Self, RecordingError> {
+        let channels = Channel::all_of(&locator.setup);
+        let recorded = channels.iter().map(|channel| RecordedChannel {
+            name: channel.name.clone(),
+            label: channel.label.clone(),
+            unit: channel.unit.to_string(),
+        });
+        let head = Head {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            source: source.to_owned(),
+            channels: recorded.collect(),
+            locator: locator.to_json().map_err(|error| RecordingError::Encode(error.to_string()))?,
+        };
+        Ok(Self { head, channels, extent: locator.setup.surface().extent() })
+    }
+}
+
+/// Name of the metadata of a recording.
+pub(super) const METADATA: &str = "palpate";
+/// Name of the attachment that holds the locator.
+pub(super) const LOCATOR: &str = "locator.json";
+
+impl Head {
+    /// The metadata that say it, beside the locator.
+    pub(super) fn metadata(&self) -> BTreeMap<String, String> {
+        let channels = serde_json::to_string(&self.channels).unwrap_or_default();
+        let of = |key: &str, value: &str| (key.to_owned(), value.to_owned());
+        BTreeMap::from([of("version", &self.version), of("source", &self.source), of("channels", &channels)])
+    }
+
+    /// The head that metadata and an attachment say; `None` where the channels are not there.
+    pub(super) fn from_metadata(metadata: &BTreeMap<String, String>, locator: String) -> Option<Self> {
+        let text = |key: &str| metadata.get(key).cloned().unwrap_or_default();
+        Some(Self {
+            version: text("version"),
+            source: text("source"),
+            channels: serde_json::from_str(metadata.get("channels")?).ok()?,
+            locator,
+        })
+    }
+}

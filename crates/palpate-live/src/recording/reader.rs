@@ -1,0 +1,304 @@
+//! Recordings read again: lists of them, thinned parts for charts, and all of one in its order.
+
+use super::head::RecordedChannel;
+use super::mcap_file::{ChunkPlace, McapFile, RawMessage};
+use super::{EXTENSION, Head, RecordingError};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::path::Path;
+
+/// Summary of a recording.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RecordingSummary {
+    /// Name of its file.
+    pub name: String,
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// Its first instant, in seconds since 1970-01-01 00:00 UTC; `None` without any.
+    pub start_s: Option<f64>,
+    /// Seconds from its first instant to its last.
+    pub seconds: f64,
+    /// Readings in it.
+    pub readings: u64,
+    /// True where its end is missing: it is being recorded, or was cut off.
+    pub is_cut_off: bool,
+}
+
+/// Part of a recording, thinned to so many samples.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Excerpt {
+    /// Channels of a reading.
+    pub channels: Vec<RecordedChannel>,
+    /// First instant of the recording, in seconds since 1970-01-01 00:00 UTC; `None` without any.
+    pub start_s: Option<f64>,
+    /// Seconds from its first instant to its last.
+    pub seconds: f64,
+    /// Samples, as [`SampleRecord`](crate::sample::SampleRecord) has them.
+    pub samples: Vec<Value>,
+    /// All events, as [`EventRecord`](crate::event::EventRecord) has them.
+    pub events: Vec<Value>,
+}
+
+/// Recordings in a folder, newest first; files that are none are left out. A folder that is not there has none.
+///
+/// # Errors
+/// [`RecordingError::File`] for a folder that cannot be read.
+pub fn list(folder: &Path) -> Result<Vec<RecordingSummary>, RecordingError> {
+    let entries = match std::fs::read_dir(folder) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => {
+            return Err(RecordingError::File { verb: "list", path: folder.display().to_string(), error });
+        }
+        Ok(entries) => entries,
+    };
+    let paths = entries.flatten().map(|entry| entry.path());
+    let mut found: Vec<_> = paths
+        .filter(|path| path.extension().is_some_and(|extension| extension == EXTENSION))
+        .filter_map(|path| summary(&path).ok())
+        .collect();
+    found.sort_by(|a, b| {
+        let start = |summary: &RecordingSummary| summary.start_s.unwrap_or(f64::INFINITY);
+        start(b).total_cmp(&start(a)).then_with(|| a.name.cmp(&b.name))
+    });
+    Ok(found)
+}
+
+/// Summary of one recording.
+///
+/// # Errors
+/// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
+pub fn summary(path: &Path) -> Result<RecordingSummary, RecordingError> {
+    let file = McapFile::open(path)?;
+    let (start_s, seconds) = span_s(&file.chunks);
+    Ok(RecordingSummary {
+        name: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+        bytes: std::fs::metadata(path).map_or(0, |found| found.len()),
+        start_s,
+        seconds,
+        readings: file.chunks.iter().map(|chunk| chunk.readings).sum(),
+        is_cut_off: !file.is_whole,
+    })
+}
+
+/// The part of a recording between two times in seconds from its start, thinned evenly to at most `points` samples and the last one.
+///
+/// # Errors
+/// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
+pub fn read(path: &Path, from_s: f64, to_s: f64, points: usize) -> Result<Excerpt, RecordingError> {
+    let mut file = McapFile::open(path)?;
+    let (start_s, seconds) = span_s(&file.chunks);
+    let start_ns =
+        file.chunks.iter().map(|chunk| chunk.span_ns.0).filter(|start| *start > 0).min().unwrap_or(0);
+    let at_ns = |after_s: f64| start_ns.saturating_add((after_s.max(0.0) * 1e9) as u64);
+    let (from_ns, to_ns) = (at_ns(from_s), at_ns(to_s));
+    let chunks = file.chunks.iter().filter(|chunk| chunk.span_ns.0 <= to_ns && chunk.span_ns.1 >= from_ns);
+    let chunks: Vec<ChunkPlace> = chunks.copied().collect();
+    let readings: u64 = chunks.iter().map(|chunk| chunk.readings).sum();
+    let mut thinning = Thinning {
+        stride: readings.div_ceil(points.max(1) as u64).max(1),
+        channels: file.head.channels.clone(),
+        count: 0,
+        samples: Vec::new(),
+        last: None,
+        events: Vec::new(),
+    };
+    for chunk in &chunks {
+        for message in file.messages(chunk)? {
+            if (from_ns..=to_ns).contains(&message.unix_ns) {
+                thinning.add(message);
+            }
+        }
+    }
+    let (samples, events) = thinning.finish();
+    Ok(Excerpt { channels: file.head.channels.clone(), start_s, seconds, samples, events })
+}
+
+fn span_s(chunks: &[ChunkPlace]) -> (Option<f64>, f64) {
+    // A chunk that has no messages, or those before the clock was known, says 0.
+    let chunks = || chunks.iter().filter(|chunk| chunk.span_ns.0 > 0);
+    let (start, end) =
+        (chunks().map(|chunk| chunk.span_ns.0).min(), chunks().map(|chunk| chunk.span_ns.1).max());
+    let seconds = start.zip(end).map_or(0.0, |(start, end)| end.saturating_sub(start) as f64 * 1e-9);
+    (start.map(|start| start as f64 * 1e-9), seconds)
+}
+
+/// Samples of which every so many are kept.
+struct Thinning {
+    stride: u64,
+    channels: Vec<RecordedChannel>,
+    count: u64,
+    samples: Vec<Value>,
+    /// The last reading that is not kept so far, and whether it will be.
+    last: Option<(Pending, Keep)>,
+    events: Vec<Value>,
+}
+
+/// A reading whose estimate is to follow.
+struct Pending {
+    reading: RawMessage,
+    estimate: Option<RawMessage>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Keep {
+    Surely,
+    AsTheLast,
+}
+
+impl Thinning {
+    fn add(&mut self, message: RawMessage) {
+        match message.topic {
+            0 => {
+                if let Some((pending, Keep::Surely)) = self.last.take() {
+                    self.samples.extend(self.sample(&pending));
+                }
+                let keep =
+                    if self.count.is_multiple_of(self.stride) { Keep::Surely } else { Keep::AsTheLast };
+                self.count += 1;
+                self.last = Some((Pending { reading: message, estimate: None }, keep));
+            }
+            1 => {
+                if let Some((pending, _)) = &mut self.last {
+                    pending.estimate = Some(message);
+                }
+            }
+            _ => self.events.extend(serde_json::from_slice::<Value>(&message.data)),
+        }
+    }
+
+    fn finish(mut self) -> (Vec<Value>, Vec<Value>) {
+        if let Some((pending, _)) = self.last.take() {
+            self.samples.extend(self.sample(&pending));
+        }
+        (self.samples, self.events)
+    }
+
+    fn sample(&self, pending: &Pending) -> Option<Value> {
+        let reading: ReadingIn = serde_json::from_slice(&pending.reading.data).ok()?;
+        let mut sample = Map::new();
+        sample.insert("number".to_owned(), reading.number.into());
+        sample.insert("time_s".to_owned(), (pending.reading.unix_ns as f64 * 1e-9).into());
+        sample.insert("reading".to_owned(), reading.of(&self.channels)?.into());
+        if let Some(estimate) = &pending.estimate
+            && let Ok(estimate) = serde_json::from_slice::<Map<String, Value>>(&estimate.data)
+            && estimate.get("number") == sample.get("number")
+        {
+            sample.extend(estimate.into_iter().filter(|(key, _)| key != "located" && key != "number"));
+        }
+        Some(sample.into())
+    }
+}
+
+/// A message of `/reading`.
+#[derive(Deserialize)]
+struct ReadingIn {
+    number: u64,
+    values: Map<String, Value>,
+}
+
+impl ReadingIn {
+    fn of(&self, channels: &[RecordedChannel]) -> Option<Vec<f64>> {
+        channels.iter().map(|channel| self.values.get(&channel.name)?.as_f64()).collect()
+    }
+}
+
+/// What a recording holds, one by one.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Recorded {
+    /// A reading, as the board sent it.
+    Reading {
+        /// Which of the session, from 0.
+        number: u64,
+        /// Its time, in ns since 1970.
+        unix_ns: u64,
+        /// One number a channel, in the units of the head's channels.
+        values: Vec<f64>,
+    },
+    /// The estimate of a reading.
+    Estimate {
+        /// The reading that it is of.
+        number: u64,
+        /// Its time, in ns since 1970.
+        unix_ns: u64,
+        /// The reading that was located, in SI units or raw.
+        located: Vec<f64>,
+        /// The estimate, as its record has it.
+        estimate: Map<String, Value>,
+    },
+    /// An event.
+    Event {
+        /// Its time, in ns since 1970.
+        unix_ns: u64,
+        /// The event, as its record has it.
+        event: Map<String, Value>,
+    },
+}
+
+/// All of a recording, in its order.
+#[derive(Debug)]
+pub struct Playback {
+    file: McapFile,
+    chunk: usize,
+    messages: std::vec::IntoIter<RawMessage>,
+    /// Messages that were not understood.
+    pub bad_messages: u64,
+}
+
+impl Playback {
+    /// Opens a recording, whole or cut off.
+    ///
+    /// # Errors
+    /// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        let file = McapFile::open(path)?;
+        Ok(Self { file, chunk: 0, messages: Vec::new().into_iter(), bad_messages: 0 })
+    }
+
+    /// What it says of itself.
+    pub fn head(&self) -> &Head {
+        &self.file.head
+    }
+
+    /// True where its end is there.
+    pub fn is_whole(&self) -> bool {
+        self.file.is_whole
+    }
+
+    /// The next of what it holds; `None` at its end.
+    ///
+    /// # Errors
+    /// [`RecordingError::File`] for a file that cannot be read.
+    pub fn next_recorded(&mut self) -> Result<Option<Recorded>, RecordingError> {
+        loop {
+            if let Some(message) = self.messages.next() {
+                match self.understand(&message) {
+                    Some(recorded) => return Ok(Some(recorded)),
+                    None => self.bad_messages += 1,
+                }
+                continue;
+            }
+            let Some(chunk) = self.file.chunks.get(self.chunk).copied() else { return Ok(None) };
+            self.chunk += 1;
+            self.messages = self.file.messages(&chunk)?.into_iter();
+        }
+    }
+
+    fn understand(&self, message: &RawMessage) -> Option<Recorded> {
+        let (unix_ns, data) = (message.unix_ns, &message.data);
+        match message.topic {
+            0 => {
+                let reading: ReadingIn = serde_json::from_slice(data).ok()?;
+                let values = reading.of(&self.file.head.channels)?;
+                Some(Recorded::Reading { number: reading.number, unix_ns, values })
+            }
+            1 => {
+                let mut estimate: Map<String, Value> = serde_json::from_slice(data).ok()?;
+                let number = estimate.remove("number")?.as_u64()?;
+                let located = estimate.remove("located")?;
+                let located = located.as_array()?.iter().map(Value::as_f64).collect::<Option<_>>()?;
+                Some(Recorded::Estimate { number, unix_ns, located, estimate })
+            }
+            _ => Some(Recorded::Event { unix_ns, event: serde_json::from_slice(data).ok()? }),
+        }
+    }
+}

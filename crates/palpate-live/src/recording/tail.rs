@@ -1,0 +1,89 @@
+//! The end of a file that grows: bytes that could not be written yet are kept, and written as soon as there is room.
+
+use super::RecordingError;
+use std::fs::{File, Metadata};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// A file that is only appended to.
+#[derive(Debug)]
+pub struct Tail {
+    file: File,
+    path: PathBuf,
+    identity: Option<(u64, u64)>,
+    /// Bytes in the file.
+    written: u64,
+    /// Bytes that are not yet.
+    pending: Vec<u8>,
+}
+
+impl Tail {
+    /// Makes a file, which must not be there yet.
+    ///
+    /// # Errors
+    /// [`RecordingError`] where it is there, or cannot be made.
+    pub fn create(path: &Path) -> Result<Self, RecordingError> {
+        let shown = || path.display().to_string();
+        let file = File::create_new(path).map_err(|error| match error.kind() {
+            ErrorKind::AlreadyExists => RecordingError::Exists { path: shown() },
+            _ => RecordingError::File { verb: "make", path: shown(), error },
+        })?;
+        let identity = file.metadata().ok().as_ref().and_then(identity);
+        Ok(Self { file, path: path.to_owned(), identity, written: 0, pending: Vec::new() })
+    }
+
+    /// Bytes in the file, and those that wait for room.
+    pub fn bytes(&self) -> u64 {
+        self.written
+    }
+
+    /// Bytes that wait for room.
+    pub fn waiting(&self) -> usize {
+        self.pending.len()
+    }
+
+    /// Takes bytes, which [`Self::write`] writes.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.pending.extend_from_slice(bytes);
+    }
+
+    /// Hands to the operating system what waits. What it does not take is kept.
+    ///
+    /// # Errors
+    /// The error with which it refused the rest.
+    pub fn write(&mut self) -> std::io::Result<()> {
+        let mut done = 0;
+        let result = loop {
+            match self.file.write(&self.pending[done..]) {
+                _ if done == self.pending.len() => break Ok(()),
+                Ok(0) => break Err(ErrorKind::WriteZero.into()),
+                Ok(count) => done += count,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => break Err(error),
+            }
+        };
+        self.pending.drain(..done);
+        self.written += done as u64;
+        result
+    }
+
+    /// False once the file's name leads to it no more: somebody took it or its folder away.
+    pub fn is_there(&self) -> bool {
+        match std::fs::metadata(&self.path) {
+            Ok(found) => self.identity.is_none() || identity(&found) == self.identity,
+            Err(error) => error.kind() != ErrorKind::NotFound,
+        }
+    }
+}
+
+#[cfg(unix)]
+#[expect(clippy::unnecessary_wraps, reason = "other systems have none")]
+fn identity(file: &Metadata) -> Option<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt;
+    Some((file.dev(), file.ino()))
+}
+
+#[cfg(not(unix))]
+fn identity(_: &Metadata) -> Option<(u64, u64)> {
+    None
+}

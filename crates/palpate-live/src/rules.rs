@@ -1,0 +1,397 @@
+//! Rules: what is published when a contact is somewhere, or presses so hard, or something happens.
+//!
+//! A rule file is TOML:
+//!
+//! ```toml
+//! [[rule]]
+//! name = "hand near the clamp"
+//! x = ["0 mm", "50 mm"]          # a band of positions
+//! force = ["2 N", "50 N"]        # a band of forces
+//! hold = "50 ms"                 # for so long before it acts, and before it can act again
+//! topic = "machine/stop"
+//! message = "1"
+//!
+//! [[rule]]
+//! name = "unplugged"
+//! event = "source_lost"
+//! topic = "machine/stop"
+//! message = "sensor"
+//! ```
+
+use crate::event::EventRecord;
+use crate::sample::Sample;
+use crate::session::Output;
+use palpate_core::{ContactEstimate, Status};
+use palpate_mechanics::units::{Dimension, Quantity};
+use serde::Deserialize;
+use std::ops::Range;
+use std::time::Duration;
+use toml::Spanned;
+
+/// Rules of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rules(Vec<Rule>);
+
+/// A rule.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rule {
+    /// Its name.
+    pub name: String,
+    /// When it acts.
+    pub condition: Condition,
+    /// The topic on which it publishes.
+    pub topic: String,
+    /// The message.
+    pub message: String,
+}
+
+/// When a rule acts.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Condition {
+    /// While a contact is in these bands, for so long.
+    Contact {
+        /// Positions along the surface, in m.
+        x_m: Option<(f64, f64)>,
+        /// Positions across it, in m.
+        y_m: Option<(f64, f64)>,
+        /// Forces, in N.
+        force_n: Option<(f64, f64)>,
+        /// Time for which it must be there before the rule acts, and not be there before it can act again.
+        hold: Duration,
+    },
+    /// At an event of this name.
+    Event(String),
+}
+
+/// A rule file that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{problem}")]
+pub struct RuleError {
+    /// What is wrong.
+    pub problem: String,
+    /// The bytes of the file that are meant.
+    pub span: Option<Range<usize>>,
+}
+
+/// Names of events, as records have them.
+const EVENTS: [&str; 14] = [
+    "source_opened",
+    "source_lost",
+    "source_ended",
+    "gap",
+    "clock_set",
+    "touch_down",
+    "move",
+    "lift_off",
+    "outside_model",
+    "second_contact",
+    "channel",
+    "tared",
+    "trouble",
+    "mark",
+];
+/// Most rules of a file.
+const MOST: usize = 1000;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileIn {
+    #[serde(default)]
+    rule: Vec<Spanned<RuleIn>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RuleIn {
+    name: Option<Spanned<String>>,
+    x: Option<Spanned<[Spanned<String>; 2]>>,
+    y: Option<Spanned<[Spanned<String>; 2]>>,
+    force: Option<Spanned<[Spanned<String>; 2]>>,
+    hold: Option<Spanned<String>>,
+    event: Option<Spanned<String>>,
+    topic: Spanned<String>,
+    message: String,
+}
+
+impl Rules {
+    /// The rules of a file's text.
+    ///
+    /// # Errors
+    /// [`RuleError`] for the first thing that is wrong, with its place.
+    pub fn from_toml(text: &str) -> Result<Self, RuleError> {
+        let file: FileIn = toml::from_str(text)
+            .map_err(|error| RuleError { problem: error.message().to_owned(), span: error.span() })?;
+        if file.rule.is_empty() {
+            return Err(RuleError { problem: "there is no [[rule]]".to_owned(), span: None });
+        }
+        if let Some(beyond) = file.rule.get(MOST) {
+            return Err(at(beyond.span(), format!("there are more than {MOST} rules")));
+        }
+        let rules = file.rule.into_iter().enumerate().map(|(i, rule)| Rule::read(i + 1, rule));
+        rules.collect::<Result<_, _>>().map(Self)
+    }
+
+    /// The rules.
+    pub fn as_slice(&self) -> &[Rule] {
+        &self.0
+    }
+}
+
+impl Rule {
+    fn read(number: usize, given: Spanned<RuleIn>) -> Result<Self, RuleError> {
+        let span = given.span();
+        let given = given.into_inner();
+        let topic = given.topic.get_ref();
+        if topic.is_empty() || topic.len() > 1000 || topic.contains(['+', '#', '\0']) {
+            let problem = "`topic` must have 1 to 1000 bytes, and none of + and #".to_owned();
+            return Err(at(given.topic.span(), problem));
+        }
+        let hold = match &given.hold {
+            None => Duration::ZERO,
+            Some(hold) => duration(hold)?,
+        };
+        let x_m = band("x", Dimension::Length, given.x.as_ref())?;
+        let y_m = band("y", Dimension::Length, given.y.as_ref())?;
+        let force_n = band("force", Dimension::Force, given.force.as_ref())?;
+        let of_contact = [&given.x, &given.y, &given.force].into_iter().flatten().next();
+        let condition = match (given.event, of_contact) {
+            (Some(event), Some(_)) => {
+                return Err(at(event.span(), "`event` does not go with `x`, `y` and `force`".to_owned()));
+            }
+            (Some(event), None) => {
+                if let Some(hold) = &given.hold {
+                    return Err(at(hold.span(), "`hold` does not go with `event`".to_owned()));
+                }
+                if !EVENTS.contains(&event.get_ref().as_str()) {
+                    let known = EVENTS.join(", ");
+                    return Err(at(
+                        event.span(),
+                        format!("`event` is `{}`; known are {known}", event.get_ref()),
+                    ));
+                }
+                Condition::Event(event.into_inner())
+            }
+            (None, Some(_)) => Condition::Contact { x_m, y_m, force_n, hold },
+            (None, None) => {
+                return Err(at(span, "the rule has no `x`, `y`, `force` or `event` to act on".to_owned()));
+            }
+        };
+        Ok(Self {
+            name: given.name.map_or_else(|| format!("rule {number}"), Spanned::into_inner),
+            condition,
+            topic: given.topic.into_inner(),
+            message: given.message,
+        })
+    }
+}
+
+fn at(span: Range<usize>, problem: String) -> RuleError {
+    RuleError { problem, span: Some(span) }
+}
+
+fn quantity(key: &str, dimension: Dimension, text: &Spanned<String>) -> Result<f64, RuleError> {
+    let value = Quantity::parse_as(text.get_ref(), dimension);
+    value.map_err(|error| at(text.span(), format!("`{key}`: {error}")))
+}
+
+fn duration(hold: &Spanned<String>) -> Result<Duration, RuleError> {
+    let seconds = quantity("hold", Dimension::Time, hold)?;
+    if (0.0..=3600.0).contains(&seconds) {
+        return Ok(Duration::from_secs_f64(seconds));
+    }
+    Err(at(hold.span(), format!("`hold` is {}; it must be from 0 s to 3600 s", hold.get_ref())))
+}
+
+fn band(
+    key: &str,
+    dimension: Dimension,
+    ends: Option<&Spanned<[Spanned<String>; 2]>>,
+) -> Result<Option<(f64, f64)>, RuleError> {
+    let Some(ends) = ends else { return Ok(None) };
+    let [low, high] = ends.get_ref();
+    let band = (quantity(key, dimension, low)?, quantity(key, dimension, high)?);
+    if band.0 < band.1 {
+        return Ok(Some(band));
+    }
+    let (low, high) = (low.get_ref(), high.get_ref());
+    Err(at(ends.span(), format!("`{key}` is from {low} to {high}; the first must be less than the second")))
+}
+
+/// Watch over the rules in the course of a session.
+#[derive(Debug)]
+pub struct RuleWatch {
+    rules: Rules,
+    states: Vec<State>,
+}
+
+/// State of a rule.
+#[derive(Clone, Copy, Debug, Default)]
+struct State {
+    acted: bool,
+    /// Instant since which the condition is otherwise than the rule has it.
+    changed: Option<Duration>,
+}
+
+impl RuleWatch {
+    /// Watch over rules of which none has acted.
+    pub fn new(rules: Rules) -> Self {
+        Self { states: vec![State::default(); rules.0.len()], rules }
+    }
+
+    /// Takes the next output of a session, and hands on the rules that act now.
+    pub fn add(&mut self, output: &Output, mut act: impl FnMut(&Rule)) {
+        for (rule, state) in self.rules.0.iter().zip(&mut self.states) {
+            let acts = match (output, &rule.condition) {
+                (Output::Sample(sample), condition @ Condition::Contact { hold, .. }) => {
+                    state.next(sample.arrived, *hold, condition.holds(sample))
+                }
+                (Output::Event(event), Condition::Event(name)) => is_called(event, name),
+                _ => false,
+            };
+            if acts {
+                act(rule);
+            }
+        }
+    }
+}
+
+impl State {
+    /// Takes whether the condition holds now; true when the rule acts.
+    fn next(&mut self, now: Duration, hold: Duration, holds: bool) -> bool {
+        if holds == self.acted {
+            self.changed = None;
+            return false;
+        }
+        let since = *self.changed.get_or_insert(now);
+        if now.saturating_sub(since) < hold {
+            return false;
+        }
+        (self.acted, self.changed) = (holds, None);
+        holds
+    }
+}
+
+impl Condition {
+    fn holds(&self, sample: &Sample) -> bool {
+        let estimate = &sample.estimate;
+        let touches = matches!(estimate.status, Status::Located | Status::Ambiguous);
+        touches
+            && std::iter::once(&estimate.contact)
+                .chain(estimate.further.as_slice())
+                .any(|contact| self.has(contact))
+    }
+
+    fn has(&self, contact: &ContactEstimate) -> bool {
+        let Self::Contact { x_m, y_m, force_n, .. } = self else { return false };
+        let within = |band: Option<(f64, f64)>, value: Option<f64>| match (band, value) {
+            (None, _) => true,
+            // A force that is not estimated is in no band.
+            (Some(_), None) => false,
+            (Some((low, high)), Some(value)) => (low..=high).contains(&value),
+        };
+        within(*x_m, Some(contact.position.x_m))
+            && within(*y_m, Some(contact.position.y_m))
+            && within(*force_n, contact.force_n)
+    }
+}
+
+fn is_called(event: &EventRecord, name: &str) -> bool {
+    event.event.name() == name
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_core::{Estimate, Position};
+
+    const FILE: &str = r#"
+        [[rule]]
+        name = "near the clamp"
+        x = ["0 mm", "50 mm"]
+        hold = "20 ms"
+        topic = "stop"
+        message = "1"
+
+        [[rule]]
+        event = "source_lost"
+        topic = "stop"
+        message = "sensor"
+    "#;
+
+    fn sample(ms: u64, x_mm: Option<f64>) -> Output {
+        let estimate = match x_mm {
+            Some(x_mm) => Estimate::of_position(Position::along(x_mm * 1e-3), Status::Located),
+            None => Estimate::of_position(Position::along(0.02), Status::NoContact),
+        };
+        Output::Sample(Box::new(Sample {
+            number: ms,
+            unix_ns: 0,
+            arrived: Duration::from_millis(ms),
+            reading: Vec::new(),
+            tared: Vec::new(),
+            estimate,
+        }))
+    }
+
+    #[test]
+    fn a_band_acts_once_it_holds_and_again_only_after_it_was_left_for_as_long() {
+        let mut watch = RuleWatch::new(Rules::from_toml(FILE).unwrap());
+        let mut acted = Vec::new();
+        // Bounces at 5 and 43 ms; there from 10, left from 50 to 80, there again from 90.
+        let course = [
+            (0, None),
+            (5, Some(30.0)),
+            (6, None),
+            (10, Some(30.0)),
+            (29, Some(31.0)),
+            (30, Some(31.0)),
+            (43, None),
+            (44, Some(30.0)),
+            (50, Some(120.0)),
+            (71, Some(120.0)),
+            (90, Some(30.0)),
+            (110, Some(30.0)),
+        ];
+        for (ms, x_mm) in course {
+            watch.add(&sample(ms, x_mm), |rule| acted.push((ms, rule.name.clone())));
+        }
+        assert_eq!(acted, [(30, "near the clamp".to_owned()), (110, "near the clamp".to_owned())]);
+    }
+
+    #[test]
+    fn an_event_acts_by_its_name() {
+        let mut watch = RuleWatch::new(Rules::from_toml(FILE).unwrap());
+        let mut acted = 0;
+        for event in [
+            crate::event::Event::SourceEnded,
+            crate::event::Event::SourceLost { why: "unplugged".to_owned() },
+        ] {
+            watch.add(&Output::Event(EventRecord { time_s: 0.0, event }), |rule| {
+                acted += 1;
+                assert_eq!(rule.message, "sensor");
+            });
+        }
+        assert_eq!(acted, 1);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_at_its_place() {
+        let cases = [
+            (r#"x = ["5 mm", "1 mm"]"#, r#"["5 mm", "1 mm"]"#),
+            (r#"x = ["5 N", "1 mm"]"#, r#""5 N""#),
+            (r#"event = "touchdown""#, r#""touchdown""#),
+            (
+                r#"force = ["1 N", "2 N"]
+                hold = "-1 s""#,
+                r#""-1 s""#,
+            ),
+            (r#"colour = 3"#, "colour"),
+        ];
+        for (line, meant) in cases {
+            let text = format!("[[rule]]\n{line}\ntopic = \"t\"\nmessage = \"\"\n");
+            let error = Rules::from_toml(&text).unwrap_err();
+            assert_eq!(&text[error.span.clone().unwrap()], meant, "{error}");
+        }
+        assert!(Rules::from_toml("").is_err());
+    }
+}

@@ -1,0 +1,256 @@
+//! The finger that touches a simulated board: at random, by a script, or where a stage has it.
+
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::surface::Extent;
+use palpate_rig::Rig;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// A finger that touches, slides and lifts at random.
+#[derive(Clone, Debug)]
+pub struct Finger {
+    rng: Xoshiro256PlusPlus,
+    extent: Extent,
+    force_n: Option<f64>,
+    typical_n: f64,
+    touch: Touch,
+    script: Option<Vec<Waypoint>>,
+    /// Where a stage holds it: on the surface, or lifted.
+    held: Option<Option<Contact>>,
+}
+
+/// Where a script has the finger at a time; lifted without a contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Waypoint {
+    time_s: f64,
+    contact: Option<Contact>,
+}
+
+/// A line of a script that cannot be followed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("line {line} of the script, `{text}`: {problem}")]
+pub struct ScriptError {
+    /// Number of the line, from 1.
+    pub line: usize,
+    /// Its text.
+    pub text: String,
+    /// What is wrong with it.
+    pub problem: &'static str,
+}
+
+/// A touch: from a place to another.
+#[derive(Clone, Copy, Debug)]
+struct Touch {
+    from: Position,
+    to: Position,
+    force_n: f64,
+    start_s: f64,
+    end_s: f64,
+}
+
+impl Finger {
+    /// Time between touches, in seconds.
+    const LIFTED_S: (f64, f64) = (0.8, 2.0);
+    /// Length of a touch, in seconds.
+    const TOUCH_S: (f64, f64) = (1.5, 5.0);
+    /// Time in which the force comes and goes, in seconds.
+    const PRESS_S: f64 = 0.1;
+    /// Share of the side at either edge that is not touched.
+    const MARGIN: f64 = 0.05;
+
+    /// A finger on the surface of a rig, with the rig's force where that is known, else around that of its presses.
+    pub fn random(rig: &Rig, seed: u64) -> Self {
+        let typical_n = rig.training.as_ref().and_then(|training| training.force_n).unwrap_or(1.0);
+        let nowhere = Position::default();
+        let touch = Touch { from: nowhere, to: nowhere, force_n: 0.0, start_s: 0.0, end_s: 0.0 };
+        let mut finger = Self {
+            script: None,
+            held: None,
+            // A stream of its own, beside that of the noise.
+            rng: Xoshiro256PlusPlus::seed_from_u64(seed ^ 0xF1_46E2),
+            extent: rig.setup.surface().extent(),
+            force_n: rig.setup.force_n(),
+            typical_n,
+            touch,
+        };
+        finger.touch = finger.next_touch(0.0);
+        finger
+    }
+
+    /// The contact at a time in seconds, which never goes back; `None` while nothing touches.
+    pub fn contact_at(&mut self, time_s: f64) -> Option<Contact> {
+        if let Some(held) = self.held {
+            return held;
+        }
+        if let Some(script) = &self.script {
+            return scripted(script, time_s);
+        }
+        while time_s >= self.touch.end_s {
+            self.touch = self.next_touch(self.touch.end_s);
+        }
+        let Touch { from, to, force_n, start_s, end_s } = self.touch;
+        if time_s < start_s {
+            return None;
+        }
+        let share = smooth((time_s - start_s) / (end_s - start_s));
+        let pressed = match self.force_n {
+            // Of a surface whose force is known, nothing less presses.
+            Some(_) => 1.0,
+            None => smooth((time_s - start_s).min(end_s - time_s) / Self::PRESS_S),
+        };
+        let between = |from: f64, to: f64| from + share * (to - from);
+        let position = Position { x_m: between(from.x_m, to.x_m), y_m: between(from.y_m, to.y_m) };
+        Some(Contact { position, force_n: force_n * pressed.max(1e-3) })
+    }
+
+    /// The same finger, which follows a script: lines of `time,x,y,force` in s, mm and N, between which it moves evenly. A force of 0 is lifted, and a line that
+    /// does not begin with a number, such as a heading, is passed over where it is the first.
+    ///
+    /// # Errors
+    /// [`ScriptError`] for the first line that is none, or whose time is not after that before it, or that is off the surface.
+    pub fn with_script(mut self, text: &str) -> Result<Self, ScriptError> {
+        let mut script: Vec<Waypoint> = Vec::new();
+        for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+            let error = |problem| ScriptError { line: i + 1, text: line.trim().to_owned(), problem };
+            let numbers: Option<Vec<f64>> = line
+                .split(',')
+                .map(|cell| cell.trim().parse().ok().filter(|x: &f64| x.is_finite()))
+                .collect();
+            let Some(&[time_s, x_mm, y_mm, force_n]) = numbers.as_deref() else {
+                if i == 0 && line.split(',').all(|cell| cell.trim().parse::<f64>().is_err()) {
+                    continue;
+                }
+                return Err(error("it must be four numbers: time in s, x and y in mm, force in N"));
+            };
+            if time_s < 0.0 || script.last().is_some_and(|last| time_s <= last.time_s) {
+                return Err(error("its time must be at least 0, and after that of the line before it"));
+            }
+            let contact = self.contact(x_mm, y_mm, force_n).map_err(error)?;
+            script.push(Waypoint { time_s, contact });
+        }
+        self.script = Some(script);
+        Ok(self)
+    }
+
+    /// Does what a line of a stage says: `finger x y force` in mm and N holds it there, `lift` lifts it, `reset` lets it go its own way again.
+    ///
+    /// # Errors
+    /// What is wrong with the line, in words.
+    pub fn obey(&mut self, line: &str) -> Result<(), &'static str> {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words.as_slice() {
+            ["lift"] => self.held = Some(None),
+            ["reset"] => self.held = None,
+            ["finger", numbers @ ..] => {
+                let numbers: Option<Vec<f64>> = numbers.iter().map(|word| word.parse().ok()).collect();
+                let Some(&[x_mm, y_mm, force_n]) = numbers.as_deref() else {
+                    return Err("`finger` wants three numbers: x and y in mm, force in N");
+                };
+                self.held = Some(self.contact(x_mm, y_mm, force_n)?);
+            }
+            _ => return Err("commands are `finger x y force`, `lift` and `reset`"),
+        }
+        Ok(())
+    }
+
+    fn contact(&self, x_mm: f64, y_mm: f64, force_n: f64) -> Result<Option<Contact>, &'static str> {
+        let position = Position { x_m: x_mm * 1e-3, y_m: y_mm * 1e-3 };
+        let width_m = self.extent.width_m().unwrap_or(0.0);
+        let is_on =
+            (0.0..=self.extent.length_m()).contains(&position.x_m) && (0.0..=width_m).contains(&position.y_m);
+        match force_n {
+            0.0 => Ok(None),
+            _ if !(force_n > 0.0 && force_n.is_finite()) => Err("the force must be at least 0 N"),
+            _ if !is_on => Err("it is off the surface"),
+            _ => Ok(Some(Contact { position, force_n })),
+        }
+    }
+
+    fn next_touch(&mut self, after_s: f64) -> Touch {
+        let start_s = after_s + self.between(Self::LIFTED_S);
+        let end_s = start_s + self.between(Self::TOUCH_S);
+        let force_n = match self.force_n {
+            Some(force_n) => force_n,
+            None => self.typical_n * self.between((0.5, 1.5)),
+        };
+        Touch { from: self.place(), to: self.place(), force_n, start_s, end_s }
+    }
+
+    fn place(&mut self) -> Position {
+        let share = (Self::MARGIN, 1.0 - Self::MARGIN);
+        let x_m = self.extent.length_m() * self.between(share);
+        let y_m = self.extent.width_m().map_or(0.0, |width_m| width_m * self.between(share));
+        Position { x_m, y_m }
+    }
+
+    fn between(&mut self, (low, high): (f64, f64)) -> f64 {
+        self.rng.random_range(low..high)
+    }
+}
+
+/// Where a script has the finger: between two waypoints on the surface evenly on the way, else where the last one says.
+fn scripted(script: &[Waypoint], time_s: f64) -> Option<Contact> {
+    let next = script.partition_point(|waypoint| waypoint.time_s <= time_s);
+    let last = script.get(next.checked_sub(1)?)?;
+    let (Some(from), Some(Waypoint { time_s: end_s, contact: Some(to) })) = (last.contact, script.get(next))
+    else {
+        return last.contact;
+    };
+    let share = (time_s - last.time_s) / (end_s - last.time_s);
+    let between = |from: f64, to: f64| from + share * (to - from);
+    let position = Position {
+        x_m: between(from.position.x_m, to.position.x_m),
+        y_m: between(from.position.y_m, to.position.y_m),
+    };
+    Some(Contact { position, force_n: between(from.force_n, to.force_n) })
+}
+
+/// A rise from 0 to 1 without a kink.
+fn smooth(share: f64) -> f64 {
+    let share = share.clamp(0.0, 1.0);
+    share * share * (3.0 - 2.0 * share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn finger() -> Finger {
+        Finger::random(&Rig::from_toml(include_str!("../../../../examples/noisy-beam.toml")).unwrap(), 1)
+    }
+
+    #[test]
+    fn a_script_is_followed_evenly_and_lifts() {
+        let script = "time,x,y,force\n1,100,0,1\n3,200,0,2\n4,0,0,0\n";
+        let mut finger = finger().with_script(script).unwrap();
+        assert_eq!(finger.contact_at(0.5), None);
+        let middle = finger.contact_at(2.0).unwrap();
+        assert!((middle.position.x_m - 0.15).abs() < 1e-12 && (middle.force_n - 1.5).abs() < 1e-12);
+        assert_eq!(finger.contact_at(3.5).unwrap().force_n, 2.0);
+        assert_eq!(finger.contact_at(9.0), None);
+    }
+
+    #[test]
+    fn lines_that_no_script_has_are_named() {
+        for (script, line) in
+            [("1,2,3\n", 1), ("1,0,0,1\n1,0,0,1\n", 2), ("1,1000,0,1\n", 1), ("h\n0,0,0,nan", 2)]
+        {
+            assert_eq!(finger().with_script(script).unwrap_err().line, line, "{script}");
+        }
+    }
+
+    #[test]
+    fn a_stage_moves_it() {
+        let mut finger = finger();
+        finger.obey("finger 120 0 2.5").unwrap();
+        let contact = finger.contact_at(0.0).unwrap();
+        assert!((contact.position.x_m - 0.12).abs() < 1e-12 && contact.force_n == 2.5);
+        finger.obey("lift").unwrap();
+        assert_eq!(finger.contact_at(0.0), None);
+        for wrong in ["finger 1 2", "finger 999 0 1", "finger 1 0 -1", "finger a b c", "dance", ""] {
+            assert!(finger.obey(wrong).is_err(), "{wrong}");
+        }
+        finger.obey("reset").unwrap();
+        assert!((0..100).any(|tenth| finger.contact_at(f64::from(tenth) * 0.1).is_some()));
+    }
+}

@@ -1,0 +1,271 @@
+//! The link of a simulated board: where its frames go, and where lines that move its finger come from.
+
+#[cfg(unix)]
+mod pty;
+mod publisher;
+
+use std::fmt;
+use std::io::{ErrorKind, Read, Write};
+use std::net::{TcpListener, TcpStream, ToSocketAddrs, UdpSocket};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Most bytes that wait for a slow reader: those of frames beyond are lost, as they are in a board's buffer.
+const MOST_WAITING: usize = 1 << 16;
+/// Longest line that moves the finger.
+const LONGEST: usize = 1 << 10;
+
+/// Where a simulated board is plugged in.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LinkUrl {
+    /// `-`: the standard output.
+    Stdout,
+    /// `pty`, or `pty:PATH` with a symbolic link there that leads to it: a pseudo-terminal, as a serial port.
+    Pty(Option<PathBuf>),
+    /// `tcp://:port`: one client at a time.
+    Tcp(String),
+    /// `udp://host:port`: a datagram a frame.
+    Udp(String),
+    /// `mqtt://host/topic`: a message a frame.
+    Mqtt(crate::sink::MqttUrl),
+}
+
+/// Text that is no link.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{text}` is no place for a board; places are `pty`, `pty:PATH`, `tcp://:7000`, `udp://host:7000`, `mqtt://host/topic` and `-`"
+)]
+pub struct LinkUrlError {
+    /// The text.
+    pub text: String,
+}
+
+/// A link that cannot be opened.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot open {url}: {error}")]
+pub struct LinkError {
+    /// The link.
+    pub url: LinkUrl,
+    /// Why.
+    pub error: std::io::Error,
+}
+
+/// An open link.
+pub struct Link {
+    way: Way,
+    name: String,
+    waiting: Vec<u8>,
+    received: Vec<u8>,
+    /// Frames for which nobody was there, or that nobody read.
+    pub unread: u64,
+}
+
+enum Way {
+    Stdout(std::io::Stdout),
+    #[cfg(unix)]
+    Pty(pty::Pty),
+    Tcp {
+        listener: TcpListener,
+        client: Option<TcpStream>,
+    },
+    Udp {
+        socket: UdpSocket,
+        to: std::net::SocketAddr,
+    },
+    Mqtt(publisher::Publisher),
+}
+
+impl FromStr for LinkUrl {
+    type Err = LinkUrlError;
+
+    fn from_str(text: &str) -> Result<Self, LinkUrlError> {
+        let error = || LinkUrlError { text: text.to_owned() };
+        let address = |rest: &str, host: &str| {
+            let (given, port) = rest.rsplit_once(':').ok_or_else(error)?;
+            port.parse::<u16>().map_err(|_| error())?;
+            Ok(format!("{}:{port}", if given.is_empty() { host } else { given }))
+        };
+        match text.split_once(':') {
+            None if text == "-" => Ok(Self::Stdout),
+            None if text == "pty" => Ok(Self::Pty(None)),
+            Some(("pty", path)) if !path.is_empty() => Ok(Self::Pty(Some(path.into()))),
+            Some(("tcp", rest)) => {
+                Ok(Self::Tcp(address(rest.strip_prefix("//").ok_or_else(error)?, "127.0.0.1")?))
+            }
+            Some(("udp", rest)) => {
+                Ok(Self::Udp(address(rest.strip_prefix("//").ok_or_else(error)?, "127.0.0.1")?))
+            }
+            Some(("mqtt", _)) => Ok(Self::Mqtt(text.parse().map_err(|_| error())?)),
+            _ => Err(error()),
+        }
+    }
+}
+
+impl fmt::Display for LinkUrl {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Stdout => f.write_str("-"),
+            Self::Pty(None) => f.write_str("pty"),
+            Self::Pty(Some(path)) => write!(f, "pty:{}", path.display()),
+            Self::Tcp(address) => write!(f, "tcp://{address}"),
+            Self::Udp(address) => write!(f, "udp://{address}"),
+            Self::Mqtt(url) => url.fmt(f),
+        }
+    }
+}
+
+impl Link {
+    /// Opens a link.
+    ///
+    /// # Errors
+    /// [`LinkError`] where the system does not give it.
+    pub fn open(url: &LinkUrl) -> Result<Self, LinkError> {
+        let (way, name) = open(url).map_err(|error| LinkError { url: url.clone(), error })?;
+        Ok(Self { way, name, waiting: Vec::new(), received: Vec::new(), unread: 0 })
+    }
+
+    /// Where it is reached: the path of a pseudo-terminal, the address of a socket.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Sends a frame, without waiting for anybody.
+    ///
+    /// # Errors
+    /// Where the link is of no use any more, as stdout whose reader has gone.
+    pub fn send(&mut self, frame: &[u8]) -> std::io::Result<()> {
+        match &mut self.way {
+            Way::Stdout(out) => {
+                out.write_all(frame)?;
+                return out.flush();
+            }
+            Way::Udp { socket, to } => {
+                self.unread += u64::from(socket.send_to(frame, *to).is_err());
+                return Ok(());
+            }
+            Way::Mqtt(publisher) => {
+                self.unread += u64::from(!publisher.publish(frame));
+                return Ok(());
+            }
+            Way::Tcp { listener, client } => {
+                if client.is_none()
+                    && let Ok((stream, _)) = listener.accept()
+                {
+                    stream.set_nonblocking(true)?;
+                    let _ = stream.set_nodelay(true);
+                    *client = Some(stream);
+                }
+                if client.is_none() {
+                    self.unread += 1;
+                    return Ok(());
+                }
+            }
+            #[cfg(unix)]
+            Way::Pty(_) => {}
+        }
+        if self.waiting.len() + frame.len() > MOST_WAITING {
+            self.unread += 1;
+        } else {
+            self.waiting.extend_from_slice(frame);
+        }
+        self.push();
+        Ok(())
+    }
+
+    /// Hands on what waits, as far as it is taken now.
+    fn push(&mut self) {
+        while !self.waiting.is_empty() {
+            let written = match &mut self.way {
+                Way::Tcp { client: Some(client), .. } => client.write(&self.waiting),
+                #[cfg(unix)]
+                Way::Pty(pty) => pty.master.write(&self.waiting),
+                _ => return,
+            };
+            match written {
+                Ok(count) if count > 0 => drop(self.waiting.drain(..count)),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) if error.kind() == ErrorKind::WouldBlock => return,
+                _ => return self.drop_client(),
+            }
+        }
+    }
+
+    fn drop_client(&mut self) {
+        self.waiting.clear();
+        self.received.clear();
+        if let Way::Tcp { client, .. } = &mut self.way {
+            *client = None;
+        }
+    }
+
+    /// Goes away, as a board whose cable is pulled: a client is hung up, a pseudo-terminal closed and another opened. Datagrams and messages know no connection.
+    ///
+    /// # Errors
+    /// Where there is no other pseudo-terminal.
+    pub fn disconnect(&mut self) -> std::io::Result<()> {
+        self.drop_client();
+        #[cfg(unix)]
+        if let Way::Pty(pty) = &mut self.way {
+            pty.reopen()?;
+            self.name = pty.name();
+        }
+        Ok(())
+    }
+
+    /// The whole lines that came from the other end.
+    pub fn lines(&mut self) -> Vec<String> {
+        let mut buffer = [0; 512];
+        loop {
+            let read = match &mut self.way {
+                Way::Tcp { client: Some(client), .. } => client.read(&mut buffer),
+                Way::Udp { socket, .. } => socket.recv(&mut buffer),
+                #[cfg(unix)]
+                Way::Pty(pty) => pty.master.read(&mut buffer),
+                _ => break,
+            };
+            match read {
+                Ok(count) if count > 0 && self.received.len() <= LONGEST => {
+                    self.received.extend_from_slice(&buffer[..count]);
+                }
+                Ok(0) => {
+                    self.drop_client();
+                    break;
+                }
+                Ok(_) => self.received.clear(),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(_) => break,
+            }
+        }
+        let Some(end) = self.received.iter().rposition(|byte| *byte == b'\n') else { return Vec::new() };
+        let lines: Vec<u8> = self.received.drain(..=end).collect();
+        String::from_utf8_lossy(&lines).lines().map(str::to_owned).collect()
+    }
+}
+
+fn open(url: &LinkUrl) -> std::io::Result<(Way, String)> {
+    match url {
+        LinkUrl::Stdout => Ok((Way::Stdout(std::io::stdout()), "stdout".to_owned())),
+        #[cfg(unix)]
+        LinkUrl::Pty(link) => {
+            let pty = pty::Pty::open(link.clone())?;
+            let name = pty.name();
+            Ok((Way::Pty(pty), name))
+        }
+        #[cfg(not(unix))]
+        LinkUrl::Pty(_) => Err(std::io::Error::other("there are no pseudo-terminals here; use tcp")),
+        LinkUrl::Tcp(address) => {
+            let listener = TcpListener::bind(address)?;
+            listener.set_nonblocking(true)?;
+            let name = format!("tcp://{}", listener.local_addr()?);
+            Ok((Way::Tcp { listener, client: None }, name))
+        }
+        LinkUrl::Udp(address) => {
+            let to =
+                address.to_socket_addrs()?.next().ok_or_else(|| std::io::Error::other("no such host"))?;
+            let socket = UdpSocket::bind(if to.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" })?;
+            socket.set_nonblocking(true)?;
+            Ok((Way::Udp { socket, to }, format!("udp://{to}")))
+        }
+        LinkUrl::Mqtt(url) => Ok((Way::Mqtt(publisher::Publisher::open(url)?), url.to_string())),
+    }
+}

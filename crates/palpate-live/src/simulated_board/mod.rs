@@ -1,0 +1,144 @@
+//! A board without hardware: sensors under a surface that a finger touches, and the frames that firmware would send.
+
+mod faults;
+mod finger;
+mod link;
+
+pub use faults::FaultConfig;
+pub use finger::{Finger, ScriptError};
+pub use link::{Link, LinkError, LinkUrl, LinkUrlError};
+
+use crate::frame::Channel;
+use faults::{Ageing, Fate, Faults};
+use palpate_estimators::setup::Setup;
+use palpate_estimators::simulate::{SimulateError, SimulatedBench};
+use std::fmt::Write;
+use std::time::Duration;
+
+/// Configuration of a simulated board.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BoardConfig {
+    /// Readings a second, greater than 0.
+    pub rate_hz: f64,
+    /// Seed of the sensors' faults and noise.
+    pub seed: u64,
+}
+
+impl Default for BoardConfig {
+    fn default() -> Self {
+        Self { rate_hz: 100.0, seed: 0 }
+    }
+}
+
+/// A simulated board: time in, bytes out.
+pub struct SimulatedBoard<'a> {
+    bench: SimulatedBench<'a>,
+    channels: Vec<Channel>,
+    finger: Finger,
+    faults: Faults,
+    ageing: Ageing,
+    rate_hz: f64,
+    /// Frames that were taken.
+    count: u64,
+    sent: Sent,
+}
+
+/// Numbers of what a board did with its frames.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Sent {
+    /// Frames that were sent whole.
+    pub whole: u64,
+    /// Frames that were left out.
+    pub dropped: u64,
+    /// Frames of which a part is missing.
+    pub torn: u64,
+}
+
+impl<'a> SimulatedBoard<'a> {
+    /// A board on the bench of a setup, touched by a finger.
+    ///
+    /// # Errors
+    /// [`SimulateError`] for a surface without a model, or one whose equations are not solved.
+    pub fn new(setup: &'a Setup, config: &BoardConfig, finger: Finger) -> Result<Self, SimulateError> {
+        let bench = SimulatedBench::new(setup, config.seed)?;
+        let channels = Channel::all_of(setup);
+        let faults = Faults::new(FaultConfig::default(), config.seed);
+        Ok(Self {
+            bench,
+            ageing: Ageing::new(channels.len(), config.seed),
+            channels,
+            finger,
+            faults,
+            rate_hz: config.rate_hz,
+            count: 0,
+            sent: Sent::default(),
+        })
+    }
+
+    /// The same board with these faults.
+    pub fn with_faults(mut self, config: FaultConfig, seed: u64) -> Self {
+        self.faults = Faults::new(config, seed);
+        self
+    }
+
+    /// Time of the next frame since the start.
+    pub fn next_at(&self) -> Duration {
+        Duration::from_secs_f64(self.count as f64 / self.rate_hz)
+    }
+
+    /// Numbers of what it did with its frames so far.
+    pub fn sent(&self) -> &Sent {
+        &self.sent
+    }
+
+    /// The finger, for a stage that moves it.
+    pub fn finger_mut(&mut self) -> &mut Finger {
+        &mut self.finger
+    }
+
+    /// The bytes of all frames that are due by `elapsed` since the start.
+    pub fn send_until(&mut self, elapsed: Duration) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        while self.next_at() <= elapsed {
+            bytes.extend(self.next_frame().unwrap_or_default());
+        }
+        bytes
+    }
+
+    /// The bytes of the next frame, whole or torn; `None` for one that is left out.
+    pub fn next_frame(&mut self) -> Option<Vec<u8>> {
+        let time_s = self.next_at().as_secs_f64();
+        let contact = self.finger.contact_at(time_s);
+        let mut clean = self.bench.clean(contact.as_slice());
+        self.ageing.act(&mut clean, &self.faults.config, 1.0 / self.rate_hz);
+        let reading = self.bench.measure(&clean);
+        let mut frame = self.line(&reading).into_bytes();
+        self.count += 1;
+        match self.faults.next(frame.len()) {
+            Fate::Whole => self.sent.whole += 1,
+            Fate::Torn { lost } => {
+                self.sent.torn += 1;
+                frame.drain(lost);
+            }
+            Fate::Dropped => {
+                self.sent.dropped += 1;
+                return None;
+            }
+        }
+        Some(frame)
+    }
+
+    /// A reading as a line of numbers in the units of the channels, to seven digits.
+    fn line(&self, reading: &[f64]) -> String {
+        let mut line = String::new();
+        for (value, channel) in reading.iter().zip(&self.channels) {
+            if !line.is_empty() {
+                line.push(',');
+            }
+            // Writing into a string cannot fail.
+            let _ = write!(line, "{}", (value / channel.unit.factor()) as f32);
+        }
+        line.push('\n');
+        line
+    }
+}

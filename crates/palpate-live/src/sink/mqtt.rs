@@ -1,0 +1,319 @@
+//! Estimates and events as messages of MQTT.
+
+use super::{Batch, Sink};
+use crate::frame::Channel;
+use crate::input::{Command, Input};
+use crate::rules::{Rule, RuleWatch, Rules};
+use crate::sample::SampleRecord;
+use crate::session::Output;
+use palpate_mechanics::surface::Extent;
+use rumqttc::{Client, Connection, ConnectionError, Event, LastWill, MqttOptions, Packet, QoS};
+use serde::Serialize;
+use std::fmt;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// A broker, and the topic under which a session's messages are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MqttUrl {
+    /// The broker's host.
+    pub host: String,
+    /// Its port.
+    pub port: u16,
+    /// User and password, where the broker wants them.
+    pub login: Option<(String, String)>,
+    /// The topic.
+    pub topic: String,
+}
+
+/// Text that is no URL of a broker.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{text}` is no broker with a topic, as in `mqtt://user:password@host:1883/bench/contact`: {problem}"
+)]
+pub struct MqttUrlError {
+    /// The text.
+    pub text: String,
+    /// What is wrong with it.
+    pub problem: &'static str,
+}
+
+impl FromStr for MqttUrl {
+    type Err = MqttUrlError;
+
+    fn from_str(text: &str) -> Result<Self, MqttUrlError> {
+        let error = |problem| MqttUrlError { text: text.to_owned(), problem };
+        let rest = text.strip_prefix("mqtt://").ok_or_else(|| error("it does not begin with mqtt://"))?;
+        let (server, topic) = rest.split_once('/').ok_or_else(|| error("it has no topic"))?;
+        if topic.is_empty() || topic.len() > 1000 || topic.contains(['+', '#', '\0']) {
+            return Err(error("a topic has 1 to 1000 bytes, and none of + and #"));
+        }
+        let (login, address) = match server.rsplit_once('@') {
+            None => (None, server),
+            Some((login, address)) => {
+                let (user, password) = login.split_once(':').unwrap_or((login, ""));
+                (Some((user.to_owned(), password.to_owned())), address)
+            }
+        };
+        let (host, port) = match address.rsplit_once(':') {
+            None => (address, 1883),
+            Some((host, port)) => {
+                (host, port.parse().map_err(|_| error("its port is no number of at most 65535"))?)
+            }
+        };
+        if host.is_empty() {
+            return Err(error("it names no host"));
+        }
+        Ok(Self { host: host.to_owned(), port, login, topic: topic.trim_end_matches('/').to_owned() })
+    }
+}
+
+/// The URL without the password.
+impl fmt::Display for MqttUrl {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "mqtt://{}:{}/{}", self.host, self.port, self.topic)
+    }
+}
+
+impl MqttUrl {
+    /// Options of a client with an identity of its own.
+    pub(crate) fn options(&self, role: &str) -> MqttOptions {
+        static NUMBER: AtomicU64 = AtomicU64::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let identity = format!("palpate-{role}-{}-{number}", std::process::id());
+        let mut options = MqttOptions::new(identity, &self.host, self.port);
+        options.set_keep_alive(Duration::from_secs(5));
+        if let Some((user, password)) = &self.login {
+            options.set_credentials(user, password);
+        }
+        options
+    }
+}
+
+/// Batches that wait for the broker's thread at most.
+const WAITING: usize = 1024;
+/// Messages that wait for the broker at most; those beyond are counted as lost.
+const MESSAGES: usize = 1024;
+/// Time before it is tried again to reach a broker.
+const AGAIN_AFTER: Duration = Duration::from_millis(500);
+/// Longest wait at the end for the broker to take the last message.
+const PATIENCE: Duration = Duration::from_millis(150);
+
+/// Publishes samples to `TOPIC/estimate`, events to `TOPIC/event`, and to `TOPIC/status` what is kept there: `online`, or `offline` once the session has ended
+/// or died.
+pub struct MqttSink {
+    to: Option<SyncSender<Arc<Batch>>>,
+    lost: Arc<AtomicU64>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl MqttSink {
+    /// A client of a broker, which need not be there yet. Rules publish their messages beside; troubles are told to the session through `reports`.
+    ///
+    /// # Errors
+    /// Where there is no thread for it.
+    pub fn new(
+        url: &MqttUrl,
+        channels: &[Channel],
+        extent: Extent,
+        rules: Option<Rules>,
+        reports: SyncSender<Input>,
+    ) -> std::io::Result<Self> {
+        let (to, from) = sync_channel(WAITING);
+        let lost = Arc::new(AtomicU64::new(0));
+        let publisher = Publisher::open(url, reports, Arc::clone(&lost))?;
+        let channels = channels.to_vec();
+        let rules = rules.map(RuleWatch::new);
+        let work = move || publisher.run(&from, &channels, extent, rules);
+        let thread = std::thread::Builder::new().name("mqtt-sink".to_owned()).spawn(work)?;
+        Ok(Self { to: Some(to), lost, thread: Some(thread) })
+    }
+
+    /// Messages that the broker did not take.
+    pub fn lost(&self) -> u64 {
+        self.lost.load(Ordering::Relaxed)
+    }
+}
+
+impl Sink for MqttSink {
+    fn batch(&mut self, batch: &Arc<Batch>) {
+        let Some(to) = &self.to else { return };
+        if to.try_send(Arc::clone(batch)).is_err() {
+            self.lost.fetch_add(batch.outputs.len() as u64, Ordering::Relaxed);
+        }
+    }
+}
+
+impl Drop for MqttSink {
+    fn drop(&mut self) {
+        drop(self.to.take());
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Publisher {
+    client: Client,
+    topic: String,
+    /// True while the broker is there.
+    online: Arc<AtomicBool>,
+    /// True once the connection has ended for good.
+    done: Arc<AtomicBool>,
+    lost: Arc<AtomicU64>,
+}
+
+impl Publisher {
+    fn open(url: &MqttUrl, reports: SyncSender<Input>, lost: Arc<AtomicU64>) -> std::io::Result<Self> {
+        let status = format!("{}/status", url.topic);
+        let mut options = url.options("session");
+        options.set_last_will(LastWill::new(&status, "offline", QoS::AtLeastOnce, true));
+        let (client, connection) = Client::new(options, MESSAGES);
+        let (online, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+        let driver = Driver {
+            client: client.clone(),
+            status,
+            name: url.to_string(),
+            online: Arc::clone(&online),
+            done: Arc::clone(&done),
+            reports,
+        };
+        std::thread::Builder::new().name("mqtt".to_owned()).spawn(move || driver.run(connection))?;
+        Ok(Self { client, topic: url.topic.clone(), online, done, lost })
+    }
+
+    fn run(
+        self,
+        batches: &Receiver<Arc<Batch>>,
+        channels: &[Channel],
+        extent: Extent,
+        mut rules: Option<RuleWatch>,
+    ) {
+        loop {
+            let batch = match batches.recv_timeout(AGAIN_AFTER) {
+                Ok(batch) => batch,
+                Err(RecvTimeoutError::Timeout) => continue,
+                Err(RecvTimeoutError::Disconnected) => break,
+            };
+            for output in &batch.outputs {
+                if let Some(rules) = &mut rules {
+                    rules.add(output, |rule| self.act(rule));
+                }
+                match output {
+                    Output::Sample(sample) => {
+                        self.publish("estimate", &SampleRecord::new(sample, channels, extent));
+                    }
+                    Output::Event(event) => self.publish("event", event),
+                }
+            }
+        }
+        self.say_goodbye();
+    }
+
+    fn publish(&self, topic: &str, record: &impl Serialize) {
+        let sent = self.online.load(Ordering::Relaxed)
+            && serde_json::to_vec(record).is_ok_and(|json| {
+                self.client
+                    .try_publish(format!("{}/{topic}", self.topic), QoS::AtMostOnce, false, json)
+                    .is_ok()
+            });
+        if !sent {
+            self.lost.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Publishes a rule's message: even while the broker is away, for when it comes back.
+    fn act(&self, rule: &Rule) {
+        let message = rule.message.as_bytes();
+        if self.client.try_publish(&rule.topic, QoS::AtLeastOnce, false, message).is_err() {
+            self.lost.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    fn say_goodbye(&self) {
+        if !self.online.load(Ordering::Relaxed) {
+            // Its last will has said it; and the driver ends with the process.
+            self.done.store(true, Ordering::Relaxed);
+            return;
+        }
+        let status = format!("{}/status", self.topic);
+        let _ = self.client.try_publish(status, QoS::AtLeastOnce, true, "offline");
+        let _ = self.client.try_disconnect();
+        let until = Instant::now() + PATIENCE;
+        while !self.done.load(Ordering::Relaxed) && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        self.done.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Keeps the connection: in a thread of its own, as it waits for the broker.
+struct Driver {
+    client: Client,
+    status: String,
+    name: String,
+    online: Arc<AtomicBool>,
+    done: Arc<AtomicBool>,
+    reports: SyncSender<Input>,
+}
+
+impl Driver {
+    fn run(self, mut connection: Connection) {
+        // Whether the broker was there at the last look; `None` before the first.
+        let mut was_there = None;
+        for event in connection.iter() {
+            match event {
+                Ok(Event::Incoming(Packet::ConnAck(_))) => {
+                    let _ = self.client.try_publish(&self.status, QoS::AtLeastOnce, true, "online");
+                    self.online.store(true, Ordering::Relaxed);
+                    if was_there == Some(false) {
+                        self.report("is there again");
+                    }
+                    was_there = Some(true);
+                }
+                Ok(Event::Outgoing(rumqttc::Outgoing::Disconnect)) | Err(ConnectionError::RequestsDone) => {
+                    break;
+                }
+                Ok(_) => {}
+                Err(error) => {
+                    self.online.store(false, Ordering::Relaxed);
+                    if self.done.load(Ordering::Relaxed) {
+                        break;
+                    }
+                    if was_there != Some(false) {
+                        self.report(&format!("cannot be reached: {error}; it is tried again"));
+                    }
+                    was_there = Some(false);
+                    std::thread::sleep(AGAIN_AFTER);
+                }
+            }
+        }
+        self.done.store(true, Ordering::Relaxed);
+    }
+
+    fn report(&self, what: &str) {
+        let text = format!("the broker {} {what}", self.name);
+        let _ = self.reports.try_send(Input::Command(Command::Trouble(text)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn urls_say_broker_login_and_topic() {
+        let url: MqttUrl = "mqtt://me:secret@bench.local:1884/left/contact".parse().unwrap();
+        assert_eq!((url.host.as_str(), url.port, url.topic.as_str()), ("bench.local", 1884, "left/contact"));
+        assert_eq!(url.login, Some(("me".to_owned(), "secret".to_owned())));
+        assert_eq!(url.to_string(), "mqtt://bench.local:1884/left/contact");
+        assert_eq!("mqtt://h/t".parse::<MqttUrl>().unwrap().port, 1883);
+        for wrong in ["mqtt://h", "mqtt:///t", "mqtt://h:x/t", "mqtt://h/a/#", "http://h/t", "mqtt://h/"] {
+            assert!(wrong.parse::<MqttUrl>().is_err(), "{wrong}");
+        }
+    }
+}

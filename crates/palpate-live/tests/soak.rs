@@ -1,0 +1,121 @@
+//! A simulated board with faults every few seconds: every line is accounted for, and memory stays flat.
+//!
+//! `PALPATE_SOAK_MINUTES=60 cargo test -p palpate-live --test soak -- --nocapture` takes an hour of readings, as fast as they are located.
+
+use palpate_estimators::fit::{Fit, FitTask};
+use palpate_live::input::{Arrival, Arrived};
+use palpate_live::recording::RecordingSwitch;
+use palpate_live::session::{Session, SessionConfig};
+use palpate_live::simulated_board::{BoardConfig, FaultConfig, Finger, SimulatedBoard};
+use palpate_live::sink::{Batch, Sink};
+use palpate_live::stamp::Stamp;
+use palpate_rig::Rig;
+use std::sync::Arc;
+use std::sync::mpsc::sync_channel;
+use std::time::Duration;
+
+const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
+const RATE_HZ: f64 = 1000.0;
+/// Seconds between two times that the cable is pulled, and those it is out.
+const PULLED_EVERY: u64 = 7;
+const PULLED_MS: u64 = 800;
+
+#[test]
+fn every_line_is_accounted_for_and_memory_stays_flat() {
+    let minutes: f64 =
+        std::env::var("PALPATE_SOAK_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(1.0);
+    let rig = Rig::from_toml(RIG).unwrap();
+    let recording = rig.simulate(0).unwrap();
+    let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
+    let faults = FaultConfig {
+        dropped: 0.005,
+        torn: 0.005,
+        drift_per_s: 1e-8,
+        walk_per_root_s: 1e-8,
+        creep: 0.02,
+        creep_s: 5.0,
+    };
+    let mut board =
+        SimulatedBoard::new(&rig.setup, &BoardConfig { rate_hz: RATE_HZ, seed: 1 }, Finger::random(&rig, 1))
+            .unwrap()
+            .with_faults(faults, 1);
+    let mut session = Session::new(&locator, &SessionConfig::default());
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("soak");
+    let _ = std::fs::remove_dir_all(&folder);
+    let (reports, _reports) = sync_channel(64);
+    let mut recorder = RecordingSwitch::new(&locator, "soak", reports).unwrap();
+    recorder.begin_in(&folder, Some("soak"), 0).unwrap();
+
+    let end = Duration::from_secs_f64(60.0 * minutes);
+    let (mut lines, mut away_frames, mut was_away, mut pulls) = (0_u64, 0_u64, false, 0_u64);
+    let mut settled_kb = None;
+    while board.next_at() < end {
+        let elapsed = board.next_at();
+        let ms = elapsed.as_millis() as u64;
+        let is_away = ms / 1000 >= PULLED_EVERY && ms % (PULLED_EVERY * 1000) < PULLED_MS;
+        let frame = board.next_frame();
+        let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
+        let mut outputs = Vec::new();
+        let mut receive = |arrival, outputs: &mut Vec<_>| session.receive(&Arrived { at, arrival }, outputs);
+        match (was_away, is_away) {
+            (false, true) => {
+                pulls += 1;
+                receive(Arrival::Lost("unplugged".to_owned()), &mut outputs);
+            }
+            (true, false) => receive(Arrival::Opened("board".to_owned()), &mut outputs),
+            _ => {}
+        }
+        was_away = is_away;
+        match frame {
+            Some(_) if is_away => away_frames += 1,
+            Some(bytes) => {
+                lines += bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
+                receive(Arrival::Bytes(bytes), &mut outputs);
+            }
+            None => {}
+        }
+        if !outputs.is_empty() {
+            recorder.batch(&Arc::new(Batch { outputs }));
+        }
+        // The recorder gets the time that a real session leaves it.
+        if ms.is_multiple_of(500) {
+            std::thread::sleep(Duration::from_millis(15));
+        }
+        if settled_kb.is_none() && elapsed > end / 4 {
+            settled_kb = resident_kb();
+        }
+    }
+    let status = recorder.end().unwrap();
+    let counters = session.counters();
+    let bad: u64 = counters.bad_frames.values().sum();
+    let sent = board.sent();
+    println!("{minutes} min at {RATE_HZ} Hz: {sent:?}, {away_frames} while unplugged");
+    println!(
+        "{lines} lines: {} located, rejected {:?}; {pulls} pulls, {} gaps",
+        counters.readings, counters.bad_frames, counters.gaps
+    );
+    println!(
+        "recorded {} readings, {} lost, {:.1} MB",
+        status.readings,
+        status.lost,
+        status.bytes as f64 / 1e6
+    );
+    // A torn frame that lost its line end is one line with the next; those that are cut by the cable end nowhere.
+    assert_eq!(lines, counters.readings + bad);
+    assert_eq!((status.readings, status.lost, status.problem), (counters.readings, 0, None));
+    assert_eq!(counters.gaps, pulls - u64::from(was_away), "each pull is a gap, and nothing else is");
+    assert!(bad > 0 && sent.torn > bad / 3, "{bad}");
+    if let (Some(before), Some(after)) = (settled_kb, resident_kb()) {
+        println!("memory: {before} kB after a quarter, {after} kB at the end");
+        // The index of the recording grows by some 20 bytes a reading; nothing else does.
+        let most = before + before / 10 + counters.readings * 3 / 4 * 20 / 1000;
+        assert!(after <= most, "{after} kB, at most {most}");
+    }
+}
+
+/// Resident memory of this process.
+fn resident_kb() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    line.trim().trim_end_matches(" kB").parse().ok()
+}
