@@ -4,6 +4,7 @@ import { api, ApiError } from "./api";
 import { need, setText } from "./dom";
 import { startKeys } from "./keys";
 import { Live } from "./model/live";
+import { Pace } from "./model/pace";
 import type { Player } from "./model/player";
 import { announce, Events } from "./panel/events";
 import { Health } from "./panel/health";
@@ -22,16 +23,14 @@ import { describe, isPlane, type Shown } from "./view/surface";
 import { bytes, seconds } from "./words";
 
 /** Milliseconds between two drawings: numbers are to be read, and charts cost most. */
-const CHARTS_MS = 50;
+const SURFACE_MS = 16;
+const CHARTS_MS = 66;
 const NUMBERS_MS = 100;
 const HEALTH_MS = 250;
 /** Motion for people who ask for less of it. */
 const REDUCED_MS = 200;
 /** Without a reading for so long the page says so. */
 const SILENT_S = 2;
-
-/** Parts of the page that are drawn at paces of their own. */
-type Part = "surface" | "charts" | "numbers" | "health";
 
 /** Views of a session; made anew for another one. */
 interface Views {
@@ -52,7 +51,7 @@ export class Page {
   private paused = false;
   private shown: Shown | null = null;
   private heard_ms = performance.now();
-  private drawn: Record<Part, number> = { surface: 0, charts: 0, numbers: 0, health: 0 };
+  private pace = new Pace();
   private dirty = true;
   private reduced = matchMedia("(prefers-reduced-motion: reduce)");
 
@@ -63,7 +62,7 @@ export class Page {
     need("pause").addEventListener("click", () => this.pause());
     need("simulate").addEventListener("click", () => this.simulate());
     need("help").addEventListener("click", () => need<HTMLDialogElement>("help-dialog").showModal());
-    need("window").addEventListener("change", () => (this.drawn.charts = 0));
+    need("window").addEventListener("change", () => this.pace.all());
     need("mark-form").addEventListener("submit", () => this.mark());
     need("mark-cancel").addEventListener("click", () => need<HTMLDialogElement>("mark-dialog").close());
     startKeys({
@@ -234,7 +233,7 @@ export class Page {
 
   private async openReplay(name: string): Promise<void> {
     await this.replay.open(name);
-    this.drawn = { surface: 0, charts: 0, numbers: 0, health: 0 };
+    this.pace.all();
     document.body.classList.add("replaying");
     this.writeBanner();
     this.notice("A replay: what is shown is not live.");
@@ -264,24 +263,21 @@ export class Page {
       player.advance(elapsed_s);
       this.replay.write();
     }
-    const due = (what: Part, every_ms: number) => {
-      const least = this.reduced.matches ? Math.max(every_ms, REDUCED_MS) : every_ms;
-      if (now - this.drawn[what] < least) return false;
-      this.drawn[what] = now;
-      return true;
-    };
+    this.pace.frame(1000 * elapsed_s);
+    const due = (part: string, every_ms: number) =>
+      this.pace.due(part, now, this.reduced.matches ? Math.max(every_ms, REDUCED_MS) : every_ms);
     if (due("health", HEALTH_MS)) {
       this.views.health.write(this.live);
       this.views.events.write(this.live);
+      if (this.shown !== null) this.views.budget.draw(this.shown.sample);
     }
     const frozen = this.paused && player === null;
-    if (!due("surface", 0) && !this.dirty) return;
+    if (!due("surface", SURFACE_MS) && !this.dirty) return;
     if (this.shown === null || !frozen) this.shown = this.instant(this.session, player);
     else if (!this.dirty) return;
     this.drawSurface(this.views, this.shown);
     if (due("numbers", NUMBERS_MS) || this.dirty) {
       writeNumbers(this.session, this.shown.sample);
-      this.views.budget.draw(this.shown.sample);
       need("surface").setAttribute("aria-label", describe(this.shown));
       this.writeSurfaceNote(this.views, this.shown);
     }
@@ -296,7 +292,7 @@ export class Page {
       session,
       sample,
       trail: this.reduced.matches ? [] : trail.aged(),
-      deflections: sample === null ? null : baseline.deflections(sample.reading),
+      deflections: sample === null || sample.status === "no_contact" ? null : baseline.deflections(sample.reading),
     };
   }
 

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 
 use crate::counts::Counts;
+use crate::dashboard;
 use crate::needs::{self, NEXTEST, Without};
 use crate::python;
 use crate::run;
@@ -41,6 +42,7 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
             Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
         })?,
         step("Python tests", || python::test(root, skips))?,
+        step("dashboard", || dashboard::test(root, skips, &skipped))?,
         step("tidy", || Ok((tidy::run(root)?, None)))?,
     ];
     let lines = skipped.lines()?;

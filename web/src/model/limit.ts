@@ -22,8 +22,9 @@ export function limitAt(limit: LimitInfo, x_mm: number, y_mm: number | undefined
   if (typeof along[0] !== "number") return nearest(limit, x_mm, y_mm ?? 0);
   const xs = along as number[];
   const right = xs.findIndex((x) => x >= x_mm);
-  if (right === 0) return xs[0] === x_mm ? (limit.sd_mm[0] ?? null) : null;
   if (right < 0) return null;
+  if (xs[right] === x_mm) return limit.sd_mm[right] ?? null;
+  if (right === 0) return null;
   const [low, high] = [limit.sd_mm[right - 1] ?? null, limit.sd_mm[right] ?? null];
   if (low === null || high === null) return null;
   const share = (x_mm - xs[right - 1]!) / (xs[right]! - xs[right - 1]!);

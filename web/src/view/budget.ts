@@ -49,7 +49,7 @@ export function budgetWords(session: SessionInfo, sample: SampleRecord | null): 
   if (here === null) return `${over} At the contact it is infinite.`;
   if (sample.sd_mm === undefined) return `${over} At the contact: ${size(factor * here)} mm.`;
   const ratio = sample.sd_mm / (factor * here);
-  return `${over} At the contact: ${size(factor * here)} mm; this estimate has ${size(sample.sd_mm)} mm, ${size(ratio)} × the limit.`;
+  return `${over} At the contact: ${size(factor * here)} mm; this estimate has ${size(sample.sd_mm)} mm, ${size(ratio)}\u00a0× the limit.`;
 }
 
 function drawCurve({ ctx, width, height }: Frame, session: SessionInfo, sample: SampleRecord | null): void {
@@ -107,7 +107,7 @@ function drawCurve({ ctx, width, height }: Frame, session: SessionInfo, sample: 
 
 function drawMap({ ctx, width, height }: Frame, session: SessionInfo, sample: SampleRecord | null): void {
   const [limit, surface] = [session.limit!, session.surface!];
-  const { quiet, accent, contact, card, ink } = palette();
+  const { accent, contact, card, ink } = palette();
   const frame = { left: 8, top: 8, width: width - 16, height: height - 40 };
   const [length, across] = [surface.length_mm, surface.width_mm ?? 1];
   const { left, top, perUnit } = fit({ length, width: across }, frame);
@@ -136,12 +136,7 @@ function drawMap({ ctx, width, height }: Frame, session: SessionInfo, sample: Sa
   ctx.strokeRect(x(0), y(across), length * perUnit, across * perUnit);
   const placed = sample !== null && isPlaced(sample.status);
   const factor = forceFactor(session, placed ? sample.force_n : undefined);
-  ctx.fillStyle = quiet;
-  ctx.textBaseline = "bottom";
-  ctx.textAlign = "left";
-  ctx.fillText(`pale ${size(best * factor)} mm`, 8, height - 8);
-  ctx.textAlign = "right";
-  ctx.fillText(`full ${size(worst * factor)} mm`, width - 8, height - 8);
+  drawShades(ctx, `${size(best * factor)} mm`, `${size(worst * factor)} mm`, width, height - 8);
   if (!placed) return;
   ctx.fillStyle = contact;
   ctx.strokeStyle = card;
@@ -151,3 +146,23 @@ function drawMap({ ctx, width, height }: Frame, session: SessionInfo, sample: Sa
   ctx.stroke();
 }
 
+
+/** The shades of the map between the limit where it is best and where it is worst. */
+function drawShades(ctx: CanvasRenderingContext2D, best: string, worst: string, width: number, bottom: number): void {
+  const { quiet, accent, card, line } = palette();
+  ctx.fillStyle = quiet;
+  ctx.textBaseline = "bottom";
+  ctx.textAlign = "left";
+  ctx.fillText(best, 8, bottom);
+  ctx.textAlign = "right";
+  ctx.fillText(worst, width - 8, bottom);
+  const left = 16 + ctx.measureText(best).width;
+  const right = width - 16 - ctx.measureText(worst).width;
+  const shades = ctx.createLinearGradient(left, 0, right, 0);
+  shades.addColorStop(0, `color-mix(in srgb, ${accent} 8%, ${card})`);
+  shades.addColorStop(1, `color-mix(in srgb, ${accent} 85%, ${card})`);
+  ctx.fillStyle = shades;
+  ctx.fillRect(left, bottom - 12, right - left, 10);
+  ctx.strokeStyle = line;
+  ctx.strokeRect(left, bottom - 12, right - left, 10);
+}

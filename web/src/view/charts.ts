@@ -5,13 +5,16 @@ import { envelope } from "../model/envelope";
 import * as column from "../model/history";
 import type { History } from "../model/history";
 import type { SessionInfo } from "../protocol";
-import { unit } from "../words";
+import { clock, unit } from "../words";
 import { element, need } from "../dom";
 import { channelStroke, onTheme, palette } from "./palette";
 import { isPlane } from "./surface";
 
 /** Points of a chart at most: two a pixel of a wide screen. */
 const MOST_POINTS = 2_000;
+
+/** Seconds between two times that are written at the axis. */
+const SECONDS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200];
 
 /** What of a history the charts show. */
 export interface Span {
@@ -180,10 +183,11 @@ class Chart {
       width: Math.max(1, this.host.clientWidth),
       height: Math.max(1, this.host.clientHeight),
       legend: { show: false },
+      padding: [6, 8, 0, 0],
       cursor: { y: false, points: { size: 5 } },
       scales: { x: { time: true }, y: { range: (_, low, high) => roomy(low, high) } },
       axes: [
-        { ...axis, size: 28, space: 70 },
+        { ...axis, size: 28, space: 84, values: (_, times) => times.map((time) => clock(time).slice(0, 8)), incrs: SECONDS },
         { ...axis, size: 52, space: 30 },
       ],
       series: [

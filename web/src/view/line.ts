@@ -11,6 +11,8 @@ import type { Shown } from "./surface";
 /** Millimetres of the units that deflections are read in. */
 const MM: Record<string, number> = { nm: 1e-6, um: 1e-3, "µm": 1e-3, mm: 1, cm: 10, m: 1000, in: 25.4 };
 const MARGIN = 26;
+/** Height of the axis with its numbers. */
+const AXIS = 24;
 /** Longest part of the picture's height that a deflection takes. */
 const DEFLECTION = 0.26;
 
@@ -20,7 +22,8 @@ export class LineView {
   /** Times that the deflections are exaggerated; null where none are drawn. */
   exaggeration: number | null = null;
 
-  draw({ ctx, width, height }: Frame, shown: Shown): void {
+  draw(frame: Frame, shown: Shown): void {
+    const { ctx, width, height } = frame;
     const surface = shown.session.surface;
     if (surface === null) return;
     const x = linear([0, surface.length_mm], [MARGIN, width - MARGIN]);
@@ -31,7 +34,7 @@ export class LineView {
     drawSupports(ctx, surface, x, level);
     drawBeam(ctx, x(0), x(surface.length_mm), level, shape);
     drawSensors(ctx, shown, x, level, shape);
-    drawContact(ctx, shown, x, level, shape);
+    drawContact(frame, shown, x, level, shape);
   }
 
   /** Deflection in pixels at a pixel along the surface, from the sensors that measure it. */
@@ -45,7 +48,10 @@ export class LineView {
     });
     this.exaggeration = null;
     if (measured.length < 2) return () => 0;
-    this.largest_mm = Math.max(this.largest_mm, ...measured.map((point) => Math.abs(point.y)));
+    // What no contact explains may be values that no sensor reads: they do not set the scale.
+    if (isPlaced(shown.sample!.status)) {
+      this.largest_mm = Math.max(this.largest_mm, ...measured.map((point) => Math.abs(point.y)));
+    }
     if (this.largest_mm === 0) return () => 0;
     const perMm = (x(surface.length_mm) - x(0)) / surface.length_mm;
     // The next round number below what fills the room.
@@ -58,13 +64,14 @@ export class LineView {
       .filter((point, i, all) => i === 0 || point.x > all[i - 1]!.x);
     const curve = naturalSpline(points);
     const factor = this.exaggeration * perMm;
-    return (px) => factor * curve((px - MARGIN) / perMm);
+    const room = 1.5 * DEFLECTION * height;
+    return (px) => Math.min(room, Math.max(-room, factor * curve((px - MARGIN) / perMm)));
   }
 }
 
 function drawAxis(ctx: CanvasRenderingContext2D, surface: SurfaceInfo, x: (mm: number) => number, height: number): void {
   const { quiet, line } = palette();
-  const [left, right, y] = [x(0), x(surface.length_mm), height - 24];
+  const [left, right, y] = [x(0), x(surface.length_mm), height - AXIS];
   ctx.strokeStyle = line;
   ctx.lineWidth = 1;
   segment(ctx, left, y, right, y);
@@ -145,7 +152,7 @@ function drawSensors(ctx: CanvasRenderingContext2D, shown: Shown, x: (mm: number
   }
 }
 
-function drawContact(ctx: CanvasRenderingContext2D, shown: Shown, x: (mm: number) => number, level: number, shape: (px: number) => number): void {
+function drawContact({ ctx, height }: Frame, shown: Shown, x: (mm: number) => number, level: number, shape: (px: number) => number): void {
   const { contact, card, ink } = palette();
   const sample = shown.sample;
   ctx.fillStyle = contact;
@@ -158,7 +165,7 @@ function drawContact(ctx: CanvasRenderingContext2D, shown: Shown, x: (mm: number
   ctx.globalAlpha = 1;
   if (sample === null || !isPlaced(sample.status)) return;
   for (const mode of sample.modes ?? []) {
-    drawInterval(ctx, mode, x, level + 0, 0.5, shape);
+    drawInterval(ctx, mode, x, level, 0.5, shape);
     const px = x(mode.x_mm);
     ctx.strokeStyle = contact;
     ctx.lineWidth = 2;
@@ -171,6 +178,7 @@ function drawContact(ctx: CanvasRenderingContext2D, shown: Shown, x: (mm: number
   [...(sample.further ?? []), sample].forEach((one) => {
     const main = one === sample;
     drawInterval(ctx, one, x, level, 1, shape);
+    drawOnAxis(ctx, one, x, height);
     const px = x(one.x_mm);
     const y = level + shape(px) - 9;
     drawArrow(ctx, px, y - 10, main ? 30 : 20);
@@ -198,6 +206,14 @@ function drawInterval(ctx: CanvasRenderingContext2D, one: ContactRecord, x: (mm:
   segment(ctx, left, y - 7, left, y + 7);
   segment(ctx, right, y - 7, right, y + 7);
   ctx.globalAlpha = 1;
+}
+
+/** The interval again at the axis, where no dot covers a short one. */
+function drawOnAxis(ctx: CanvasRenderingContext2D, one: ContactRecord, x: (mm: number) => number, height: number): void {
+  if (one.x_95_mm === undefined) return;
+  const [left, right] = one.x_95_mm.map(x) as [number, number];
+  ctx.fillStyle = palette().contact;
+  ctx.fillRect(left, height - AXIS - 4, Math.max(2, right - left), 7);
 }
 
 /** An arrow that presses down on a point. */

@@ -9,7 +9,7 @@ export interface Shown {
   session: SessionInfo;
   sample: SampleRecord | null;
   trail: (TrailPoint & { age: number })[];
-  /** Readings less what they are untouched, in the units of the channels. */
+  /** Readings less what they are untouched, in the units of the channels; null while nothing touches, or before anything was read untouched. */
   deflections: number[] | null;
 }
 
