@@ -46,14 +46,18 @@ pub fn test(root: &Path, skips: Skips, skipped: &Skipped) -> Result<(bool, Optio
     for script in ["test", "browser-test"] {
         let mut tests = npm(root, &["run", "--silent", script]);
         tests.env("NO_COLOR", "1").env(skipped::VARIABLE, &skipped.file);
-        tests.env("PALPATE_BINARY", root.join("target/debug").join(format!("palpate{}", std::env::consts::EXE_SUFFIX)));
+        tests.env(
+            "PALPATE_BINARY",
+            root.join("target/debug").join(format!("palpate{}", std::env::consts::EXE_SUFFIX)),
+        );
         match skips {
             Skips::Fail => tests.env(STRICT, "1"),
             Skips::Pass => tests.env_remove(STRICT),
         };
         let watched = run::watched(&mut tests)?;
         succeeded &= watched.succeeded;
-        counts = [counts, Counts::of_vitest(&watched.lines)].into_iter().flatten().reduce(|sum, more| sum + more);
+        counts =
+            [counts, Counts::of_vitest(&watched.lines)].into_iter().flatten().reduce(|sum, more| sum + more);
     }
     let skips = skipped.lines()?.len() - before;
     Ok((succeeded, counts.map(|counts| counts.with_skips(skips))))
