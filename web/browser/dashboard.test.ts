@@ -12,7 +12,7 @@ const recordings = mkdtempSync(join(tmpdir(), "palpate-dashboard-"));
 afterAll(() => rmSync(recordings, { recursive: true }));
 
 /** Waits until an element has a text. */
-async function says(page: Page, id: string, text: RegExp, timeout = 15_000): Promise<string> {
+async function says(page: Page, id: string, text: RegExp, timeout = 30_000): Promise<string> {
   await page.waitForFunction(
     ({ id, source, flags }) => new RegExp(source, flags).test(document.getElementById(id)?.textContent ?? ""),
     { id, source: text.source, flags: text.flags },

@@ -34,7 +34,8 @@ export class Replay {
     this.player = player;
     const scrubber = need<HTMLInputElement>("scrubber");
     scrubber.max = String(player.seconds);
-    scrubber.step = String(Math.max(0.001, player.seconds / 1000));
+    // A step would put the end of the recording out of reach; keys step by a hundredth.
+    scrubber.step = "any";
     setText(need("replay-title"), `Replay of ${name}`);
     setText(need("replay-note"), thinnedWords(player, all.find((one) => one.name === name)));
     need("replay").hidden = false;
