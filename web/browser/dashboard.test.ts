@@ -1,15 +1,12 @@
 // The dashboard in a browser, on the real server with its simulated board: as a person uses it, by clicks and by keys.
 
-import { mkdtempSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import type { SampleRecord } from "../src/protocol";
+import { isPlaced, number, statusWords } from "../src/words";
 import { hasChromium, launch, open, picture } from "./chromium";
+import { record } from "./recorder";
 import { Server } from "./server";
-
-const recordings = mkdtempSync(join(tmpdir(), "palpate-dashboard-"));
-afterAll(() => rmSync(recordings, { recursive: true }));
 
 /** Waits until an element has a text. */
 async function says(page: Page, id: string, text: RegExp, timeout = 30_000): Promise<string> {
@@ -19,6 +16,17 @@ async function says(page: Page, id: string, text: RegExp, timeout = 30_000): Pro
     { timeout },
   );
   return (await page.locator(`#${id}`).textContent()) ?? "";
+}
+
+/** Waits until the page shows a sample. */
+async function shows(page: Page, sample: SampleRecord): Promise<void> {
+  const position = isPlaced(sample.status) ? number(sample.x_mm, sample.sd_mm) : "—";
+  const expected = { status: statusWords(sample).word, position };
+  await page.waitForFunction(
+    ({ status, position }) =>
+      document.getElementById("status")?.textContent === status && document.getElementById("position")?.textContent === position,
+    expected,
+  );
 }
 
 /** Pixels of the surface that have the colour of the contact. */
@@ -48,7 +56,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
     let page: Page;
     let faults: string[];
     beforeAll(async () => {
-      server = await Server.start(["--record", recordings]);
+      server = await Server.start([]);
       ({ page, faults } = await open(browser, server.url));
     });
     afterAll(() => server?.stop());
@@ -119,8 +127,11 @@ describe.skipIf(!hasChromium())("dashboard", () => {
     });
 
     test("records by a click, and replays with a scrubber by keys", async () => {
+      const recorded = await record(page, server.url);
+      await page.reload();
+      await says(page, "status", /^(Located|No contact)$/);
       await page.locator("#record").click();
-      await says(page, "notice", /Recording \S+: .*\d (B|kB|MB)$/);
+      await says(page, "recording-now", /Recording \S+: .*\d (B|kB|MB)$/);
       await page.waitForTimeout(3_000);
       await page.locator("#surface-title").click();
       await page.keyboard.press("r");
@@ -135,15 +146,17 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       await says(page, "replay-play", /^Play$/);
       await page.keyboard.press("Home");
       await says(page, "replay-time", /^0\.00 \//);
+      await shows(page, recorded()[0]!);
       await page.keyboard.press("ArrowRight");
       await page.keyboard.press("ArrowRight");
       expect(Number(await scrubber.inputValue())).toBeGreaterThan(0);
       await page.keyboard.press("End");
       await says(page, "replay-time", new RegExp(`^${seconds.toFixed(2).replace(".", "\\.")} /`));
-      await says(page, "status", /^(Located|No contact|Ambiguous|Outside model)$/);
+      await shows(page, recorded().at(-1)!);
       await picture(page, "replay");
       await page.keyboard.press("Escape");
       expect(await page.locator("#replay").isVisible()).toBe(false);
+      await page.unrouteAll();
     });
 
     test("says that the connection is lost, and is live again after the server has been started anew", async () => {
@@ -152,7 +165,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       await says(page, "connection", /^Connection lost$/);
       expect(await page.locator("#banner").textContent()).toContain("not live");
       await picture(page, "lost");
-      server = await Server.start(["--record", recordings], port);
+      server = await Server.start([], port);
       await says(page, "connection", /^Connected$/);
       await page.locator("#banner").waitFor({ state: "hidden" });
       await says(page, "status", /^Located$/);

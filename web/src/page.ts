@@ -20,7 +20,7 @@ import { LineView } from "./view/line";
 import { onTheme } from "./view/palette";
 import { drawPlane } from "./view/plane";
 import { describe, isPlane, type Shown } from "./view/surface";
-import { bytes, seconds } from "./words";
+import { bytes, PLAIN_MARK, seconds } from "./words";
 
 /** Milliseconds between two drawings: numbers are to be read, and charts cost most. */
 const SURFACE_MS = 16;
@@ -47,7 +47,7 @@ export class Page {
   private live = new Live(0);
   private views: Views | null = null;
   private replay = new Replay(() => this.replayClosed());
-  private connection: Connection = { state: "connecting" };
+  private connection: Connection = "connecting";
   private paused = false;
   private shown: Shown | null = null;
   private heard_ms = performance.now();
@@ -90,9 +90,9 @@ export class Page {
   connected(connection: Connection): void {
     this.connection = connection;
     const chip = need("connection");
-    chip.dataset.state = connection.state;
-    setText(chip, { connecting: "Connecting…", open: "Connected", lost: "Connection lost" }[connection.state]);
-    if (connection.state === "open") {
+    chip.dataset.state = connection;
+    setText(chip, { connecting: "Connecting…", open: "Connected", lost: "Connection lost" }[connection]);
+    if (connection === "open") {
       this.heard_ms = performance.now();
       void this.ask();
     }
@@ -101,7 +101,10 @@ export class Page {
 
   take(message: StreamMessage): void {
     const told = this.live.take(message);
-    if (message.samples.length > 0) this.heard_ms = performance.now();
+    if (message.samples.length > 0) {
+      this.heard_ms = performance.now();
+      document.body.classList.remove("unread");
+    }
     announce(told);
     if (told.some((event) => ["source_opened", "source_lost", "source_ended", "tared"].includes(event.event))) void this.ask();
     if (told.some((event) => event.event === "tared")) this.notice("Tared: the baseline was taken anew.");
@@ -132,6 +135,7 @@ export class Page {
     setText(need("locator"), locator === null ? "no locator" : `${locator.name} · ${locator.kind}`);
     need("locator").title = locator?.description.join("\n") ?? "";
     need("welcome").hidden = session.source !== null;
+    setText(need("welcome-title"), this.live.sample === null ? "No source of readings yet" : "The source has ended");
     need("simulate").hidden = need("welcome-simulated").hidden = !session.has_simulated;
     const tare = need<HTMLButtonElement>("tare");
     tare.disabled = !session.tare.available;
@@ -141,14 +145,22 @@ export class Page {
     record.title = session.recording === null ? "palpate serve … --record DIR says where recordings go" : `Recordings go to ${session.recording.folder}`;
     const name = session.recording?.name ?? null;
     record.setAttribute("aria-pressed", String(name !== null));
-    const words = name === null ? "Record" : `Stop recording`;
+    const words = name === null ? "Record" : "Stop recording";
     record.replaceChildren(`${words} `, Object.assign(document.createElement("kbd"), { textContent: "r" }));
-    if (name !== null) this.notice(`● Recording ${name}: ${seconds(session.recording!.seconds)}, ${bytes(session.recording!.bytes)}`);
+    const progress = name === null ? "" : `● Recording ${name}: ${seconds(session.recording!.seconds)}, ${bytes(session.recording!.bytes)}`;
+    setText(need("recording-now"), progress);
   }
 
   private everySecond(): void {
-    if (this.session?.recording?.name != null && this.connection.state === "open") void this.ask();
+    const records = this.session?.recording?.name != null;
+    // A session that is silent may have ended, or another have begun.
+    if (this.connection === "open" && (records || this.silent_s() > SILENT_S)) void this.ask();
     this.writeBanner();
+  }
+
+  /** Seconds since the last reading came. */
+  private silent_s(): number {
+    return (performance.now() - this.heard_ms) / 1000;
   }
 
   private writeBanner(): void {
@@ -160,13 +172,12 @@ export class Page {
   }
 
   private bannerWords(): string {
-    if (this.connection.state === "lost") {
-      return `The connection to palpate serve is lost: what is shown is not live. Trying again (${this.connection.attempt}).`;
-    }
-    const silent_s = (performance.now() - this.heard_ms) / 1000;
-    if (this.connection.state !== "open" || this.session === null || this.session.source === null || silent_s < SILENT_S) return "";
-    const why = this.live.state?.source == null ? "The source is away and looked for again" : "The source sends no readings";
-    return `${why}: none for ${seconds(silent_s)}.`;
+    // Words that do not change while they hold: a screen reader says every change.
+    if (this.connection === "lost") return "The connection to palpate serve is lost: what is shown is not live. Trying again.";
+    const expected = this.connection === "open" && this.session !== null && this.session.source !== null;
+    if (!expected || this.silent_s() < SILENT_S) return "";
+    if (this.live.state?.source == null) return "The source is away and looked for again: what is shown is not live.";
+    return "The source sends no readings: what is shown is not live.";
   }
 
   // What a person does.
@@ -192,7 +203,7 @@ export class Page {
 
   private mark(): void {
     const text = need<HTMLInputElement>("mark-text").value.trim();
-    void this.act(() => api.mark(text), text === "" ? "Marked." : `Marked: ${text}`);
+    void this.act(() => api.mark(text === "" ? PLAIN_MARK : text), text === "" ? "Marked." : `Marked: ${text}`);
   }
 
   private record(): void {
@@ -201,7 +212,7 @@ export class Page {
     void this.act(async () => {
       await api.record(name === null);
       await this.ask();
-      if (name === null) return;
+      if (name === null) return this.notice("Recording.");
       this.notice(`Recorded ${name}.`);
       await this.list();
     }, "");
@@ -234,9 +245,10 @@ export class Page {
   private async openReplay(name: string): Promise<void> {
     await this.replay.open(name);
     this.pace.all();
+    document.body.classList.remove("unread");
     document.body.classList.add("replaying");
     this.writeBanner();
-    this.notice("A replay: what is shown is not live.");
+    this.notice("A replay: surface, numbers and charts are not live. Channels, source and events are.");
   }
 
   private replayClosed(): void {

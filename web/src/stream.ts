@@ -4,15 +4,12 @@ import { api } from "./api";
 import type { StreamMessage } from "./protocol";
 
 /** State of the connection. */
-export type Connection =
-  | { state: "connecting" }
-  | { state: "open" }
-  | { state: "lost"; attempt: number; again_ms: number };
+export type Connection = "connecting" | "open" | "lost";
 
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 5_000;
-/** The server sends sixty messages a second: without any for so long, the connection is taken for lost. */
-const SILENCE_MS = 4_000;
+/** A session sends sixty messages a second. Without any for so long, the server is asked whether it is there: without a source it has none. */
+const SILENCE_MS = 3_000;
 
 /** Milliseconds before an attempt, from 1: twice as long each time, up to five seconds. */
 export function wait_ms(attempt: number): number {
@@ -26,7 +23,9 @@ export function openStream(take: (message: StreamMessage) => void, tell: (connec
     const socket = api.stream();
     let heard = performance.now();
     const watch = setInterval(() => {
-      if (performance.now() - heard > SILENCE_MS) lost();
+      if (performance.now() - heard < SILENCE_MS) return;
+      heard = performance.now();
+      api.session().catch(() => lost());
     }, 1_000);
     let over = false;
     const lost = () => {
@@ -35,12 +34,12 @@ export function openStream(take: (message: StreamMessage) => void, tell: (connec
       clearInterval(watch);
       socket.close();
       attempt += 1;
-      tell({ state: "lost", attempt, again_ms: wait_ms(attempt) });
+      tell("lost");
       setTimeout(open, wait_ms(attempt));
     };
     socket.onopen = () => {
       attempt = 0;
-      tell({ state: "open" });
+      tell("open");
     };
     socket.onmessage = (event) => {
       heard = performance.now();
@@ -49,6 +48,6 @@ export function openStream(take: (message: StreamMessage) => void, tell: (connec
     socket.onclose = lost;
     socket.onerror = lost;
   };
-  tell({ state: "connecting" });
+  tell("connecting");
   open();
 }

@@ -2,6 +2,9 @@
 
 import type { ChannelState, ContactRecord, EstimateRecord, EventRecord, Status } from "./protocol";
 
+/** Text of a mark without one. */
+export const PLAIN_MARK = "mark";
+
 /** True of a status whose position means something. */
 export function isPlaced(status: Status): boolean {
   return status === "located" || status === "ambiguous";
@@ -95,7 +98,7 @@ export function eventWords(event: EventRecord): string {
     case "tared":
       return "Tared: the baseline was taken anew";
     case "mark":
-      return event.text === "" ? "Mark" : `Mark: ${event.text}`;
+      return event.text === PLAIN_MARK ? "Mark" : `Mark: ${event.text}`;
   }
 }
 

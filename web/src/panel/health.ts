@@ -45,9 +45,9 @@ export class Health {
     const symbol = unit(this.session.channels[i]?.unit ?? "");
     const value = live.sample?.reading[i];
     state.dataset.state = channel.state;
-    setText(state, channelWords(channel.state));
+    setText(state, channel.range === null ? "no reading yet" : channelWords(channel.state));
     setText(now, value === undefined ? "—" : `${number(value, channel.noise_sd)} ${symbol}`);
-    setText(noise, `${size(channel.noise_sd)} ${symbol}`);
+    setText(noise, channel.range === null ? "—" : `${size(channel.noise_sd)} ${symbol}`);
     setText(range, channel.range === null ? "—" : channel.range.map((end) => number(end, channel.noise_sd)).join(" to "));
   }
 

@@ -214,6 +214,7 @@ class Chart {
     if (x < left || x > left + width) return;
     plot.ctx.save();
     plot.ctx.strokeStyle = palette().ink;
+    plot.ctx.setLineDash([]);
     plot.ctx.lineWidth = 2 * (window.devicePixelRatio || 1);
     plot.ctx.beginPath();
     plot.ctx.moveTo(x, top);
