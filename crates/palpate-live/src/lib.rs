@@ -8,6 +8,7 @@ pub mod frame;
 pub mod input;
 pub mod pipeline;
 pub mod sample;
+pub mod server;
 pub mod session;
 pub mod simulated_board;
 pub mod sink;

@@ -7,7 +7,9 @@ mod url;
 pub use url::{SourceUrl, SourceUrlError};
 
 use crate::input::{Arrival, Arrived, Input};
+use crate::simulated_board::BoardConfig;
 use crate::stamp::HostClock;
+use palpate_rig::Rig;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -82,6 +84,22 @@ impl Source {
                 simulated::open(outlet, &folder.join(rig), *rate_hz, *seed)?;
             }
         }
+        Ok(Self { stop })
+    }
+
+    /// Opens a simulated board on the bench of a rig.
+    ///
+    /// # Errors
+    /// [`SourceError::Simulate`] for a surface without a model, or one whose equations are not solved.
+    pub fn simulated(
+        rig: Rig,
+        config: BoardConfig,
+        clock: HostClock,
+        to: SyncSender<Input>,
+    ) -> Result<Self, SourceError> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let outlet = Outlet { to, clock, stop: Arc::clone(&stop) };
+        simulated::open_rig(outlet, rig, config, "a simulated board".to_owned())?;
         Ok(Self { stop })
     }
 }

@@ -14,10 +14,14 @@ pub fn open(outlet: Outlet, path: &Path, rate_hz: f64, seed: u64) -> Result<(), 
     let complaint = |error: String| SourceError::Rig { path: path.display().to_string(), error };
     let text = std::fs::read_to_string(path).map_err(|error| complaint(error.to_string()))?;
     let rig = Rig::from_toml(&text).map_err(|error| complaint(error.to_string()))?;
-    let config = BoardConfig { rate_hz, seed };
-    // Made once here so that a rig that cannot be simulated is refused before anything is begun.
-    SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, seed))?;
     let name = format!("a simulated board ({})", path.display());
+    open_rig(outlet, rig, BoardConfig { rate_hz, seed }, name)
+}
+
+/// Opens a simulated board on the bench of a rig.
+pub fn open_rig(outlet: Outlet, rig: Rig, config: BoardConfig, name: String) -> Result<(), SourceError> {
+    // Made once here so that a rig that cannot be simulated is refused before anything is begun.
+    SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, config.seed))?;
     std::thread::Builder::new().name("source".to_owned()).spawn(move || run(&outlet, &rig, &config, name))?;
     Ok(())
 }

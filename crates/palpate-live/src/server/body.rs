@@ -1,0 +1,47 @@
+//! Bodies of requests and answers: JSON, and complaints in words.
+
+use axum::Json;
+use axum::body::Bytes;
+use axum::extract::rejection::BytesRejection;
+use axum::extract::{FromRequest, Request};
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use serde::de::DeserializeOwned;
+
+/// An answer that is no success: what is wrong, and what to do.
+#[derive(Debug)]
+pub struct Refusal {
+    status: StatusCode,
+    error: String,
+    help: &'static str,
+}
+
+impl Refusal {
+    /// A refusal with its status.
+    pub fn new(status: StatusCode, error: impl ToString, help: &'static str) -> Self {
+        Self { status, error: error.to_string(), help }
+    }
+}
+
+impl IntoResponse for Refusal {
+    fn into_response(self) -> Response {
+        let body = serde_json::json!({ "error": self.error, "help": self.help });
+        (self.status, Json(body)).into_response()
+    }
+}
+
+/// A body of JSON.
+pub struct JsonBody<T>(pub T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
+    type Rejection = Refusal;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
+        let bytes = Bytes::from_request(request, state).await.map_err(|error: BytesRejection| {
+            Refusal::new(error.status(), error.body_text(), "send at most 64 kB of JSON")
+        })?;
+        serde_json::from_slice(&bytes).map(Self).map_err(|error| {
+            Refusal::new(StatusCode::BAD_REQUEST, error, "docs/live-server.md says what the body is")
+        })
+    }
+}

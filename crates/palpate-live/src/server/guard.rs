@@ -1,0 +1,235 @@
+//! Guard of the server: who may ask.
+
+use super::body::Refusal;
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use std::net::{IpAddr, SocketAddr};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Shortest token.
+const SHORTEST_TOKEN: usize = 16;
+/// Requests that change something, a second, of all browsers together.
+const POSTS_A_SECOND: u32 = 50;
+
+/// Headers of every answer.
+const HEADERS: [(HeaderName, &str); 5] = [
+    (
+        header::CONTENT_SECURITY_POLICY,
+        "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'",
+    ),
+    (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (header::REFERRER_POLICY, "no-referrer"),
+    (header::X_FRAME_OPTIONS, "DENY"),
+    (header::CACHE_CONTROL, "no-cache"),
+];
+
+/// Access that cannot be granted.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum AccessError {
+    /// An address that others reach, without a token.
+    #[error("{address} can be reached from other machines, and there is no token")]
+    NoToken {
+        /// The address.
+        address: IpAddr,
+    },
+    /// A token that is too short or has other characters.
+    #[error("the token has {length} characters; it must have at least {SHORTEST_TOKEN}, of which each is a letter, a digit, `-`, `.`, `_` or `~`")]
+    Token {
+        /// Its length.
+        length: usize,
+    },
+}
+
+/// Who may ask a server.
+#[derive(Clone, Debug, Default)]
+pub struct Access {
+    token: Option<String>,
+    host_names: Vec<String>,
+    address: Option<IpAddr>,
+}
+
+impl Access {
+    /// Access at an address: anybody on this machine, elsewhere whoever has the token. `host_names` are names of this machine that a
+    /// browser may call it by, beside its address.
+    ///
+    /// # Errors
+    /// [`AccessError`] for a token that is too short, or an address that others reach without one.
+    pub fn new(address: SocketAddr, token: Option<String>, host_names: Vec<String>) -> Result<Self, AccessError> {
+        let of_a_url = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
+        match &token {
+            Some(token) if token.len() < SHORTEST_TOKEN || !token.bytes().all(of_a_url) => {
+                Err(AccessError::Token { length: token.len() })
+            }
+            None if !address.ip().is_loopback() => Err(AccessError::NoToken { address: address.ip() }),
+            _ => Ok(Self { token, host_names, address: None }),
+        }
+    }
+
+    /// The same, of a server that listens at this address.
+    pub(super) fn at(self, address: IpAddr) -> Self {
+        Self { address: Some(address), ..self }
+    }
+
+    fn check(&self, request: &Request) -> Result<(), Refusal> {
+        let headers = request.headers();
+        let host = text(headers, header::HOST).unwrap_or_default();
+        if !self.is_own(host) {
+            return Err(Refusal::new(
+                StatusCode::FORBIDDEN,
+                format!("this server is not called `{host}`"),
+                "call it by its address, or start it with --host-name NAME",
+            ));
+        }
+        let changes = request.method() != Method::GET && request.method() != Method::HEAD;
+        let is_stream = headers.contains_key(header::UPGRADE);
+        if let (true, Some(origin)) = (changes || is_stream, text(headers, header::ORIGIN)) {
+            let same = origin.split_once("://").is_some_and(|(_, rest)| rest.eq_ignore_ascii_case(host));
+            if !same {
+                return Err(Refusal::new(
+                    StatusCode::FORBIDDEN,
+                    format!("a page of {origin} may not control this server"),
+                    "open the page that this server itself serves",
+                ));
+            }
+        }
+        match &self.token {
+            Some(token) if !given(request).is_some_and(|given| equal(given.as_bytes(), token.as_bytes())) => {
+                Err(Refusal::new(
+                    StatusCode::UNAUTHORIZED,
+                    "the token is missing or wrong",
+                    "give it as `?token=T`, or as the header `Authorization: Bearer T`",
+                ))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// True for a name of this server. A page of somebody else's name that was made to point here has that name, so it is none.
+    fn is_own(&self, host: &str) -> bool {
+        let name = match host.strip_prefix('[') {
+            Some(rest) => rest.split(']').next().unwrap_or_default(),
+            None => host.split(':').next().unwrap_or_default(),
+        };
+        if let Ok(address) = name.parse::<IpAddr>() {
+            // At 0.0.0.0 it is any of the machine's addresses.
+            let own = self.address.is_some_and(|own| own == address || own.is_unspecified());
+            return own || address.is_loopback();
+        }
+        let named = |own: &String| own.eq_ignore_ascii_case(name);
+        name.eq_ignore_ascii_case("localhost") || self.host_names.iter().any(named)
+    }
+}
+
+fn text(headers: &HeaderMap, name: HeaderName) -> Option<&str> {
+    headers.get(name).map(|value| value.to_str().unwrap_or("?"))
+}
+
+/// The token of a request.
+fn given(request: &Request) -> Option<&str> {
+    let bearer = text(request.headers(), header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer "));
+    let query = request.uri().query().unwrap_or_default();
+    bearer.or_else(|| query.split('&').find_map(|pair| pair.strip_prefix("token=")))
+}
+
+/// Equality in a time that does not depend on where they differ.
+fn equal(given: &[u8], token: &[u8]) -> bool {
+    let differ = given.iter().zip(token).fold(0, |differ, (a, b)| differ | (a ^ b));
+    given.len() == token.len() && std::hint::black_box(differ) == 0
+}
+
+/// Guard of all routes.
+#[derive(Debug)]
+pub struct Guard {
+    access: Access,
+    /// Start of the second that is counted, and posts in it.
+    posts: Mutex<(Instant, u32)>,
+}
+
+impl Guard {
+    /// A guard that grants this access.
+    pub fn new(access: Access) -> Self {
+        Self { access, posts: Mutex::new((Instant::now(), 0)) }
+    }
+
+    fn check(&self, request: &Request) -> Result<(), Refusal> {
+        self.access.check(request)?;
+        if request.method() != Method::POST {
+            return Ok(());
+        }
+        let mut posts = self.posts.lock().unwrap_or_else(PoisonError::into_inner);
+        if posts.0.elapsed() > Duration::from_secs(1) {
+            *posts = (Instant::now(), 0);
+        }
+        posts.1 += 1;
+        if posts.1 > POSTS_A_SECOND {
+            let error = format!("more than {POSTS_A_SECOND} commands in a second");
+            return Err(Refusal::new(StatusCode::TOO_MANY_REQUESTS, error, "wait a second"));
+        }
+        Ok(())
+    }
+}
+
+/// Lets a request through that is allowed, and puts the headers on every answer.
+pub async fn guarded(State(guard): State<Arc<Guard>>, request: Request, next: Next) -> Response {
+    // The page's parts carry no token in their addresses, and hold nothing of the session.
+    let mut response = match guard.check_for(&request) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => refusal.into_response(),
+    };
+    for (name, value) in HEADERS {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+impl Guard {
+    fn check_for(&self, request: &Request) -> Result<(), Refusal> {
+        if request.uri().path().starts_with("/api/") {
+            return self.check(request);
+        }
+        let without_token = Access { token: None, ..self.access.clone() };
+        without_token.check(request)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn access(address: &str, token: Option<&str>) -> Result<Access, AccessError> {
+        let address: SocketAddr = address.parse().unwrap();
+        let access = Access::new(address, token.map(str::to_owned), vec!["bench.lab".to_owned()]);
+        access.map(|access| access.at(address.ip()))
+    }
+
+    #[test]
+    fn other_machines_need_a_token() {
+        assert!(access("127.0.0.1:0", None).is_ok() && access("[::1]:0", None).is_ok());
+        assert!(matches!(access("0.0.0.0:0", None), Err(AccessError::NoToken { .. })));
+        assert!(matches!(access("192.168.1.5:0", None), Err(AccessError::NoToken { .. })));
+        assert_eq!(access("0.0.0.0:0", Some("short")).unwrap_err(), AccessError::Token { length: 5 });
+        assert!(access("0.0.0.0:0", Some("0123456789abcdef")).is_ok());
+    }
+
+    #[test]
+    fn only_own_names_are_answered() {
+        let own = access("127.0.0.1:0", None).unwrap();
+        for host in ["localhost:8377", "127.0.0.1:8377", "[::1]:8377", "bench.lab", "BENCH.LAB:80"] {
+            assert!(own.is_own(host), "{host}");
+        }
+        for host in ["", "evil.example:8377", "localhost.evil.example", "192.168.1.5", "127.0.0.1.evil.example"] {
+            assert!(!own.is_own(host), "{host}");
+        }
+        let anywhere = access("0.0.0.0:0", Some("0123456789abcdef")).unwrap();
+        assert!(anywhere.is_own("192.168.1.5:8377") && !anywhere.is_own("evil.example"));
+    }
+
+    #[test]
+    fn tokens_are_compared_whole() {
+        assert!(equal(b"abc", b"abc"));
+        assert!(!equal(b"abd", b"abc") && !equal(b"ab", b"abc") && !equal(b"abcd", b"abc") && !equal(b"", b"abc"));
+    }
+}

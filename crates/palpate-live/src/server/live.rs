@@ -1,0 +1,168 @@
+//! A locator in live use: the session that runs, and the beginning of another.
+
+use super::session_info::SessionInfo;
+use super::web_sink::{Hub, WebSink};
+use crate::frame::Channel;
+use crate::input::{Command, Input};
+use crate::pipeline;
+use crate::session::{Session, SessionConfig};
+use crate::simulated_board::BoardConfig;
+use crate::source::{Source, SourceError, SourceUrl};
+use crate::stamp::HostClock;
+use palpate_estimators::estimator::Locator;
+use palpate_rig::Rig;
+use std::path::PathBuf;
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+
+/// A locator in live use.
+pub struct Live {
+    locator: Arc<Locator>,
+    info: SessionInfo,
+    simulated: Option<(Rig, BoardConfig)>,
+    /// Folder that paths in URLs of sources are relative to.
+    folder: PathBuf,
+    clock: HostClock,
+    hub: Hub,
+    running: Mutex<Option<Running>>,
+}
+
+/// A session that runs.
+struct Running {
+    url: String,
+    inputs: SyncSender<Input>,
+    thread: JoinHandle<()>,
+    /// Its thread ends with it.
+    _source: Source,
+}
+
+/// A wish that cannot be done.
+#[derive(Debug, thiserror::Error)]
+pub enum LiveError {
+    /// No session runs.
+    #[error("no session runs: there is no source, or it has ended")]
+    NoSession,
+    /// The session has more to do than it can.
+    #[error("the session is behind its source")]
+    Behind,
+    /// There is no rig to simulate.
+    #[error("there is no simulated board: the server was started with a locator alone")]
+    NotSimulated,
+    /// The source cannot be opened.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// There is no thread for the session.
+    #[error("no thread for the session: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+impl Live {
+    /// A locator of this name, without a session. Where `simulated` has a rig, browsers may begin a session with a simulated board on its
+    /// bench.
+    pub fn new(locator: Locator, name: &str, simulated: Option<(Rig, BoardConfig)>, folder: PathBuf) -> Self {
+        let info = SessionInfo::new(&locator, name, simulated.is_some());
+        Self {
+            locator: Arc::new(locator),
+            info,
+            simulated,
+            folder,
+            clock: HostClock::new(),
+            hub: Hub::default(),
+            running: Mutex::default(),
+        }
+    }
+
+    /// Begins a session with a source; one that runs is ended.
+    ///
+    /// # Errors
+    /// [`LiveError`] for a source that cannot be opened; the session that ran goes on then.
+    pub fn begin(&self, url: &SourceUrl) -> Result<(), LiveError> {
+        self.begin_with(url.to_string(), |clock, to| Source::open(url, &self.folder, clock, to))
+    }
+
+    /// Begins a session with the simulated board; one that runs is ended.
+    ///
+    /// # Errors
+    /// [`LiveError::NotSimulated`] without a rig, and as of [`Self::begin`].
+    pub fn begin_simulated(&self) -> Result<(), LiveError> {
+        let (rig, config) = self.simulated.clone().ok_or(LiveError::NotSimulated)?;
+        self.begin_with("simulated".to_owned(), |clock, to| Source::simulated(rig, config, clock, to))
+    }
+
+    fn begin_with(
+        &self,
+        url: String,
+        open: impl FnOnce(HostClock, SyncSender<Input>) -> Result<Source, SourceError>,
+    ) -> Result<(), LiveError> {
+        let (inputs, received) = sync_channel(pipeline::WAITING);
+        let source = open(self.clock, inputs.clone())?;
+        let mut running = self.lock();
+        if let Some(running) = running.take() {
+            running.end();
+        }
+        let (locator, clock, hub) = (Arc::clone(&self.locator), self.clock, self.hub.clone());
+        let run = move || {
+            let mut session = Session::new(&locator, &SessionConfig::default());
+            let sink = WebSink::new(hub, session.channels(), session.extent());
+            pipeline::run(&mut session, clock, &received, &mut [Box::new(sink)]);
+        };
+        let thread = std::thread::Builder::new().name("session".to_owned()).spawn(run)?;
+        *running = Some(Running { url, inputs, thread, _source: source });
+        Ok(())
+    }
+
+    /// Has the session do what somebody wishes.
+    ///
+    /// # Errors
+    /// [`LiveError::NoSession`] or [`LiveError::Behind`].
+    pub fn command(&self, command: Command) -> Result<(), LiveError> {
+        use std::sync::mpsc::TrySendError;
+        let running = self.lock();
+        let running = running.as_ref().ok_or(LiveError::NoSession)?;
+        running.inputs.try_send(Input::Command(command)).map_err(|error| match error {
+            TrySendError::Full(_) => LiveError::Behind,
+            TrySendError::Disconnected(_) => LiveError::NoSession,
+        })
+    }
+
+    /// Ends the session, where one runs.
+    pub fn end(&self) {
+        if let Some(running) = self.lock().take() {
+            running.end();
+        }
+    }
+
+    /// URL of the source, while its session runs.
+    pub fn source(&self) -> Option<String> {
+        let running = self.lock();
+        running.as_ref().filter(|running| !running.thread.is_finished()).map(|running| running.url.clone())
+    }
+
+    /// Channels of a reading.
+    pub fn channels(&self) -> Vec<Channel> {
+        Channel::all_of(&self.locator.setup)
+    }
+
+    pub(super) fn info(&self) -> SessionInfo {
+        SessionInfo { source: self.source(), ..self.info.clone() }
+    }
+
+    pub(super) fn hub(&self) -> &Hub {
+        &self.hub
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Option<Running>> {
+        self.running.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Running {
+    fn end(self) {
+        let Self { inputs, thread, _source: source, .. } = self;
+        drop(source);
+        // Refused only by a session that has ended.
+        let _ = inputs.send(Input::Stop);
+        let _ = thread.join();
+    }
+}

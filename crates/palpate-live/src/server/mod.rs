@@ -1,0 +1,93 @@
+//! The web server: a page, a stream of the session, and its controls.
+//!
+//! One thread runs all of it. A browser costs a task and its place in bounded queues: one that is too slow loses the oldest messages,
+//! which are counted, and the session never waits for it.
+
+mod body;
+mod guard;
+mod live;
+mod page;
+mod routes;
+mod session_info;
+mod stream;
+mod web_sink;
+
+pub use guard::{Access, AccessError};
+pub use live::{Live, LiveError};
+pub use web_sink::{Hub, WebSink};
+
+use axum::serve::ListenerExt;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use tokio::sync::oneshot;
+
+/// A server that cannot be started.
+#[derive(Debug, thiserror::Error)]
+pub enum ServerError {
+    /// The address cannot be listened at.
+    #[error("cannot listen at {address}: {error}")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// Why.
+        error: std::io::Error,
+    },
+    /// There is no thread, or no event queue, for it.
+    #[error("cannot run a web server: {0}")]
+    Run(#[from] std::io::Error),
+}
+
+/// A web server that runs in a thread of its own until it is dropped.
+#[derive(Debug)]
+pub struct Server {
+    address: SocketAddr,
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Server {
+    /// Starts a server of a live session at an address; port 0 takes any that is free.
+    ///
+    /// # Errors
+    /// [`ServerError`] where the address cannot be listened at.
+    pub fn start(address: SocketAddr, access: Access, live: Arc<Live>) -> Result<Self, ServerError> {
+        let listener =
+            TcpListener::bind(address).map_err(|error| ServerError::Listen { address, error })?;
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let (stop, stopped) = oneshot::channel::<()>();
+        let router = routes::router(access.at(address.ip()), live);
+        let run = move || {
+            runtime.block_on(async {
+                let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
+                // A message leaves at once, whatever the one before it became of.
+                let listener = listener.tap_io(|stream| {
+                    let _ = stream.set_nodelay(true);
+                });
+                tokio::select! {
+                    _ = axum::serve(listener, router) => {}
+                    _ = stopped => {}
+                }
+            });
+            runtime.shutdown_background();
+        };
+        let thread = std::thread::Builder::new().name("server".to_owned()).spawn(run)?;
+        Ok(Self { address, stop: Some(stop), thread: Some(thread) })
+    }
+
+    /// The address that it listens at.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! The dashboard's files, as far as they were built.
+
+use axum::http::{StatusCode, Uri, header};
+use axum::response::{Html, IntoResponse, Response};
+use rust_embed::RustEmbed;
+
+/// The dashboard, which `cargo xtask web` builds.
+#[derive(RustEmbed)]
+#[folder = "$CARGO_MANIFEST_DIR/../../web/dist"]
+#[allow_missing = true]
+struct Dashboard;
+
+/// A file of the dashboard; without the dashboard a page that says how to get it.
+pub async fn page(uri: Uri) -> Response {
+    let path = match uri.path() {
+        "/" => "index.html",
+        path => path.trim_start_matches('/'),
+    };
+    match Dashboard::get(path) {
+        Some(file) => ([(header::CONTENT_TYPE, content_type(path))], file.data).into_response(),
+        None if path == "index.html" => Html(include_str!("without_dashboard.html")).into_response(),
+        None => (StatusCode::NOT_FOUND, "there is no such page").into_response(),
+    }
+}
+
+fn content_type(path: &str) -> &'static str {
+    match path.rsplit('.').next().unwrap_or_default() {
+        "html" => "text/html; charset=utf-8",
+        "js" => "text/javascript; charset=utf-8",
+        "css" => "text/css; charset=utf-8",
+        "svg" => "image/svg+xml",
+        "png" => "image/png",
+        "ico" => "image/x-icon",
+        "json" | "webmanifest" => "application/json",
+        "woff2" => "font/woff2",
+        _ => "application/octet-stream",
+    }
+}

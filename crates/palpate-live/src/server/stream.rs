@@ -1,0 +1,117 @@
+//! The stream of a session to one browser.
+
+use super::body::Refusal;
+use super::live::Live;
+use super::web_sink::{Hub, MOST_BROWSERS, with_missed};
+use axum::extract::rejection::QueryRejection;
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade, rejection::WebSocketUpgradeRejection};
+use axum::extract::{Query, State};
+use axum::http::StatusCode;
+use axum::response::Response;
+use serde::Deserialize;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::broadcast::{Receiver, error::RecvError};
+
+/// Most bytes of a message from a browser.
+const MOST_BYTES: usize = 4096;
+/// Most bytes that wait to be written to a browser, beside the message that is being written.
+const MOST_WAITING: usize = 1 << 20;
+/// A browser that takes nothing for so long is let go.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// What a browser wants.
+#[derive(Debug, Deserialize)]
+pub struct Wish {
+    #[serde(default)]
+    form: Form,
+    #[serde(default)]
+    rate: Rate,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Form {
+    #[default]
+    Json,
+    Binary,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+enum Rate {
+    #[default]
+    #[serde(rename = "60")]
+    Display,
+    #[serde(rename = "all")]
+    All,
+}
+
+/// Opens a stream.
+pub async fn stream(
+    State(live): State<Arc<Live>>,
+    wish: Result<Query<Wish>, QueryRejection>,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> Result<Response, Refusal> {
+    const HELP: &str = "form is `json` or `binary`, rate is `60` or `all`; binary has all";
+    let Query(wish) = wish.map_err(|error| Refusal::new(StatusCode::BAD_REQUEST, error.body_text(), HELP))?;
+    let upgrade = upgrade
+        .map_err(|error| Refusal::new(error.status(), error.body_text(), "open it as a WebSocket"))?;
+    let hub = live.hub().clone();
+    let Ok(place) = Arc::clone(&hub.places).try_acquire_owned() else {
+        let error = format!("{MOST_BROWSERS} browsers follow this session already");
+        return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, error, "close one of them"));
+    };
+    let upgrade = upgrade
+        .max_message_size(MOST_BYTES)
+        .max_frame_size(MOST_BYTES)
+        .write_buffer_size(0)
+        .max_write_buffer_size(MOST_WAITING);
+    Ok(upgrade.on_upgrade(move |socket| async move {
+        follow(socket, &hub, &wish).await;
+        drop(place);
+    }))
+}
+
+async fn follow(mut socket: WebSocket, hub: &Hub, wish: &Wish) {
+    match (wish.form, wish.rate) {
+        (Form::Binary, _) => {
+            send_all(&mut socket, hub.binary.subscribe(), |packet, _| Message::Binary(packet.clone())).await;
+        }
+        (Form::Json, Rate::All) => {
+            send_all(&mut socket, hub.json.subscribe(), |text, _| Message::Text(text.clone())).await;
+        }
+        (Form::Json, Rate::Display) => {
+            let message = |text: &_, missed| Message::Text(with_missed(text, missed));
+            send_all(&mut socket, hub.states.subscribe(), message).await;
+        }
+    }
+}
+
+/// Sends what comes, until the browser goes, sends too much, or takes nothing any more.
+async fn send_all<T: Clone>(
+    socket: &mut WebSocket,
+    mut messages: Receiver<T>,
+    message: impl Fn(&T, u64) -> Message,
+) {
+    let mut missed = 0;
+    loop {
+        tokio::select! {
+            next = messages.recv() => match next {
+                Ok(next) => {
+                    let sent = tokio::time::timeout(PATIENCE, socket.send(message(&next, missed))).await;
+                    if !matches!(sent, Ok(Ok(()))) {
+                        return;
+                    }
+                    missed = 0;
+                }
+                Err(RecvError::Lagged(count)) => missed += count,
+                Err(RecvError::Closed) => return,
+            },
+            // Nothing that a browser sends means anything; pings are answered by the socket.
+            received = socket.recv() => match received {
+                Some(Ok(Message::Close(_))) | Some(Err(_)) | None => return,
+                Some(Ok(_)) => {}
+            },
+        }
+    }
+}

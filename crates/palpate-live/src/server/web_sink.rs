@@ -1,0 +1,180 @@
+//! The sink that browsers read: each message is encoded once, and its bytes are shared by all of them.
+
+use crate::event::EventRecord;
+use crate::frame::Channel;
+use crate::sample::{Sample, SampleRecord};
+use crate::sink::{Batch, Sink, StateRecord};
+use axum::body::Bytes;
+use axum::extract::ws::Utf8Bytes;
+use palpate_core::Status;
+use palpate_mechanics::surface::Extent;
+use serde::Serialize;
+use std::sync::Arc;
+use tokio::sync::{Semaphore, broadcast};
+
+/// Most browsers that follow the session at a time.
+pub const MOST_BROWSERS: usize = 256;
+/// Messages that wait for a browser at 60 Hz: about a second.
+const STATES: usize = 64;
+/// Messages that wait for a browser that takes every sample.
+const BATCHES: usize = 512;
+/// Most samples of a message at 60 Hz.
+const MOST_SAMPLES: usize = 64;
+/// End of a message at 60 Hz of which none was missed.
+const NONE_MISSED: &str = "\"missed\":0}";
+
+/// Meeting place of a session and its browsers.
+#[derive(Clone, Debug)]
+pub struct Hub {
+    pub(super) states: broadcast::Sender<Utf8Bytes>,
+    pub(super) json: broadcast::Sender<Utf8Bytes>,
+    pub(super) binary: broadcast::Sender<Bytes>,
+    pub(super) places: Arc<Semaphore>,
+}
+
+impl Default for Hub {
+    fn default() -> Self {
+        Self {
+            states: broadcast::Sender::new(STATES),
+            json: broadcast::Sender::new(BATCHES),
+            binary: broadcast::Sender::new(BATCHES),
+            places: Arc::new(Semaphore::new(MOST_BROWSERS)),
+        }
+    }
+}
+
+/// Sink of a session into a hub.
+#[derive(Debug)]
+pub struct WebSink {
+    hub: Hub,
+    channels: Vec<Channel>,
+    extent: Extent,
+    /// Batches since the last state.
+    recent: Vec<Arc<Batch>>,
+}
+
+#[derive(Serialize)]
+struct Batched<'a> {
+    samples: Vec<SampleRecord>,
+    events: Vec<&'a EventRecord>,
+}
+
+#[derive(Serialize)]
+struct Stated<'a> {
+    state: &'a StateRecord,
+    samples: Vec<SampleRecord>,
+    events: Vec<&'a EventRecord>,
+    missed: u64,
+}
+
+impl WebSink {
+    /// A sink of samples of these channels.
+    pub fn new(hub: Hub, channels: &[Channel], extent: Extent) -> Self {
+        Self { hub, channels: channels.to_vec(), extent, recent: Vec::new() }
+    }
+
+    fn record(&self, sample: &Sample) -> SampleRecord {
+        SampleRecord::new(sample, &self.channels, self.extent)
+    }
+}
+
+impl Sink for WebSink {
+    fn batch(&mut self, batch: &Arc<Batch>) {
+        if self.hub.states.receiver_count() > 0 {
+            self.recent.push(Arc::clone(batch));
+        }
+        if self.hub.json.receiver_count() > 0 {
+            let samples = batch.samples().map(|sample| self.record(sample)).collect();
+            if let Ok(text) = serde_json::to_string(&Batched { samples, events: batch.events().collect() }) {
+                // Nobody may be there any more.
+                let _ = self.hub.json.send(text.into());
+            }
+        }
+        if self.hub.binary.receiver_count() > 0 {
+            let packet = packet(batch, &self.channels);
+            if !packet.is_empty() {
+                let _ = self.hub.binary.send(packet.into());
+            }
+        }
+    }
+
+    fn state(&mut self, state: &Arc<StateRecord>) {
+        let recent = std::mem::take(&mut self.recent);
+        if self.hub.states.receiver_count() == 0 {
+            return;
+        }
+        let samples: Vec<&Sample> = recent.iter().flat_map(|batch| batch.samples()).collect();
+        let samples = thinned(&samples).into_iter().map(|sample| self.record(sample)).collect();
+        let events = recent.iter().flat_map(|batch| batch.events()).collect();
+        if let Ok(text) = serde_json::to_string(&Stated { state, samples, events, missed: 0 }) {
+            let _ = self.hub.states.send(text.into());
+        }
+    }
+}
+
+/// At most so many, evenly, the last always.
+fn thinned<'a>(samples: &[&'a Sample]) -> Vec<&'a Sample> {
+    let every = samples.len().div_ceil(MOST_SAMPLES).max(1);
+    let mut thinned: Vec<&Sample> = samples.iter().rev().step_by(every).copied().collect();
+    thinned.reverse();
+    thinned
+}
+
+/// A message at 60 Hz for a browser that has missed some before it.
+pub fn with_missed(message: &Utf8Bytes, missed: u64) -> Utf8Bytes {
+    match message.strip_suffix(NONE_MISSED) {
+        Some(rest) if missed > 0 => format!("{rest}\"missed\":{missed}}}").into(),
+        _ => message.clone(),
+    }
+}
+
+/// Version of the binary packets.
+const PACKET_VERSION: u8 = 1;
+/// Bytes before the samples of a packet.
+const HEAD_BYTES: usize = 8;
+/// Bytes of a sample before its reading.
+const SAMPLE_BYTES: usize = 44;
+
+/// The samples of a batch as a packet, which docs/live-server.md describes; empty where there are none.
+fn packet(batch: &Batch, channels: &[Channel]) -> Vec<u8> {
+    let count = batch.samples().count();
+    if count == 0 {
+        return Vec::new();
+    }
+    let mut bytes = Vec::with_capacity(HEAD_BYTES + count * (SAMPLE_BYTES + 4 * channels.len()));
+    bytes.extend([b'p', PACKET_VERSION]);
+    bytes.extend((channels.len() as u16).to_le_bytes());
+    bytes.extend((count as u32).to_le_bytes());
+    for sample in batch.samples() {
+        let contact = &sample.estimate.contact;
+        let sd = |variance: fn(&[f64; 6]) -> f64| {
+            contact.uncertainty.map_or(f64::NAN, |uncertainty| variance(&uncertainty.covariance).sqrt())
+        };
+        bytes.extend(sample.number.to_le_bytes());
+        bytes.extend(sample.unix_ns.to_le_bytes());
+        bytes.extend([code(sample.estimate.status), sample.estimate.further.as_slice().len() as u8, 0, 0]);
+        let figures = [
+            contact.position.x_m * 1e3,
+            contact.position.y_m * 1e3,
+            contact.force_n.unwrap_or(f64::NAN),
+            sd(|covariance| covariance[0]) * 1e3,
+            sd(|covariance| covariance[3]) * 1e3,
+            sd(|covariance| covariance[5]),
+        ];
+        let readings = sample.reading.iter().zip(channels).map(|(value, channel)| value / channel.unit.factor());
+        let floats = figures.into_iter().chain(readings);
+        floats.for_each(|value| bytes.extend((value as f32).to_le_bytes()));
+    }
+    bytes
+}
+
+/// Number of a status in a packet.
+fn code(status: Status) -> u8 {
+    match status {
+        Status::NoContact => 0,
+        Status::Located => 1,
+        Status::Ambiguous => 2,
+        Status::OutsideModel => 3,
+        _ => 4,
+    }
+}
