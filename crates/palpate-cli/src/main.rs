@@ -51,6 +51,7 @@ enum Command {
     Limit(commands::limit::Arguments),
     Inspect(commands::inspect::Arguments),
     Profile(commands::profile::Arguments),
+    Serve(commands::serve::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -73,6 +74,7 @@ fn main() -> ExitCode {
         Command::Limit(arguments) => commands::limit::run(&arguments),
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
         Command::Profile(arguments) => commands::profile::run(&arguments),
+        Command::Serve(arguments) => commands::serve::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -10,6 +10,7 @@ mod learnt;
 pub mod limit;
 pub mod locate;
 pub mod profile;
+pub mod serve;
 pub mod simulate;
 pub mod study;
 pub mod track;

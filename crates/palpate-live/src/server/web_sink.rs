@@ -178,3 +178,27 @@ fn code(status: Status) -> u8 {
         _ => 4,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::Counters;
+    use tokio::sync::broadcast::error::TryRecvError;
+
+    #[test]
+    fn the_oldest_messages_are_dropped_and_counted() {
+        let hub = Hub::default();
+        let mut slow = hub.states.subscribe();
+        let mut sink = WebSink::new(hub, &[], Extent::line(0.4).unwrap());
+        for readings in 0..200 {
+            let counters = Counters { readings, ..Counters::default() };
+            sink.state(&Arc::new(StateRecord { counters, ..StateRecord::default() }));
+        }
+        assert!(matches!(slow.try_recv(), Err(TryRecvError::Lagged(136))));
+        let message = slow.try_recv().unwrap();
+        let told: serde_json::Value = serde_json::from_str(&with_missed(&message, 136)).unwrap();
+        assert_eq!((&told["missed"], &told["state"]["counters"]["readings"]), (&136.into(), &136.into()));
+        // Without any missed, its bytes are those of all others.
+        assert_eq!(with_missed(&message, 0).as_ptr(), message.as_ptr());
+    }
+}

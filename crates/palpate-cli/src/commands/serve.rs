@@ -1,0 +1,154 @@
+//! `palpate serve`: a session that browsers follow.
+
+use crate::failure::{Complaint, Failure};
+use crate::input::{self, RigOrLocator};
+use crate::progress::{self, Observer};
+use crate::remark::remark;
+use palpate_estimators::estimator::{Estimator, Locator};
+use palpate_estimators::fit::{Fit, FitTask};
+use palpate_live::server::{Access, AccessError, Live, LiveError, Server, ServerError};
+use palpate_live::simulated_board::BoardConfig;
+use palpate_live::source::SourceUrl;
+use palpate_rig::Rig;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The bench of the demonstration: that of the founding paper, with noise.
+const DEMO: &str = include_str!("../../../../examples/noisy-beam.toml");
+/// Its name.
+const DEMO_NAME: &str = "examples/noisy-beam.toml";
+/// Time between two looks for Ctrl-C.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// Serve a dashboard: contacts, readings and events of a board, live in a browser.
+///
+/// A rig is fitted first, to its simulation or to --data. Without arguments a simulated board on the bench of the founding paper is shown.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The locator, or a rig to fit
+    #[arg(value_name = "LOCATOR|RIG.toml")]
+    locator: Option<PathBuf>,
+    /// The source of readings: `-`, or `simulated:RIG.toml?rate=100`; without one the page offers a simulated board
+    #[arg(long, value_name = "URL")]
+    from: Option<SourceUrl>,
+    /// A recording to fit the rig to
+    #[arg(long, value_name = "FILE.csv", requires = "locator")]
+    data: Option<PathBuf>,
+    /// The address to listen at; any but loopback needs --token
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8377")]
+    listen: SocketAddr,
+    /// The token that requests must carry; `auto` makes one up
+    #[arg(long, value_name = "TOKEN")]
+    token: Option<String>,
+    /// A name by which browsers may call this machine, beside its address; may be repeated
+    #[arg(long, value_name = "NAME")]
+    host_name: Vec<String>,
+    /// Seed of fit and simulation
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let token = match arguments.token.as_deref() {
+        Some("auto") => Some(made_up_token()?),
+        given => given.map(str::to_owned),
+    };
+    let access = Access::new(arguments.listen, token.clone(), arguments.host_name.clone()).map_err(refused)?;
+    let live = Arc::new(live(arguments)?);
+    let server = Server::start(arguments.listen, access, Arc::clone(&live)).map_err(|error| match &error {
+        ServerError::Listen { .. } => {
+            Complaint::new(&error).help("--listen 127.0.0.1:0 takes a port that is free")
+        }
+        ServerError::Run(_) => Complaint::new(&error),
+    })?;
+    begin(&live, arguments)?;
+    let query = token.map_or_else(String::new, |token| format!("?token={token}"));
+    remark!("palpate: open http://{}/{query} in a browser; Ctrl-C ends it", server.address());
+    while !progress::interrupted() {
+        std::thread::sleep(LOOK_EVERY);
+    }
+    // First the session, so that browsers get what it has told; both end within milliseconds.
+    live.end();
+    drop(server);
+    Err(Failure::Interrupted("the server was ended".to_owned()))
+}
+
+/// The locator of the arguments, without a session.
+fn live(arguments: &Arguments) -> Result<Live, Failure> {
+    let path = arguments.locator.as_deref().unwrap_or(Path::new(DEMO_NAME));
+    let read = match &arguments.locator {
+        None => RigOrLocator::Rig(Box::new(input::parse_rig(path, DEMO)?)),
+        Some(path) => RigOrLocator::read(path)?,
+    };
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let (locator, simulated) = match read {
+        RigOrLocator::Locator(locator) => {
+            if arguments.data.is_some() {
+                let complaint = Complaint::about(path, "--data is for rigs, and this is a locator");
+                return Err(complaint.help("leave --data out").into());
+            }
+            (*locator, None)
+        }
+        RigOrLocator::Rig(rig) => {
+            let locator = fitted(&rig, path, arguments)?;
+            let can_be = rig.setup.surface().model().is_some();
+            let config = BoardConfig { seed: arguments.seed, ..BoardConfig::default() };
+            (locator, can_be.then_some((*rig, config)))
+        }
+    };
+    if let Err(error) = locator.tare() {
+        remark!("warning: no tare, so offsets that have moved stay in the readings: {error}");
+    }
+    // URLs name paths as the command line does: from the folder it was started in.
+    Ok(Live::new(locator, &name, simulated, PathBuf::new()))
+}
+
+fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Failure> {
+    if rig.estimator == Estimator::Auto {
+        let complaint = Complaint::about(path, "the estimator is `auto`, whose choice may take minutes");
+        return Err(complaint.help("`palpate fit` it once, and serve the locator").into());
+    }
+    let recording = match &arguments.data {
+        Some(data) => input::read_recording(&rig.setup, data)?,
+        None => rig.simulate(arguments.seed).map_err(|error| {
+            Complaint::about(path, error).help("--data names a recording to fit")
+        })?,
+    };
+    let needed = rig.estimator.positions_needed();
+    recording.check_distinct_positions(needed).map_err(Complaint::new)?;
+    let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
+    Observer::of_rounds(rig.estimator.most_rounds())
+        .watch(|watch| rig.estimator.fit_task(task.watch(watch)))
+        .map_err(|error| Failure::from_error(&error))
+}
+
+/// Begins the first session, where its source is known.
+fn begin(live: &Live, arguments: &Arguments) -> Result<(), Failure> {
+    let begun = match (&arguments.from, &arguments.locator) {
+        (Some(url), _) => live.begin(url),
+        (None, None) => live.begin_simulated(),
+        (None, Some(_)) => {
+            remark!("palpate: no source yet; --from names one, and the page offers a simulated board of a rig");
+            Ok(())
+        }
+    };
+    begun.map_err(|error: LiveError| Complaint::new(error).help("--from names the source").into())
+}
+
+fn refused(error: AccessError) -> Failure {
+    let help = match error {
+        AccessError::NoToken { .. } => "--token auto makes one up; or listen at 127.0.0.1",
+        AccessError::Token { .. } => "--token auto makes one up",
+    };
+    Complaint::new(error).help(help).into()
+}
+
+/// 128 bits from the system's random numbers, in hexadecimal digits.
+fn made_up_token() -> Result<String, Failure> {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes)
+        .map_err(|error| Complaint::new(format!("no random numbers for a token: {error}")).help("give one"))?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}

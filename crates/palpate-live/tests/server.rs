@@ -1,0 +1,263 @@
+//! The web server over real sockets: each route as it should be asked, and as it should not.
+
+use palpate_estimators::fit::{Fit, FitTask};
+use palpate_live::server::{Access, Live, Server};
+use palpate_live::simulated_board::BoardConfig;
+use palpate_rig::Rig;
+use serde_json::{Value, json};
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tungstenite::client::IntoClientRequest;
+use tungstenite::{Message, WebSocket};
+
+const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
+const TOKEN: &str = "0123456789abcdef";
+
+/// A served simulated board of 1,000 readings a second, whose session has not begun.
+fn served(token: Option<&str>) -> (Arc<Live>, Server) {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let recording = rig.simulate(0).unwrap();
+    let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
+    let config = BoardConfig { rate_hz: 1000.0, seed: 1 };
+    let live = Arc::new(Live::new(locator, "noisy-beam.toml", Some((rig, config)), PathBuf::new()));
+    let address: SocketAddr = "127.0.0.1:0".parse().unwrap();
+    let access = Access::new(address, token.map(str::to_owned), Vec::new()).unwrap();
+    let server = Server::start(address, access, Arc::clone(&live)).unwrap();
+    (live, server)
+}
+
+/// Status, head and body of an answer.
+fn ask(server: &Server, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> (u16, String, String) {
+    let mut stream = TcpStream::connect(server.address()).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    let mut request = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\nContent-Length: {}\r\n", body.len());
+    if !headers.iter().any(|(name, _)| *name == "Host") {
+        request += &format!("Host: {}\r\n", server.address());
+    }
+    headers.iter().for_each(|(name, value)| request += &format!("{name}: {value}\r\n"));
+    // A server that refuses a body does not read it all.
+    let _ = stream.write_all(format!("{request}\r\n{body}").as_bytes());
+    let mut answer = Vec::new();
+    let _ = stream.read_to_end(&mut answer);
+    let answer = String::from_utf8_lossy(&answer).into_owned();
+    let (head, body) = answer.split_once("\r\n\r\n").unwrap_or_default();
+    (head.split(' ').nth(1).unwrap_or("0").parse().unwrap(), head.to_ascii_lowercase(), body.to_owned())
+}
+
+fn get(server: &Server, path: &str) -> (u16, Value) {
+    let (status, _, body) = ask(server, "GET", path, &[], "");
+    (status, serde_json::from_str(&body).unwrap_or_default())
+}
+
+fn post(server: &Server, path: &str, body: &str) -> (u16, Value) {
+    let (status, _, body) = ask(server, "POST", path, &[], body);
+    (status, serde_json::from_str(&body).unwrap_or_default())
+}
+
+fn follow(server: &Server, query: &str, origin: Option<&str>) -> tungstenite::Result<WebSocket<TcpStream>> {
+    let mut request = format!("ws://{}/api/stream{query}", server.address()).into_client_request()?;
+    if let Some(origin) = origin {
+        request.headers_mut().insert("Origin", origin.parse().unwrap());
+    }
+    let stream = TcpStream::connect(server.address())?;
+    stream.set_read_timeout(Some(Duration::from_secs(20)))?;
+    let (socket, _) = tungstenite::client(request, stream).map_err(|error| match error {
+        tungstenite::HandshakeError::Failure(error) => error,
+        tungstenite::HandshakeError::Interrupted(_) => tungstenite::Error::ConnectionClosed,
+    })?;
+    Ok(socket)
+}
+
+fn next(socket: &mut WebSocket<TcpStream>) -> Value {
+    serde_json::from_str(socket.read().unwrap().to_text().unwrap()).unwrap()
+}
+
+#[test]
+fn a_browser_begins_the_simulated_board_and_follows_it() {
+    let (live, server) = served(None);
+    let (status, session) = get(&server, "/api/session");
+    assert_eq!((status, &session["source"], &session["has_simulated"]), (200, &Value::Null, &json!(true)));
+    assert_eq!(session["surface"]["supports"][1], json!({ "at_mm": 400.0, "kind": "simple" }));
+    assert_eq!(session["channels"].as_array().unwrap().len(), 8);
+    assert_eq!(session["limit"]["sd_mm"].as_array().unwrap().len(), 399);
+    // Before there is a session, there is nothing to tare.
+    assert_eq!(post(&server, "/api/tare", "{}").0, 409);
+
+    let mut socket = follow(&server, "", None).unwrap();
+    assert_eq!(post(&server, "/api/source", r#"{"url":"simulated"}"#).0, 200);
+    assert_eq!(get(&server, "/api/session").1["source"], "simulated");
+    assert_eq!(post(&server, "/api/mark", r#"{"text":"here"}"#).0, 200);
+    assert_eq!(post(&server, "/api/tare", "{}").0, 200);
+    let (mut events, mut last) = (Vec::new(), -1);
+    while last < 500 {
+        let message = next(&mut socket);
+        let samples = message["samples"].as_array().unwrap();
+        assert!(samples.len() <= 64);
+        for sample in samples {
+            let number = sample["number"].as_i64().unwrap();
+            assert!(number > last && sample["reading"].as_array().unwrap().len() == 8);
+            last = number;
+        }
+        let told = message["events"].as_array().unwrap();
+        events.extend(told.iter().map(|event| event["event"].as_str().unwrap().to_owned()));
+    }
+    for expected in ["source_opened", "mark", "tared"] {
+        assert!(events.iter().any(|event| event == expected), "{expected}: {events:?}");
+    }
+    // Begun anew, it counts from 0 for the same browser.
+    assert_eq!(post(&server, "/api/source", r#"{"url":"simulated"}"#).0, 200);
+    let begins = Instant::now();
+    while next(&mut socket)["samples"].as_array().unwrap().iter().all(|sample| sample["number"] != 0) {
+        assert!(begins.elapsed() < Duration::from_secs(10));
+    }
+    live.end();
+    assert_eq!(get(&server, "/api/session").1["source"], Value::Null);
+    assert_eq!(post(&server, "/api/mark", r#"{"text":"late"}"#).0, 409);
+}
+
+#[test]
+fn every_sample_comes_as_json_and_as_packets() {
+    let (live, server) = served(None);
+    let mut text = follow(&server, "?rate=all", None).unwrap();
+    let mut binary = follow(&server, "?form=binary&rate=all", None).unwrap();
+    live.begin_simulated().unwrap();
+    let mut expected = 0;
+    let mut first = Value::Null;
+    while expected < 300 {
+        for sample in next(&mut text)["samples"].as_array().unwrap() {
+            assert_eq!(sample["number"], expected);
+            if expected == 0 {
+                first = sample.clone();
+            }
+            expected += 1;
+        }
+    }
+    let mut expected = 0_u64;
+    while expected < 300 {
+        let Message::Binary(packet) = binary.read().unwrap() else { panic!("no packet") };
+        let u32_at = |at: usize| u32::from_le_bytes(packet[at..at + 4].try_into().unwrap());
+        assert_eq!(&packet[..4], [b'p', 1, 8, 0]);
+        let each = 44 + 4 * 8;
+        assert_eq!(packet.len(), 8 + each * u32_at(4) as usize);
+        for sample in packet[8..].chunks(each) {
+            assert_eq!(u64::from_le_bytes(sample[..8].try_into().unwrap()), expected);
+            if expected == 0 {
+                let f32_at = |at: usize| f64::from(f32::from_le_bytes(sample[at..at + 4].try_into().unwrap()));
+                assert!((f32_at(20) - first["x_mm"].as_f64().unwrap()).abs() < 1e-3);
+                assert!((f32_at(44) / first["reading"][0].as_f64().unwrap() - 1.0).abs() < 1e-6);
+            }
+            expected += 1;
+        }
+    }
+    live.end();
+}
+
+#[test]
+fn other_pages_and_other_names_are_refused() {
+    let (_live, server) = served(None);
+    let own = format!("http://{}", server.address());
+    let ask_from = |origin: &str| ask(&server, "POST", "/api/tare", &[("Origin", origin)], "{}").0;
+    assert_eq!(ask_from("http://evil.example"), 403);
+    assert_eq!(ask_from("null"), 403);
+    assert_eq!(ask_from(&own), 409);
+    assert_eq!(ask(&server, "GET", "/api/session", &[("Host", "evil.example")], "").0, 403);
+    let refused = follow(&server, "", Some("http://evil.example")).unwrap_err();
+    assert!(matches!(refused, tungstenite::Error::Http(answer) if answer.status() == 403));
+    follow(&server, "", Some(&own)).unwrap();
+}
+
+#[test]
+fn a_token_is_asked_for() {
+    let (_live, server) = served(Some(TOKEN));
+    assert_eq!(get(&server, "/api/session").0, 401);
+    assert_eq!(get(&server, "/api/session?token=0123456789abcdeg").0, 401);
+    assert_eq!(get(&server, &format!("/api/session?token={TOKEN}")).0, 200);
+    let bearer = format!("Bearer {TOKEN}");
+    assert_eq!(ask(&server, "POST", "/api/tare", &[("Authorization", &bearer)], "{}").0, 409);
+    assert!(follow(&server, "", None).is_err());
+    follow(&server, &format!("?token={TOKEN}"), None).unwrap();
+    // The page itself tells nothing of the session.
+    assert_eq!(ask(&server, "GET", "/", &[], "").0, 200);
+}
+
+#[test]
+fn bad_requests_are_answered_in_words() {
+    let (_live, server) = served(None);
+    let long = json!({ "text": "m".repeat(201) }).to_string();
+    let large = json!({ "text": "m".repeat(70_000) }).to_string();
+    let cases = [
+        ("/api/mark", long.as_str(), 400),
+        ("/api/mark", r#"{"text":"two\nlines"}"#, 400),
+        ("/api/mark", r#"{"text":1}"#, 400),
+        ("/api/mark", "{", 400),
+        ("/api/mark", &large, 413),
+        ("/api/source", r#"{"url":"serial:///dev/ttyACM0"}"#, 403),
+        ("/api/source", r#"{"url":"simulated:/etc/passwd"}"#, 403),
+        ("/api/nothing", "{}", 404),
+    ];
+    for (path, body, expected) in cases {
+        let (status, answer) = post(&server, path, body);
+        assert_eq!(status, expected, "{path} {}", &body[..body.len().min(80)]);
+        assert!(answer["error"].is_string() && answer["help"].is_string(), "{path}: {answer}");
+    }
+    assert_eq!(get(&server, "/api/stream").0, 400);
+    assert!(follow(&server, "?form=xml", None).is_err());
+    for path in ["/../Cargo.toml", "/%2e%2e/Cargo.toml", "/no-such-file.js"] {
+        assert_eq!(get(&server, path).0, 404, "{path}");
+    }
+    let (status, head, _) = ask(&server, "GET", "/", &[], "");
+    assert_eq!(status, 200);
+    for header in ["content-security-policy: default-src 'self'", "x-content-type-options: nosniff", "referrer-policy: no-referrer"] {
+        assert!(head.contains(header), "{head}");
+    }
+}
+
+#[test]
+fn too_many_commands_in_a_second_are_refused() {
+    let (_live, server) = served(None);
+    let refused = (0..60).map(|_| post(&server, "/api/tare", "{}").0).filter(|status| *status == 429).count();
+    assert!(refused > 0);
+}
+
+#[test]
+fn a_browser_that_sends_too_much_is_let_go() {
+    let (live, server) = served(None);
+    let mut socket = follow(&server, "", None).unwrap();
+    live.begin_simulated().unwrap();
+    socket.send(Message::Text("m".repeat(5000).into())).unwrap();
+    let start = Instant::now();
+    while socket.read().is_ok() {
+        assert!(start.elapsed() < Duration::from_secs(10));
+    }
+    live.end();
+}
+
+#[test]
+fn a_browser_that_never_reads_costs_the_others_nothing() {
+    let (live, server) = served(None);
+    let _slow: Vec<_> = (0..3).map(|_| follow(&server, "?rate=all", None).unwrap()).collect();
+    let mut quick = follow(&server, "?rate=all", None).unwrap();
+    live.begin_simulated().unwrap();
+    let mut expected = 0;
+    while expected < 3000 {
+        for sample in next(&mut quick)["samples"].as_array().unwrap() {
+            assert_eq!(sample["number"], expected);
+            expected += 1;
+        }
+    }
+    live.end();
+}
+
+#[test]
+fn servers_end_at_once_with_browsers_on() {
+    let (live, server) = served(None);
+    live.begin_simulated().unwrap();
+    let _browsers: Vec<_> = (0..10).map(|_| follow(&server, "", None).unwrap()).collect();
+    let start = Instant::now();
+    live.end();
+    drop(server);
+    assert!(start.elapsed() < Duration::from_millis(200), "{:?}", start.elapsed());
+}
