@@ -28,6 +28,11 @@ impl Counts {
         lines.iter().rev().find_map(|line| pytest(line))
     }
 
+    /// Adds up vitest's closing lines; `None` when there is none.
+    pub fn of_vitest(lines: &[String]) -> Option<Self> {
+        lines.iter().filter_map(|line| vitest(line)).reduce(Self::add)
+    }
+
     /// Counts tests that found a prerequisite missing, which their runner takes as passed, as skipped.
     pub fn with_skips(self, skips: usize) -> Self {
         let moved = skips.min(self.passed);
@@ -81,6 +86,12 @@ fn pytest(line: &str) -> Option<Counts> {
     let is_closing = took.starts_with(|first: char| first.is_ascii_digit()) && took.contains('s');
     let counts = tally(results, ',');
     (is_closing && counts != Counts::default()).then_some(counts)
+}
+
+/// `      Tests  1 failed | 32 passed | 2 skipped (35)`
+fn vitest(line: &str) -> Option<Counts> {
+    let (results, _) = line.trim_start().strip_prefix("Tests  ")?.rsplit_once(" (")?;
+    Some(tally(results, '|'))
 }
 
 fn tally(results: &str, between: char) -> Counts {
@@ -154,6 +165,15 @@ mod tests {
         let counts = read("===== 316 passed, 1 error in 131.02s (0:02:11) =====");
         assert_eq!(counts, Some(Counts { passed: 316, failed: 1, skipped: 0 }));
         assert_eq!(read("no tests ran in 0.01s"), None);
+    }
+
+    #[test]
+    fn the_closing_line_of_vitest_is_read() {
+        let read = |line: &str| Counts::of_vitest(&[" Test Files  1 failed (3)".to_owned(), line.to_owned()]);
+        let counts = read("      Tests  1 failed | 32 passed | 2 skipped (35)");
+        assert_eq!(counts, Some(Counts { passed: 32, failed: 1, skipped: 2 }));
+        assert_eq!(read("      Tests  33 passed (33)"), Some(Counts { passed: 33, failed: 0, skipped: 0 }));
+        assert_eq!(read("no tests"), None);
     }
 
     #[test]

@@ -1,7 +1,8 @@
-//! The project's chores: `cargo xtask test | wheel | tidy | rig-keys | bench | fuzz`.
+//! The project's chores: `cargo xtask test | web | wheel | tidy | rig-keys | bench | fuzz`.
 #![forbid(unsafe_code)]
 
 mod counts;
+mod dashboard;
 mod fuzz;
 mod needs;
 mod python;
@@ -27,12 +28,14 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Chore {
-    /// Run every check: formatting, clippy, tests, doc tests, docs, Python tests, tidy
+    /// Run every check: formatting, clippy, tests, doc tests, docs, Python tests, dashboard, tidy
     Test {
         /// A test that is skipped for want of a prerequisite fails
         #[arg(long)]
         strict: bool,
     },
+    /// Build the dashboard of `palpate serve` into web/dist, from which compiling takes it; needs Node
+    Web,
     /// Build the wheel of the Python package, and run its tests on it with the oldest and the newest of what it supports
     Wheel,
     /// Write docs/rig-keys.md from the types that rig and study files are read into
@@ -64,6 +67,7 @@ fn main() -> ExitCode {
         Chore::Test { strict } => {
             test::run(&root, if strict { skipped::Skips::Fail } else { skipped::Skips::Pass })
         }
+        Chore::Web => dashboard::build(&root),
         Chore::Wheel => python::wheel(&root),
         Chore::RigKeys => rig_keys::run(&root),
         Chore::Tidy => tidy::run(&root),

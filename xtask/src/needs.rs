@@ -61,9 +61,25 @@ pub const PYTHON: Need = Need {
     },
 };
 
-const NEEDS: [Need; 6] = [
+/// Builds the dashboard, and runs its tests.
+pub const NODE: Need = Need {
+    name: "Node with npm",
+    variable: None,
+    found: |_, _| {
+        let recent = "const [major, minor] = process.versions.node.split('.').map(Number); process.exit(major * 100 + minor < 2019)";
+        run::answers("node", &["-e", recent]) && run::answers("npm", &["--version"])
+    },
+    packages: &["nodejs", "npm"],
+    without: Without::Skips {
+        tests: &["every test of the dashboard"],
+        remedy: "install Node 20.19 or later with npm; without it `palpate serve` has no dashboard",
+    },
+};
+
+const NEEDS: [Need; 7] = [
     NEXTEST,
     PYTHON,
+    NODE,
     Need {
         name: "the folder of real recordings",
         variable: Some("PALPATE_DATA"),
@@ -80,7 +96,7 @@ const NEEDS: [Need; 6] = [
         found: |_, named| named.unwrap_or(Path::new("/usr/bin/chromium")).is_file(),
         packages: &["chromium", "fonts-dejavu-core"],
         without: Without::Skips {
-            tests: &["crates/palpate-cli/tests/cli/browser.rs"],
+            tests: &["crates/palpate-cli/tests/cli/browser.rs", "web/browser/dashboard.test.ts"],
             remedy: "install Debian's chromium, or name the program in PALPATE_CHROMIUM",
         },
     },

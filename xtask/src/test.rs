@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 
 use crate::counts::Counts;
+use crate::dashboard;
 use crate::needs::{self, NEXTEST, Without};
 use crate::python;
 use crate::run;
@@ -47,6 +48,7 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
             Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
         })?,
         step("Python tests", || python::test(root, skips, environment, &TESTED))?,
+        step("dashboard", || dashboard::test(root, skips, &skipped, &TESTED))?,
         step("tidy", || Ok((tidy::run(root)?, None)))?,
     ];
     let lines = skipped.lines()?;

@@ -1,0 +1,56 @@
+// Headless Chromium, and pages that remember what went wrong on them.
+
+import { appendFileSync, existsSync, mkdirSync } from "node:fs";
+import { type Browser, type BrowserContextOptions, chromium, type Page } from "playwright-core";
+import { ROOT } from "./server";
+
+const PROGRAM = process.env.PALPATE_CHROMIUM ?? "/usr/bin/chromium";
+const FLAGS = [
+  "--headless",
+  "--no-sandbox",
+  "--disable-gpu",
+  "--disable-quic",
+  "--no-first-run",
+  "--disable-background-networking",
+  "--disable-component-update",
+  "--disable-sync",
+];
+/** Pictures of the page, for a person to look at. */
+const PICTURES = `${ROOT}/target/xtask/dashboard`;
+
+/** True where Chromium is; says that the tests are skipped where it is not, as the tests in Rust do. */
+export function hasChromium(): boolean {
+  if (existsSync(PROGRAM)) return true;
+  const line = "skipped web/browser/dashboard.test.ts: Chromium is missing; install Debian's chromium, or name the program in PALPATE_CHROMIUM";
+  if (process.env.PALPATE_STRICT === "1") throw new Error(line);
+  console.error(line);
+  if (process.env.PALPATE_SKIPPED !== undefined) appendFileSync(process.env.PALPATE_SKIPPED, `${line}\n`);
+  return false;
+}
+
+export function launch(): Promise<Browser> {
+  mkdirSync(PICTURES, { recursive: true });
+  return chromium.launch({ executablePath: PROGRAM, args: FLAGS });
+}
+
+/** A page, and the faults that a person would not see: errors, and what was fetched from elsewhere. */
+export async function open(browser: Browser, url: string, options: BrowserContextOptions = {}): Promise<{ page: Page; faults: string[] }> {
+  const context = await browser.newContext({ viewport: { width: 1280, height: 1000 }, ...options });
+  const page = await context.newPage();
+  page.setDefaultTimeout(15_000);
+  const faults: string[] = [];
+  page.on("pageerror", (error) => faults.push(String(error.stack ?? error)));
+  page.on("console", (message) => {
+    // A server that is away is an error of the network, which the page says in words.
+    if (message.type() === "error" && !message.text().includes("ERR_CONNECTION")) faults.push(message.text());
+  });
+  page.on("request", (request) => {
+    if (new URL(request.url()).host !== new URL(url).host) faults.push(`fetched ${request.url()}`);
+  });
+  await page.goto(url);
+  return { page, faults };
+}
+
+export async function picture(page: Page, name: string): Promise<void> {
+  await page.screenshot({ path: `${PICTURES}/${name}.png`, fullPage: true });
+}

@@ -1,0 +1,59 @@
+// Requests to `palpate serve`, at the address that the page came from.
+
+import type { RecordingContent, RecordingInfo, SessionInfo } from "./protocol";
+
+/** An answer of the server that is no success: its words, and what can be done. */
+export class ApiError extends Error {
+  constructor(
+    readonly status: number,
+    words: string,
+    readonly help: string | null,
+  ) {
+    super(help === null ? words : `${words}: ${help}`);
+  }
+}
+
+/** The token of the page's own address; only servers beyond loopback have one. */
+const token = new URLSearchParams(location.search).get("token");
+
+/** Longest time that an answer may take. */
+const TIMEOUT_MS = 10_000;
+
+async function request(path: string, init: RequestInit): Promise<Response> {
+  const headers = new Headers(init.headers);
+  if (token !== null) headers.set("Authorization", `Bearer ${token}`);
+  const response = await fetch(`api/${path}`, { ...init, headers, signal: AbortSignal.timeout(TIMEOUT_MS) });
+  if (response.ok) return response;
+  const body: unknown = await response.json().catch(() => null);
+  const { error, help } = (body ?? {}) as { error?: string; help?: string };
+  throw new ApiError(response.status, error ?? `the server answered ${response.status}`, help ?? null);
+}
+
+async function get<T>(path: string): Promise<T> {
+  return (await (await request(path, {})).json()) as T;
+}
+
+async function post(path: string, body: object): Promise<void> {
+  await request(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
+}
+
+export const api = {
+  session: () => get<SessionInfo>("session"),
+  recordings: () => get<RecordingInfo[]>("recordings"),
+  recording: (name: string, points: number) =>
+    get<RecordingContent>(`recordings/${encodeURIComponent(name)}?points=${points}`),
+  tare: () => post("tare", {}),
+  mark: (text: string) => post("mark", { text }),
+  record: (on: boolean) => post("record", { on }),
+  simulate: () => post("source", { url: "simulated" }),
+  recordingFile: (name: string) => withToken(`api/recordings/${encodeURIComponent(name)}/file`),
+  stream: () => {
+    const url = new URL(withToken("api/stream"), location.href);
+    url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+    return new WebSocket(url);
+  },
+};
+
+function withToken(path: string): string {
+  return token === null ? path : `${path}?token=${encodeURIComponent(token)}`;
+}

@@ -1,0 +1,34 @@
+// What the channels read untouched, from which deflections are drawn.
+
+import type { SampleRecord } from "../protocol";
+
+/** Readings over which the mean is taken. */
+const MEAN_OF = 100;
+
+/** Mean of the untouched readings; follows a drift while nothing touches. */
+export class Baseline {
+  /** Null before anything was read untouched. */
+  mean: number[] | null = null;
+  private count = 0;
+
+  push(sample: SampleRecord): void {
+    if (sample.status !== "no_contact") return;
+    this.count += 1;
+    const weight = 1 / Math.min(this.count, MEAN_OF);
+    this.mean = sample.reading.map((value, i) => {
+      const mean = this.mean?.[i] ?? value;
+      return mean + weight * (value - mean);
+    });
+  }
+
+  clear(): void {
+    this.mean = null;
+    this.count = 0;
+  }
+
+  /** A reading less the baseline; null before anything was read untouched. */
+  deflections(reading: number[]): number[] | null {
+    const mean = this.mean;
+    return mean === null ? null : reading.map((value, i) => value - (mean[i] ?? NaN));
+  }
+}

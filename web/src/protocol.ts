@@ -1,0 +1,124 @@
+// Records of `palpate serve`, as docs/live-dashboard.md and the server's own documentation have them.
+
+/** Position, force and their uncertainty. What was not estimated is left out. */
+export interface ContactRecord {
+  x_mm: number;
+  y_mm?: number;
+  force_n?: number;
+  x_95_mm?: [number, number];
+  y_95_mm?: [number, number];
+  sd_mm?: number;
+  sd_force_n?: number;
+  force_95_n?: [number, number];
+  trade_off?: string;
+}
+
+export type Status = "located" | "no_contact" | "ambiguous" | "outside_model" | "outside_surface";
+
+/** A place that explains a reading, with its share of the probability. */
+export type ModeRecord = ContactRecord & { probability: number };
+
+export interface EstimateRecord extends ContactRecord {
+  status: Status;
+  modes?: ModeRecord[];
+  further?: ContactRecord[];
+}
+
+/** A reading, in the units of its channels, with its estimate. Times are seconds since 1970. */
+export interface SampleRecord extends EstimateRecord {
+  number: number;
+  time_s: number;
+  reading: number[];
+}
+
+export type ChannelState = "well" | "dead" | "saturated";
+
+export interface StateRecord {
+  source: string | null;
+  rate_hz: number;
+  touched: boolean;
+  counters: { readings: number; bad_frames: Record<string, number>; lost_frames: number; gaps: number };
+  channels: { state: ChannelState; range: [number, number] | null; noise_sd: number }[];
+}
+
+export type EventRecord = { time_s: number } & (
+  | { event: "source_opened"; name: string }
+  | { event: "source_lost"; why: string }
+  | { event: "source_ended" }
+  | { event: "gap"; seconds: number; lost_frames?: number }
+  | { event: "clock_set"; by_s: number }
+  | ({ event: "touch_down" | "move" | "second_contact" } & ContactRecord)
+  | { event: "lift_off"; seconds: number }
+  | { event: "outside_model" }
+  | { event: "channel"; name: string; state: ChannelState }
+  | { event: "tared" }
+  | { event: "mark"; text: string }
+);
+
+/** A message of the stream, sixty times a second. */
+export interface StreamMessage {
+  state: StateRecord;
+  samples: SampleRecord[];
+  events: EventRecord[];
+  missed: number;
+}
+
+export interface ChannelInfo {
+  name: string;
+  label: string;
+  unit: string;
+  measure: string;
+  x_mm: number | null;
+  y_mm?: number | null;
+}
+
+export interface SurfaceInfo {
+  kind: string;
+  length_mm: number;
+  width_mm: number | null;
+  supports: { at_mm: number; kind: string }[];
+}
+
+/** Cramér–Rao bound over the surface. */
+export interface LimitInfo {
+  positions_mm: (number | [number, number])[];
+  sd_mm: (number | null)[];
+  force_n: number;
+}
+
+export interface SessionInfo {
+  version: string;
+  locator: { name: string; kind: string; description: string[] } | null;
+  surface: SurfaceInfo | null;
+  channels: ChannelInfo[];
+  force: { known_n: number | null; unknown: boolean };
+  tare: { available: boolean; follows: boolean; why?: string };
+  limit: LimitInfo | null;
+  source: string | null;
+  recording: RecordingState | null;
+  has_simulated: boolean;
+}
+
+/** Where recordings go; a name while one is being made. */
+export interface RecordingState {
+  folder: string;
+  name: string | null;
+  bytes: number;
+  seconds: number;
+}
+
+export interface RecordingInfo {
+  name: string;
+  bytes: number;
+  start_s: number;
+  seconds: number;
+  readings: number;
+}
+
+export interface RecordingContent {
+  channels: ChannelInfo[];
+  start_s: number;
+  seconds: number;
+  samples: SampleRecord[];
+  events: EventRecord[];
+}

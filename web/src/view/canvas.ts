@@ -1,0 +1,35 @@
+// A canvas that has as many pixels as the screen shows of it.
+
+export interface Frame {
+  ctx: CanvasRenderingContext2D;
+  width: number;
+  height: number;
+}
+
+/** Clears a canvas and gives it in CSS pixels; null while it has no size. */
+export function begin(canvas: HTMLCanvasElement): Frame | null {
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  const ctx = canvas.getContext("2d");
+  if (ctx === null || width === 0 || height === 0) return null;
+  const ratio = window.devicePixelRatio || 1;
+  const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== w || canvas.height !== h) {
+    canvas.width = w;
+    canvas.height = h;
+  }
+  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+  ctx.clearRect(0, 0, width, height);
+  return { ctx, width, height };
+}
+
+export function disc(ctx: CanvasRenderingContext2D, x: number, y: number, radius: number): void {
+  ctx.beginPath();
+  ctx.arc(x, y, radius, 0, 2 * Math.PI);
+}
+
+export function segment(ctx: CanvasRenderingContext2D, x0: number, y0: number, x1: number, y1: number): void {
+  ctx.beginPath();
+  ctx.moveTo(x0, y0);
+  ctx.lineTo(x1, y1);
+  ctx.stroke();
+}

@@ -1,0 +1,158 @@
+// What statuses, states and events are called, and numbers with their units.
+
+import type { ChannelState, ContactRecord, EstimateRecord, EventRecord, Status } from "./protocol";
+
+/** Text of a mark without one. */
+export const PLAIN_MARK = "mark";
+
+/** True of a status whose position means something. */
+export function isPlaced(status: Status): boolean {
+  return status === "located" || status === "ambiguous";
+}
+
+/** A status in a word or two, and what it means. */
+export function statusWords(estimate: EstimateRecord): { word: string; why: string } {
+  switch (estimate.status) {
+    case "located": {
+      const further = estimate.further?.length ?? 0;
+      if (further > 0) {
+        return { word: `${further + 1} contacts`, why: "The strongest is given in numbers; the others are marked." };
+      }
+      if (estimate.trade_off !== undefined) {
+        return { word: "Located", why: `Near an end ${estimate.trade_off} trade off: other pairs of them read alike.` };
+      }
+      return { word: "Located", why: "One contact explains the reading." };
+    }
+    case "no_contact":
+      return { word: "No contact", why: "Nothing touches: the reading is noise." };
+    case "ambiguous": {
+      const others = estimate.modes?.length ?? 0;
+      const places = others === 1 ? "another place explains" : `${others} other places explain`;
+      return { word: "Ambiguous", why: `The most probable place is given; ${places} the reading too.` };
+    }
+    case "outside_model":
+      return {
+        word: "Outside model",
+        why: "No single contact explains the reading within the noise: a second contact, a patch, a damaged or exchanged channel, or drift. If nothing touches, tare.",
+      };
+    case "outside_surface":
+      return { word: "Outside surface", why: "The position is beyond the surface's edge, which no contact can have." };
+  }
+}
+
+export function channelWords(state: ChannelState): string {
+  return { well: "reads", dead: "dead: one value", saturated: "saturated: at the end of its range" }[state];
+}
+
+const BAD_FRAMES: Record<string, string> = {
+  too_long: "longer than any frame",
+  channels: "another number of values than channels",
+  missing_channel: "a channel is missing",
+  not_a_number: "a value is no number",
+  encoding: "not text",
+  checksum: "the checksum is wrong",
+  malformed: "not a frame",
+};
+
+/** Why a frame was no reading. */
+export function badFrameWords(cause: string): string {
+  return BAD_FRAMES[cause] ?? cause.replaceAll("_", " ");
+}
+
+/** A position and a force in words. */
+export function contactWords(contact: ContactRecord): string {
+  const place =
+    contact.y_mm === undefined
+      ? `${number(contact.x_mm, contact.sd_mm)} mm`
+      : `${number(contact.x_mm, contact.sd_mm)}, ${number(contact.y_mm, contact.sd_mm)} mm`;
+  return contact.force_n === undefined ? place : `${place}, ${number(contact.force_n, contact.sd_force_n)} N`;
+}
+
+/** An event in words. */
+export function eventWords(event: EventRecord): string {
+  switch (event.event) {
+    case "source_opened":
+      return `Source opened: ${event.name}`;
+    case "source_lost":
+      return `Source lost: ${event.why}`;
+    case "source_ended":
+      return "Source ended";
+    case "gap": {
+      const lost = event.lost_frames === undefined ? "" : `, ${event.lost_frames} frames lost`;
+      return `Gap of ${seconds(event.seconds)}${lost}`;
+    }
+    case "clock_set":
+      return `Clock set ${event.by_s < 0 ? "back" : "forward"} by ${seconds(Math.abs(event.by_s))}`;
+    case "touch_down":
+      return `Touch-down at ${contactWords(event)}`;
+    case "move":
+      return `Moved to ${contactWords(event)}`;
+    case "second_contact":
+      return `Second contact at ${contactWords(event)}`;
+    case "lift_off":
+      return `Lift-off after ${seconds(event.seconds)}`;
+    case "outside_model":
+      return "Outside model: no single contact explains the readings";
+    case "channel":
+      return `Channel ${event.name}: ${channelWords(event.state)}`;
+    case "tared":
+      return "Tared: the baseline was taken anew";
+    case "mark":
+      return event.text === PLAIN_MARK ? "Mark" : `Mark: ${event.text}`;
+  }
+}
+
+/** A number with as many decimals as its standard deviation lets mean something: its first digit is the last. */
+export function number(value: number, sd?: number): string {
+  if (!Number.isFinite(value)) return "—";
+  return value.toFixed(decimals(sd ?? Math.abs(value) / 100)).replace("-", "−");
+}
+
+/** A standard deviation or another size, to two digits. */
+export function size(value: number): string {
+  if (!Number.isFinite(value)) return "—";
+  if (value === 0) return "0";
+  const places = Math.max(0, Math.min(9, 1 - Math.floor(Math.log10(Math.abs(value)))));
+  return value.toFixed(places).replace("-", "−");
+}
+
+function decimals(sd: number): number {
+  if (!(sd > 0)) return 2;
+  return Math.max(0, Math.min(6, -Math.floor(Math.log10(sd))));
+}
+
+export function seconds(value: number): string {
+  if (value < 1) return `${Math.round(value * 1000)} ms`;
+  if (value < 60) return `${value.toFixed(1)} s`;
+  const whole = Math.round(value);
+  const [hours, minutes, rest] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
+  const two = (part: number) => String(part).padStart(2, "0");
+  return hours > 0 ? `${hours}:${two(minutes)}:${two(rest)} h` : `${minutes}:${two(rest)} min`;
+}
+
+export function bytes(value: number): string {
+  const units = ["B", "kB", "MB", "GB"];
+  let power = 0;
+  while (value >= 1000 && power < units.length - 1) {
+    value /= 1000;
+    power += 1;
+  }
+  return `${power === 0 ? value : value.toFixed(1)} ${units[power]}`;
+}
+
+export function hertz(value: number): string {
+  return value < 10 ? `${value.toFixed(1)} Hz` : `${Math.round(value).toLocaleString("en-GB")} Hz`;
+}
+
+/** A time of day, to the tenth of a second. */
+export function clock(time_s: number): string {
+  const date = new Date(time_s * 1000);
+  const two = (part: number) => String(part).padStart(2, "0");
+  const tenth = Math.floor(date.getMilliseconds() / 100);
+  return `${two(date.getHours())}:${two(date.getMinutes())}:${two(date.getSeconds())}.${tenth}`;
+}
+
+/** Units as people write them. */
+export function unit(symbol: string): string {
+  return symbol.replace(/^u(?=[a-z])/, "µ");
+}

@@ -1,0 +1,105 @@
+//! The dashboard of `palpate serve`: its build, and its tests in Node and in a browser.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::{Context, Result};
+
+use crate::counts::Counts;
+use crate::needs::NODE;
+use crate::run;
+use crate::skipped::{self, STRICT, Skipped, Skips};
+
+/// Most bytes of the dashboard's scripts and styles, as they are sent without compression.
+const MOST_BYTES: u64 = 150_000;
+
+/// Builds the dashboard into `web/dist`, from which `palpate serve` takes it when it is compiled.
+pub fn build(root: &Path) -> Result<bool> {
+    if !NODE.is_there(root) {
+        println!("{}", NODE.describe());
+        return Ok(false);
+    }
+    if !(install(root)? && run::shown(&mut npm(root, &["run", "--silent", "build"]))?) {
+        return Ok(false);
+    }
+    let bytes = size(&root.join("web/dist/assets"))?;
+    println!("web/dist: {bytes} bytes of scripts and styles; at most {MOST_BYTES}");
+    Ok(bytes <= MOST_BYTES)
+}
+
+/// Builds the dashboard and the server, which is among what `tested` tells cargo to build, and runs the tests of both.
+pub fn test(
+    root: &Path,
+    skips: Skips,
+    skipped: &Skipped,
+    tested: &[&str],
+) -> Result<(bool, Option<Counts>)> {
+    if !NODE.is_there(root) {
+        println!("{}", NODE.describe());
+        return Ok((skips == Skips::Pass, None));
+    }
+    let mut server = Command::new("cargo");
+    server.args(["build", "--quiet"]).args(tested).current_dir(root);
+    // The dashboard first: the server holds it.
+    if !(build(root)? && run::shown(&mut server)?) {
+        return Ok((false, None));
+    }
+    let before = skipped.lines()?.len();
+    let (mut succeeded, mut counts) = (true, None);
+    for script in ["test", "browser-test"] {
+        let mut tests = npm(root, &["run", "--silent", script]);
+        tests.env("NO_COLOR", "1").env(skipped::VARIABLE, &skipped.file);
+        tests.env(
+            "PALPATE_BINARY",
+            root.join("target/debug").join(format!("palpate{}", std::env::consts::EXE_SUFFIX)),
+        );
+        match skips {
+            Skips::Fail => tests.env(STRICT, "1"),
+            Skips::Pass => tests.env_remove(STRICT),
+        };
+        let watched = run::watched(&mut tests)?;
+        succeeded &= watched.succeeded;
+        counts =
+            [counts, Counts::of_vitest(&watched.lines)].into_iter().flatten().reduce(|sum, more| sum + more);
+    }
+    let skips = skipped.lines()?.len() - before;
+    Ok((succeeded, counts.map(|counts| counts.with_skips(skips))))
+}
+
+/// Installs what `web/package-lock.json` names, where that has changed since the last time.
+fn install(root: &Path) -> Result<bool> {
+    let lock = root.join("web/package-lock.json");
+    let wanted = fs::read_to_string(&lock).with_context(|| format!("cannot read {}", lock.display()))?;
+    let stamp = root.join("web/node_modules/.installed-package-lock.json");
+    if fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) {
+        return Ok(true);
+    }
+    println!("installing the dashboard's packages");
+    if !run::shown(&mut npm(root, &["ci", "--no-audit", "--no-fund"]))? {
+        return Ok(false);
+    }
+    fs::write(&stamp, wanted).with_context(|| format!("cannot write {}", stamp.display()))?;
+    Ok(true)
+}
+
+fn npm(root: &Path, arguments: &[&str]) -> Command {
+    let mut npm = Command::new(if cfg!(windows) { "npm.cmd" } else { "npm" });
+    npm.args(arguments).current_dir(root.join("web"));
+    npm
+}
+
+/// Bytes of the files of a folder.
+fn size(folder: &Path) -> Result<u64> {
+    let files = match fs::read_dir(folder) {
+        Ok(files) => files,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(0),
+        Err(error) => return Err(error).with_context(|| format!("cannot read {}", folder.display())),
+    };
+    let mut bytes = 0;
+    for file in files {
+        bytes += file.and_then(|file| file.metadata()).context("cannot read the dashboard's files")?.len();
+    }
+    Ok(bytes)
+}
