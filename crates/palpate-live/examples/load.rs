@@ -32,7 +32,9 @@ struct Case {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let seconds: f64 = std::env::args().nth(1).map_or(Ok(10.0), |text| text.parse())?;
-    println!("readings/s  browsers  asleep  samples  lost  median ms  p99 ms  worst ms  CPU %  memory MB: before, after  messages at 60 Hz");
+    println!(
+        "readings/s  browsers  asleep  samples  lost  median ms  p99 ms  worst ms  CPU %  memory MB: before, after  messages at 60 Hz"
+    );
     for case in [
         Case { rate_hz: 1_000.0, browsers: 1, asleep: 0 },
         Case { rate_hz: 20_000.0, browsers: 1, asleep: 0 },
@@ -77,7 +79,9 @@ fn run(case: &Case, length: Duration) -> Result<(), Box<dyn Error>> {
     drop(server);
     let (mut latencies_ms, lost) = all.join().map_err(|_| "a reader has panicked")?;
     latencies_ms.sort_by(f64::total_cmp);
-    let at = |share: f64| latencies_ms.get((share * (latencies_ms.len() - 1) as f64) as usize).copied().unwrap_or(f64::NAN);
+    let at = |share: f64| {
+        latencies_ms.get((share * (latencies_ms.len() - 1) as f64) as usize).copied().unwrap_or(f64::NAN)
+    };
     let mut messages = Vec::new();
     for browser in browsers {
         messages.push(browser.join().map_err(|_| "a browser has panicked")?);
@@ -129,6 +133,7 @@ fn samples(socket: &mut WebSocket<TcpStream>) -> (Vec<f64>, u64) {
 /// Resident memory, where /proc tells it.
 fn memory_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let kb = status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse().ok());
+    let kb =
+        status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse().ok());
     kb.unwrap_or(f64::NAN) * 1e-3
 }

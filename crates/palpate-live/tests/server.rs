@@ -30,10 +30,17 @@ fn served(token: Option<&str>) -> (Arc<Live>, Server) {
 }
 
 /// Status, head and body of an answer.
-fn ask(server: &Server, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> (u16, String, String) {
+fn ask(
+    server: &Server,
+    method: &str,
+    path: &str,
+    headers: &[(&str, &str)],
+    body: &str,
+) -> (u16, String, String) {
     let mut stream = TcpStream::connect(server.address()).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
-    let mut request = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\nContent-Length: {}\r\n", body.len());
+    let mut request =
+        format!("{method} {path} HTTP/1.1\r\nConnection: close\r\nContent-Length: {}\r\n", body.len());
     if !headers.iter().any(|(name, _)| *name == "Host") {
         request += &format!("Host: {}\r\n", server.address());
     }
@@ -145,7 +152,8 @@ fn every_sample_comes_as_json_and_as_packets() {
         for sample in packet[8..].chunks(each) {
             assert_eq!(u64::from_le_bytes(sample[..8].try_into().unwrap()), expected);
             if expected == 0 {
-                let f32_at = |at: usize| f64::from(f32::from_le_bytes(sample[at..at + 4].try_into().unwrap()));
+                let f32_at =
+                    |at: usize| f64::from(f32::from_le_bytes(sample[at..at + 4].try_into().unwrap()));
                 assert!((f32_at(20) - first["x_mm"].as_f64().unwrap()).abs() < 1e-3);
                 assert!((f32_at(44) / first["reading"][0].as_f64().unwrap() - 1.0).abs() < 1e-6);
             }
@@ -210,7 +218,11 @@ fn bad_requests_are_answered_in_words() {
     }
     let (status, head, _) = ask(&server, "GET", "/", &[], "");
     assert_eq!(status, 200);
-    for header in ["content-security-policy: default-src 'self'", "x-content-type-options: nosniff", "referrer-policy: no-referrer"] {
+    for header in [
+        "content-security-policy: default-src 'self'",
+        "x-content-type-options: nosniff",
+        "referrer-policy: no-referrer",
+    ] {
         assert!(head.contains(header), "{head}");
     }
 }

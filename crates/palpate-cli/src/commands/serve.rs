@@ -55,14 +55,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some("auto") => Some(made_up_token()?),
         given => given.map(str::to_owned),
     };
-    let access = Access::new(arguments.listen, token.clone(), arguments.host_name.clone()).map_err(refused)?;
+    let access =
+        Access::new(arguments.listen, token.clone(), arguments.host_name.clone()).map_err(refused)?;
     let live = Arc::new(live(arguments)?);
-    let server = Server::start(arguments.listen, access, Arc::clone(&live)).map_err(|error| match &error {
-        ServerError::Listen { .. } => {
-            Complaint::new(&error).help("--listen 127.0.0.1:0 takes a port that is free")
-        }
-        ServerError::Run(_) => Complaint::new(&error),
-    })?;
+    let server =
+        Server::start(arguments.listen, access, Arc::clone(&live)).map_err(|error| match &error {
+            ServerError::Listen { .. } => {
+                Complaint::new(&error).help("--listen 127.0.0.1:0 takes a port that is free")
+            }
+            ServerError::Run(_) => Complaint::new(&error),
+        })?;
     begin(&live, arguments)?;
     let query = token.map_or_else(String::new, |token| format!("?token={token}"));
     remark!("palpate: open http://{}/{query} in a browser; Ctrl-C ends it", server.address());
@@ -112,9 +114,9 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
     }
     let recording = match &arguments.data {
         Some(data) => input::read_recording(&rig.setup, data)?,
-        None => rig.simulate(arguments.seed).map_err(|error| {
-            Complaint::about(path, error).help("--data names a recording to fit")
-        })?,
+        None => rig
+            .simulate(arguments.seed)
+            .map_err(|error| Complaint::about(path, error).help("--data names a recording to fit"))?,
     };
     let needed = rig.estimator.positions_needed();
     recording.check_distinct_positions(needed).map_err(Complaint::new)?;
@@ -130,7 +132,9 @@ fn begin(live: &Live, arguments: &Arguments) -> Result<(), Failure> {
         (Some(url), _) => live.begin(url),
         (None, None) => live.begin_simulated(),
         (None, Some(_)) => {
-            remark!("palpate: no source yet; --from names one, and the page offers a simulated board of a rig");
+            remark!(
+                "palpate: no source yet; --from names one, and the page offers a simulated board of a rig"
+            );
             Ok(())
         }
     };
@@ -148,7 +152,8 @@ fn refused(error: AccessError) -> Failure {
 /// 128 bits from the system's random numbers, in hexadecimal digits.
 fn made_up_token() -> Result<String, Failure> {
     let mut bytes = [0; 16];
-    getrandom::fill(&mut bytes)
-        .map_err(|error| Complaint::new(format!("no random numbers for a token: {error}")).help("give one"))?;
+    getrandom::fill(&mut bytes).map_err(|error| {
+        Complaint::new(format!("no random numbers for a token: {error}")).help("give one")
+    })?;
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }

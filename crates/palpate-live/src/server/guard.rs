@@ -36,7 +36,9 @@ pub enum AccessError {
         address: IpAddr,
     },
     /// A token that is too short or has other characters.
-    #[error("the token has {length} characters; it must have at least {SHORTEST_TOKEN}, of which each is a letter, a digit, `-`, `.`, `_` or `~`")]
+    #[error(
+        "the token has {length} characters; it must have at least {SHORTEST_TOKEN}, of which each is a letter, a digit, `-`, `.`, `_` or `~`"
+    )]
     Token {
         /// Its length.
         length: usize,
@@ -57,7 +59,11 @@ impl Access {
     ///
     /// # Errors
     /// [`AccessError`] for a token that is too short, or an address that others reach without one.
-    pub fn new(address: SocketAddr, token: Option<String>, host_names: Vec<String>) -> Result<Self, AccessError> {
+    pub fn new(
+        address: SocketAddr,
+        token: Option<String>,
+        host_names: Vec<String>,
+    ) -> Result<Self, AccessError> {
         let of_a_url = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
         match &token {
             Some(token) if token.len() < SHORTEST_TOKEN || !token.bytes().all(of_a_url) => {
@@ -129,7 +135,8 @@ fn text(headers: &HeaderMap, name: HeaderName) -> Option<&str> {
 
 /// The token of a request.
 fn given(request: &Request) -> Option<&str> {
-    let bearer = text(request.headers(), header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer "));
+    let bearer =
+        text(request.headers(), header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer "));
     let query = request.uri().query().unwrap_or_default();
     bearer.or_else(|| query.split('&').find_map(|pair| pair.strip_prefix("token=")))
 }
@@ -220,7 +227,9 @@ mod tests {
         for host in ["localhost:8377", "127.0.0.1:8377", "[::1]:8377", "bench.lab", "BENCH.LAB:80"] {
             assert!(own.is_own(host), "{host}");
         }
-        for host in ["", "evil.example:8377", "localhost.evil.example", "192.168.1.5", "127.0.0.1.evil.example"] {
+        for host in
+            ["", "evil.example:8377", "localhost.evil.example", "192.168.1.5", "127.0.0.1.evil.example"]
+        {
             assert!(!own.is_own(host), "{host}");
         }
         let anywhere = access("0.0.0.0:0", Some("0123456789abcdef")).unwrap();
@@ -230,6 +239,8 @@ mod tests {
     #[test]
     fn tokens_are_compared_whole() {
         assert!(equal(b"abc", b"abc"));
-        assert!(!equal(b"abd", b"abc") && !equal(b"ab", b"abc") && !equal(b"abcd", b"abc") && !equal(b"", b"abc"));
+        assert!(
+            !equal(b"abd", b"abc") && !equal(b"ab", b"abc") && !equal(b"abcd", b"abc") && !equal(b"", b"abc")
+        );
     }
 }

@@ -145,7 +145,7 @@ impl Live {
     }
 
     pub(super) fn info(&self) -> SessionInfo {
-        SessionInfo { source: self.source(), ..self.info.clone() }
+        self.info.clone().with_source(self.source())
     }
 
     pub(super) fn hub(&self) -> &Hub {

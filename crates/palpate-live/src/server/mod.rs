@@ -52,8 +52,7 @@ impl Server {
     /// # Errors
     /// [`ServerError`] where the address cannot be listened at.
     pub fn start(address: SocketAddr, access: Access, live: Arc<Live>) -> Result<Self, ServerError> {
-        let listener =
-            TcpListener::bind(address).map_err(|error| ServerError::Listen { address, error })?;
+        let listener = TcpListener::bind(address).map_err(|error| ServerError::Listen { address, error })?;
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;

@@ -1,6 +1,6 @@
 //! Routes of the server.
 
-use super::body::{JsonBody, Refusal};
+use super::body::{JsonAnswer, JsonBody, Refusal};
 use super::guard::{Access, Guard, guarded};
 use super::live::{Live, LiveError};
 use super::session_info::SessionInfo;
@@ -9,7 +9,7 @@ use crate::input::Command;
 use axum::extract::{DefaultBodyLimit, State};
 use axum::http::StatusCode;
 use axum::routing::{get, post};
-use axum::{Json, Router, middleware};
+use axum::{Router, middleware};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -19,7 +19,7 @@ const MOST_BYTES: usize = 1 << 16;
 /// Most characters of a mark.
 const MOST_OF_A_MARK: usize = 200;
 
-type Answer = Result<Json<Value>, Refusal>;
+type Answer = Result<JsonAnswer<Value>, Refusal>;
 
 /// All routes, guarded.
 pub fn router(access: Access, live: Arc<Live>) -> Router {
@@ -41,8 +41,8 @@ pub fn router(access: Access, live: Arc<Live>) -> Router {
         .with_state(live)
 }
 
-async fn session(State(live): State<Arc<Live>>) -> Json<SessionInfo> {
-    Json(live.info())
+async fn session(State(live): State<Arc<Live>>) -> JsonAnswer<SessionInfo> {
+    JsonAnswer(live.info())
 }
 
 /// An object without fields that matter.
@@ -61,7 +61,8 @@ struct Mark {
 async fn mark(State(live): State<Arc<Live>>, JsonBody(Mark { text }): JsonBody<Mark>) -> Answer {
     let length = text.chars().count();
     if length == 0 || length > MOST_OF_A_MARK || text.chars().any(char::is_control) {
-        let error = format!("a mark of {length} characters; it may have 1 to {MOST_OF_A_MARK}, none of control");
+        let error =
+            format!("a mark of {length} characters; it may have 1 to {MOST_OF_A_MARK}, none of control");
         return Err(Refusal::new(StatusCode::BAD_REQUEST, error, "write less, on one line"));
     }
     done(live.command(Command::Mark(text)))
@@ -89,7 +90,7 @@ async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBod
 }
 
 fn done(result: Result<(), LiveError>) -> Answer {
-    result.map(|()| Json(json!({}))).map_err(|error| {
+    result.map(|()| JsonAnswer(json!({}))).map_err(|error| {
         let (status, help) = match error {
             LiveError::NoSession => (StatusCode::CONFLICT, "choose a source first"),
             LiveError::Behind => (StatusCode::SERVICE_UNAVAILABLE, "try it again"),

@@ -25,7 +25,7 @@ pub struct SessionInfo {
     force: Value,
     tare: Value,
     limit: Option<Value>,
-    pub(super) source: Option<String>,
+    source: Option<String>,
     recording: Option<Value>,
     has_simulated: bool,
 }
@@ -53,6 +53,11 @@ impl SessionInfo {
             has_simulated,
         }
     }
+
+    /// The same, while a session of this source runs.
+    pub fn with_source(self, source: Option<String>) -> Self {
+        Self { source, ..self }
+    }
 }
 
 fn surface(surface: &SurfaceSpec) -> Value {
@@ -76,6 +81,7 @@ fn support_kind(kind: BeamSupportKind) -> &'static str {
     match kind {
         BeamSupportKind::Simple => "simple",
         BeamSupportKind::Clamped => "clamped",
+        BeamSupportKind::Guided => "guided",
         BeamSupportKind::Free => "free",
         BeamSupportKind::Elastic { .. } => "elastic",
     }
@@ -107,7 +113,8 @@ fn limit(locator: &Locator) -> Option<Value> {
         Some(linear) => linear.cramer_rao_bound(extent),
         None => {
             let cost = CramerRaoBound::cost(setup.surface().model()?, setup.layout(), 0);
-            if cost.seconds > LIMIT_S {
+            // At least, since no search for contacts that read alike is made.
+            if cost.seconds[0] > LIMIT_S {
                 return None;
             }
             setup.cramer_rao_bound().ok()?

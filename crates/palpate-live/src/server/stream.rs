@@ -54,8 +54,8 @@ pub async fn stream(
 ) -> Result<Response, Refusal> {
     const HELP: &str = "form is `json` or `binary`, rate is `60` or `all`; binary has all";
     let Query(wish) = wish.map_err(|error| Refusal::new(StatusCode::BAD_REQUEST, error.body_text(), HELP))?;
-    let upgrade = upgrade
-        .map_err(|error| Refusal::new(error.status(), error.body_text(), "open it as a WebSocket"))?;
+    let upgrade =
+        upgrade.map_err(|error| Refusal::new(error.status(), error.body_text(), "open it as a WebSocket"))?;
     let hub = live.hub().clone();
     let Ok(place) = Arc::clone(&hub.places).try_acquire_owned() else {
         let error = format!("{MOST_BROWSERS} browsers follow this session already");

@@ -161,7 +161,8 @@ fn packet(batch: &Batch, channels: &[Channel]) -> Vec<u8> {
             sd(|covariance| covariance[3]) * 1e3,
             sd(|covariance| covariance[5]),
         ];
-        let readings = sample.reading.iter().zip(channels).map(|(value, channel)| value / channel.unit.factor());
+        let readings =
+            sample.reading.iter().zip(channels).map(|(value, channel)| value / channel.unit.factor());
         let floats = figures.into_iter().chain(readings);
         floats.for_each(|value| bytes.extend((value as f32).to_le_bytes()));
     }
