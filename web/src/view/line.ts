@@ -92,7 +92,7 @@ function drawSupports(ctx: CanvasRenderingContext2D, surface: SurfaceInfo, x: (m
   ctx.lineWidth = 1.5;
   for (const support of surface.supports) {
     const at = x(support.at_mm);
-    if (support.kind === "clamped") {
+    if (support.kind === "clamped" || support.kind === "guided") {
       const inner = support.at_mm < surface.length_mm / 2 ? -1 : 1;
       segment(ctx, at, level - 22, at, level + 22);
       for (let y = level - 22; y <= level + 16; y += 8) segment(ctx, at, y + 6, at + 8 * inner, y);
