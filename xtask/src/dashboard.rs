@@ -30,12 +30,7 @@ pub fn build(root: &Path) -> Result<bool> {
 }
 
 /// Builds the dashboard and the server, which is among what `tested` tells cargo to build, and runs the tests of both.
-pub fn test(
-    root: &Path,
-    skips: Skips,
-    skipped: &Skipped,
-    tested: &[&str],
-) -> Result<(bool, Option<Counts>)> {
+pub fn test(root: &Path, skips: Skips, skipped: &Skipped, tested: &[&str]) -> Result<(bool, Option<Counts>)> {
     if !NODE.is_there(root) {
         println!("{}", NODE.describe());
         return Ok((skips == Skips::Pass, None));

@@ -14,7 +14,8 @@ fn main() {
     let channel = |i: usize| Channel { name: format!("s{i}"), label: format!("c{i}"), unit: Unit::NONE };
     let channels: Vec<Channel> = (0..CHANNELS).map(channel).collect();
     let value = |n: u32, i: usize| (f64::from(n) * 0.37 + i as f64 * 12.1).sin() as f32 * 100.0;
-    let (mut plain, mut named, mut json, mut binary) = (String::new(), String::new(), String::new(), Vec::new());
+    let (mut plain, mut named, mut json, mut binary) =
+        (String::new(), String::new(), String::new(), Vec::new());
     for n in 0..FRAMES {
         let values: Vec<f32> = (0..CHANNELS).map(|i| value(n, i)).collect();
         let join = |show: &dyn Fn(usize) -> String| (0..CHANNELS).map(show).collect::<Vec<_>>().join(",");

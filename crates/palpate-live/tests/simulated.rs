@@ -52,7 +52,7 @@ fn a_finger_is_followed_from_touch_down_to_lift_off() {
             }
         }
     }
-    assert!(downs >= 8 && (downs - offs as i32).abs() <= 1, "{downs} {offs}");
+    assert!(downs >= 8 && (downs - offs).abs() <= 1, "{downs} {offs}");
     errors_m.sort_by(f64::total_cmp);
     let median_m = errors_m[errors_m.len() / 2];
     assert!(median_m < 0.3e-3, "{median_m}");

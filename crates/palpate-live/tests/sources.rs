@@ -253,7 +253,7 @@ impl Board {
                 match event {
                     Ok(Event::Incoming(Packet::SubAck(_))) => ready.send(()).unwrap(),
                     Ok(Event::Incoming(Packet::Publish(message))) => {
-                        to.send(message.payload.to_vec()).unwrap()
+                        to.send(message.payload.to_vec()).unwrap();
                     }
                     Ok(_) => {}
                     Err(_) => return,

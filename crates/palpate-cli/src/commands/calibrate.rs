@@ -10,7 +10,7 @@ use palpate_estimators::evaluation::cross_validate;
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::recording::{self, Column, Columns, Recording, Row};
 use palpate_live::calibration::{Guide, Press, Progress, Waiting};
-use palpate_live::frame::{BadFrame, Channel, TextDecoder};
+use palpate_live::frame::{BadFrame, Channel, Decoder, Frame};
 use palpate_live::input::{Arrival, Arrived, Input};
 use palpate_live::pipeline::WAITING;
 use palpate_live::source::{Source, SourceUrl};
@@ -31,7 +31,7 @@ use std::time::Duration;
 pub struct Arguments {
     /// The rig file
     rig: PathBuf,
-    /// Source of the readings: `-` for stdin, `simulated:rig.toml`
+    /// Source of the readings: `serial:///dev/ttyACM0`, `tcp://host:port`, `udp://:port`, `mqtt://host/topic`, `file:recording.mcap`, `-` for stdin
     #[arg(long, value_name = "SOURCE")]
     from: SourceUrl,
     /// The recording of the presses
@@ -176,7 +176,10 @@ fn press_all(arguments: &Arguments, guide: &mut Guide, journal: &mut Journal) ->
     let _source = Source::open(&arguments.from, Path::new("."), HostClock::new(), to)
         .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
     let keys = (arguments.from != SourceUrl::Stdin).then(keys);
-    let mut decoder = TextDecoder::new(&Channel::all_of(&journal.rig.setup));
+    let mut decoder = Decoder::new(&Channel::all_of(&journal.rig.setup));
+    decoder
+        .set_columns(arguments.from.columns())
+        .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
     let mut bad: BTreeMap<BadFrame, u64> = BTreeMap::new();
     ask(guide, journal);
     while guide.waiting() != Waiting::Nothing {
@@ -218,23 +221,26 @@ fn press_all(arguments: &Arguments, guide: &mut Guide, journal: &mut Journal) ->
 }
 
 /// Decodes what arrived; true when there will be no more.
-fn receive(
-    arrived: &Arrived,
-    decoder: &mut TextDecoder,
-    mut hand_on: impl FnMut(Result<palpate_live::frame::Frame, BadFrame>),
-) -> bool {
+fn receive(arrived: &Arrived, decoder: &mut Decoder, hand_on: impl FnMut(Result<Frame, BadFrame>)) -> bool {
     match &arrived.arrival {
         Arrival::Bytes(bytes) => decoder.receive(bytes, hand_on),
-        Arrival::Message(bytes) => {
-            decoder.receive(bytes, &mut hand_on);
-            decoder.end_message(hand_on);
+        Arrival::Message(bytes) => decoder.receive_message(bytes, hand_on),
+        Arrival::Opened(name) => {
+            decoder.open();
+            remark!("readings from {name}");
         }
-        Arrival::Opened(name) => remark!("readings from {name}"),
+        Arrival::Joined(name) => {
+            decoder.join();
+            remark!("readings from {name}");
+        }
         Arrival::Lost(why) => {
-            decoder.reset();
+            decoder.open();
             remark!("the source went away: {why}; it is waited for");
         }
-        Arrival::Ended => return true,
+        Arrival::Ended => {
+            decoder.end(hand_on);
+            return true;
+        }
     }
     false
 }

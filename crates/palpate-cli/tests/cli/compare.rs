@@ -138,7 +138,10 @@ fn a_dead_channel_is_left_out_of_the_sums() {
     let located = said(&run(folder.path(), &arguments));
     for (line, x_mm) in located.lines().skip(1).zip(positions_mm) {
         let cells: Vec<&str> = line.split(',').collect();
-        assert!((cells[1].parse::<f64>().unwrap() - x_mm).abs() < 4.0 && cells.last() == Some(&"located"), "{line}");
+        assert!(
+            (cells[1].parse::<f64>().unwrap() - x_mm).abs() < 4.0 && cells.last() == Some(&"located"),
+            "{line}"
+        );
     }
     complained(
         &run(folder.path(), &["locate", "locator.json", "stuck.csv", "--no-header", "--dead", "9"]),

@@ -72,15 +72,14 @@ impl TextReader {
 
     fn fields(&mut self, line: &[u8], marks: Marks) -> Result<Line, BadFrame> {
         let separator = Separator::of(line, marks);
-        let mut fields = Fields { rest: Some(line), separator };
+        let fields = Fields { rest: Some(line), separator };
         if marks.has(Marks::NAMED) && fields.clone().next().is_some_and(|field| named(field).is_some()) {
             return self.named(fields, separator).map(Line::Whole);
         }
         let mut frame = Filling::new(&self.names);
         let mut roles = self.columns.iter();
-        let first = fields.clone();
-        while let Some(field) = fields.next() {
-            let Some(value) = number(field, separator) else { return self.header(first) };
+        for field in fields.clone() {
+            let Some(value) = number(field, separator) else { return self.header(fields) };
             frame.set(*roles.next().ok_or(BadFrame::Channels)?, value)?;
         }
         if roles.next().is_some() {

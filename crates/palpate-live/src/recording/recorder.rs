@@ -181,7 +181,6 @@ enum Health {
 }
 
 impl<'a> Recording<'a> {
-    #[expect(clippy::type_complexity, reason = "the status goes back to whoever says the problem")]
     fn begin(
         tail: Tail,
         subject: &'a Subject,

@@ -18,8 +18,8 @@ pub struct Refusal {
 
 impl Refusal {
     /// A refusal with its status.
-    pub fn new(status: StatusCode, error: impl ToString, help: &'static str) -> Self {
-        Self { status, error: error.to_string(), help }
+    pub fn new(status: StatusCode, error: impl Into<String>, help: &'static str) -> Self {
+        Self { status, error: error.into(), help }
     }
 }
 
@@ -53,7 +53,11 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
             Refusal::new(error.status(), error.body_text(), "send at most 64 kB of JSON")
         })?;
         serde_json::from_slice(&bytes).map(Self).map_err(|error| {
-            Refusal::new(StatusCode::BAD_REQUEST, error, "docs/live-server.md says what the body is")
+            Refusal::new(
+                StatusCode::BAD_REQUEST,
+                error.to_string(),
+                "docs/live-server.md says what the body is",
+            )
         })
     }
 }

@@ -85,7 +85,9 @@ async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBod
     let begun = tokio::task::spawn_blocking(move || live.begin_simulated()).await;
     match begun {
         Ok(result) => done(result),
-        Err(error) => Err(Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, error, "start palpate again")),
+        Err(error) => {
+            Err(Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, error.to_string(), "start palpate again"))
+        }
     }
 }
 
@@ -98,7 +100,7 @@ fn done(result: Result<(), LiveError>) -> Answer {
             LiveError::Source(_) => (StatusCode::BAD_REQUEST, "start `palpate serve` with another source"),
             LiveError::Thread(_) => (StatusCode::INTERNAL_SERVER_ERROR, "start palpate again"),
         };
-        Refusal::new(status, error, help)
+        Refusal::new(status, error.to_string(), help)
     })
 }
 

@@ -72,7 +72,7 @@ impl ContactWatch {
         let before = std::mem::replace(&mut self.state, next);
         match next {
             State::Untouched => {
-                tell(Event::LiftOff { seconds: now.saturating_sub(self.since).as_secs_f64() })
+                tell(Event::LiftOff { seconds: now.saturating_sub(self.since).as_secs_f64() });
             }
             State::OutsideModel => tell(Event::OutsideModel),
             State::Touched { contacts } => {

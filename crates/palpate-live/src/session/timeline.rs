@@ -52,7 +52,7 @@ impl Timeline {
         }
         let by_ns = offset_ns - self.seen_ns;
         self.seen_ns = offset_ns;
-        (by_ns.abs() > SET_NS).then(|| by_ns as f64 * 1e-9)
+        (by_ns.abs() > SET_NS).then_some(by_ns as f64 * 1e-9)
     }
 
     /// Time of the next reading in ns since 1970, and the gap before it.

@@ -92,6 +92,15 @@ pub(crate) struct Outlet {
 }
 
 impl Outlet {
+    fn new(to: SyncSender<Input>, clock: HostClock) -> Self {
+        Self { to, clock, stop: Arc::default(), open: Arc::default() }
+    }
+
+    /// The source whose thread has this outlet, without a way back to the device.
+    fn source(&self) -> Source {
+        Source { stop: Arc::clone(&self.stop), open: Arc::clone(&self.open), commands: None }
+    }
+
     /// Hands an arrival on, stamped now; false once nobody wants more. While the session is behind it waits, and what the device sends gathers in
     /// the buffers of the system.
     pub(crate) fn send(&self, arrival: Arrival) -> bool {
@@ -137,8 +146,8 @@ impl Source {
         clock: HostClock,
         to: SyncSender<Input>,
     ) -> Result<Self, SourceError> {
-        let (stop, open) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
-        let outlet = Outlet { to, clock, stop: Arc::clone(&stop), open: Arc::clone(&open) };
+        let outlet = Outlet::new(to, clock);
+        let mut source = outlet.source();
         let (commands, for_device) = sync_channel(COMMANDS);
         let mut takes_commands = true;
         match url.clone() {
@@ -167,7 +176,8 @@ impl Source {
                 simulated::open(outlet, &folder.join(rig), rate_hz, seed)?;
             }
         }
-        Ok(Self { stop, open, commands: takes_commands.then_some(commands) })
+        source.commands = takes_commands.then_some(commands);
+        Ok(source)
     }
 
     /// Sends a command to the device: bytes to a serial port or a TCP server, a message to the topic of an MQTT board with `/command` behind it.
@@ -196,10 +206,10 @@ impl Source {
         clock: HostClock,
         to: SyncSender<Input>,
     ) -> Result<Self, SourceError> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let outlet = Outlet { to, clock, stop: Arc::clone(&stop) };
+        let outlet = Outlet::new(to, clock);
+        let source = outlet.source();
         simulated::open_rig(outlet, rig, config, "a simulated board".to_owned())?;
-        Ok(Self { stop })
+        Ok(source)
     }
 }
 
