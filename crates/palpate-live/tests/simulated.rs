@@ -28,7 +28,7 @@ fn a_finger_is_followed_from_touch_down_to_lift_off() {
     let mut session = Session::new(&locator, &SessionConfig::default());
     let mut out = Vec::new();
     let start_ns = 1_800_000_000_000_000_000;
-    let (mut downs, mut offs, mut errors_m) = (0, 0, Vec::new());
+    let (mut downs, mut offs, mut errors_m) = (0_i32, 0_i32, Vec::new());
     for frame in 0..8000_u64 {
         let elapsed = board.next_at();
         let bytes = board.send_until(elapsed);

@@ -30,12 +30,16 @@ pub struct Arguments {
     /// The locator, or a rig to fit
     #[arg(value_name = "LOCATOR|RIG.toml")]
     locator: Option<PathBuf>,
-    /// The source of readings: `-`, or `simulated:RIG.toml?rate=100`; without one the page offers a simulated board
+    /// The source of readings: `serial:///dev/ttyACM0?baud=115200`, `tcp://host:port`, `udp://:port`, `mqtt://host/topic`,
+    /// `file:recording.mcap?speed=1`, `simulated:RIG.toml?rate=100`, or `-` for stdin; without one the page offers a simulated board
     #[arg(long, value_name = "URL")]
     from: Option<SourceUrl>,
     /// A recording to fit the rig to
     #[arg(long, value_name = "FILE.csv", requires = "locator")]
     data: Option<PathBuf>,
+    /// A folder in which browsers may record the session
+    #[arg(long, value_name = "DIR")]
+    record: Option<PathBuf>,
     /// The address to listen at; any but loopback needs --token
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8377")]
     listen: SocketAddr,
@@ -104,7 +108,11 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
         remark!("warning: no tare, so offsets that have moved stay in the readings: {error}");
     }
     // URLs name paths as the command line does: from the folder it was started in.
-    Ok(Live::new(locator, &name, simulated, PathBuf::new()))
+    let live = Live::new(locator, &name, simulated, PathBuf::new());
+    Ok(match &arguments.record {
+        Some(folder) => live.with_recordings(folder.clone()),
+        None => live,
+    })
 }
 
 fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Failure> {

@@ -2,9 +2,10 @@
 
 use super::session_info::SessionInfo;
 use super::web_sink::{Hub, WebSink};
-use crate::frame::Channel;
+use crate::frame::{Channel, ColumnsError};
 use crate::input::{Command, Input};
 use crate::pipeline;
+use crate::recording::{self, Excerpt, RecordingError, RecordingStatus, RecordingSummary, RecordingSwitch};
 use crate::session::{Session, SessionConfig};
 use crate::simulated_board::BoardConfig;
 use crate::source::{Source, SourceError, SourceUrl};
@@ -23,6 +24,8 @@ pub struct Live {
     simulated: Option<(Rig, BoardConfig)>,
     /// Folder that paths in URLs of sources are relative to.
     folder: PathBuf,
+    /// Folder of recordings, where sessions may be recorded.
+    recordings: Option<PathBuf>,
     clock: HostClock,
     hub: Hub,
     running: Mutex<Option<Running>>,
@@ -33,6 +36,7 @@ struct Running {
     url: String,
     inputs: SyncSender<Input>,
     thread: JoinHandle<()>,
+    switch: RecordingSwitch,
     /// Its thread ends with it.
     _source: Source,
 }
@@ -55,6 +59,15 @@ pub enum LiveError {
     /// There is no thread for the session.
     #[error("no thread for the session: {0}")]
     Thread(#[from] std::io::Error),
+    /// The columns of a source are not those of the locator's channels.
+    #[error(transparent)]
+    Columns(#[from] ColumnsError),
+    /// Sessions are not recorded.
+    #[error("there is no folder for recordings")]
+    NoFolder,
+    /// A recording cannot be made or read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
 }
 
 impl Live {
@@ -67,18 +80,27 @@ impl Live {
             info,
             simulated,
             folder,
+            recordings: None,
             clock: HostClock::new(),
             hub: Hub::default(),
             running: Mutex::default(),
         }
     }
 
+    /// The same with a folder in which sessions may be recorded.
+    #[must_use]
+    pub fn with_recordings(self, folder: PathBuf) -> Self {
+        Self { recordings: Some(folder), ..self }
+    }
+
     /// Begins a session with a source; one that runs is ended.
     ///
     /// # Errors
-    /// [`LiveError`] for a source that cannot be opened; the session that ran goes on then.
+    /// [`LiveError`] for a source that cannot be opened, or whose columns lack a channel; the session that ran goes on then.
     pub fn begin(&self, url: &SourceUrl) -> Result<(), LiveError> {
-        self.begin_with(url.to_string(), |clock, to| Source::open(url, &self.folder, clock, to))
+        self.begin_with(url.to_string(), url.columns(), |clock, to| {
+            Source::open(url, &self.folder, clock, to)
+        })
     }
 
     /// Begins a session with the simulated board; one that runs is ended.
@@ -87,28 +109,34 @@ impl Live {
     /// [`LiveError::NotSimulated`] without a rig, and as of [`Self::begin`].
     pub fn begin_simulated(&self) -> Result<(), LiveError> {
         let (rig, config) = self.simulated.clone().ok_or(LiveError::NotSimulated)?;
-        self.begin_with("simulated".to_owned(), |clock, to| Source::simulated(rig, config, clock, to))
+        self.begin_with("simulated".to_owned(), &[], |clock, to| Source::simulated(rig, config, clock, to))
     }
 
     fn begin_with(
         &self,
         url: String,
+        columns: &[String],
         open: impl FnOnce(HostClock, SyncSender<Input>) -> Result<Source, SourceError>,
     ) -> Result<(), LiveError> {
         let (inputs, received) = sync_channel(pipeline::WAITING);
+        Session::new(&self.locator, &SessionConfig::default()).set_columns(columns)?;
+        let switch = RecordingSwitch::new(&self.locator, &url, inputs.clone())?;
         let source = open(self.clock, inputs.clone())?;
         let mut running = self.lock();
         if let Some(running) = running.take() {
             running.end();
         }
         let (locator, clock, hub) = (Arc::clone(&self.locator), self.clock, self.hub.clone());
+        let (columns, records) = (columns.to_vec(), switch.clone());
         let run = move || {
             let mut session = Session::new(&locator, &SessionConfig::default());
+            // Refused above, where it would be.
+            let _ = session.set_columns(&columns);
             let sink = WebSink::new(hub, session.channels(), session.extent());
-            pipeline::run(&mut session, clock, &received, &mut [Box::new(sink)]);
+            pipeline::run(&mut session, clock, &received, &mut [Box::new(sink), Box::new(records)]);
         };
         let thread = std::thread::Builder::new().name("session".to_owned()).spawn(run)?;
-        *running = Some(Running { url, inputs, thread, _source: source });
+        *running = Some(Running { url, inputs, thread, switch, _source: source });
         Ok(())
     }
 
@@ -124,6 +152,62 @@ impl Live {
             TrySendError::Full(_) => LiveError::Behind,
             TrySendError::Disconnected(_) => LiveError::NoSession,
         })
+    }
+
+    /// Begins a recording of the session, under a name or one that says the time.
+    ///
+    /// # Errors
+    /// [`LiveError::NoFolder`], [`LiveError::NoSession`], or [`LiveError::Recording`] where one goes on or its file cannot be made.
+    pub fn begin_recording(&self, name: Option<&str>) -> Result<RecordingStatus, LiveError> {
+        let folder = self.recordings()?;
+        let switch = self.switch().ok_or(LiveError::NoSession)?;
+        Ok(switch.begin_in(folder, name, self.clock.now().unix_ns / 1_000_000_000)?)
+    }
+
+    /// Ends the recording of the session, and waits until its file is whole; `None` where none goes on.
+    ///
+    /// # Errors
+    /// [`LiveError::NoSession`].
+    pub fn end_recording(&self) -> Result<Option<RecordingStatus>, LiveError> {
+        Ok(self.switch().ok_or(LiveError::NoSession)?.end())
+    }
+
+    /// Recordings in the folder, newest first.
+    ///
+    /// # Errors
+    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a folder that cannot be read.
+    pub fn list_recordings(&self) -> Result<Vec<RecordingSummary>, LiveError> {
+        Ok(recording::list(self.recordings()?)?)
+    }
+
+    /// Part of a recording of the folder; see [`recording::read`].
+    ///
+    /// # Errors
+    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a name that no recording has, or a file that cannot be read.
+    pub fn read_recording(
+        &self,
+        name: &str,
+        (from_s, to_s): (f64, f64),
+        points: usize,
+    ) -> Result<Excerpt, LiveError> {
+        Ok(recording::read(&self.recording_path(name)?, from_s, to_s, points)?)
+    }
+
+    /// Path of a recording of the folder, which need not be there.
+    ///
+    /// # Errors
+    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a name that no recording has.
+    pub fn recording_path(&self, name: &str) -> Result<PathBuf, LiveError> {
+        Ok(self.recordings()?.join(recording::check_name(name)?))
+    }
+
+    fn recordings(&self) -> Result<&PathBuf, LiveError> {
+        self.recordings.as_ref().ok_or(LiveError::NoFolder)
+    }
+
+    /// The switch of the session that runs.
+    fn switch(&self) -> Option<RecordingSwitch> {
+        self.lock().as_ref().map(|running| running.switch.clone())
     }
 
     /// Ends the session, where one runs.
@@ -145,7 +229,11 @@ impl Live {
     }
 
     pub(super) fn info(&self) -> SessionInfo {
-        self.info.clone().with_source(self.source())
+        let recording = self.recordings.as_ref().map(|folder| {
+            let status = self.switch().and_then(|switch| switch.status());
+            (folder.display().to_string(), status)
+        });
+        self.info.clone().with_source(self.source()).with_recording(recording)
     }
 
     pub(super) fn hub(&self) -> &Hub {
@@ -159,10 +247,11 @@ impl Live {
 
 impl Running {
     fn end(self) {
-        let Self { inputs, thread, _source: source, .. } = self;
+        let Self { inputs, thread, switch, _source: source, .. } = self;
         drop(source);
         // Refused only by a session that has ended.
         let _ = inputs.send(Input::Stop);
         let _ = thread.join();
+        switch.end();
     }
 }

@@ -6,8 +6,12 @@ use super::live::{Live, LiveError};
 use super::session_info::SessionInfo;
 use super::{page, stream};
 use crate::input::Command;
-use axum::extract::{DefaultBodyLimit, State};
+use crate::recording::{Excerpt, RecordingError, RecordingSummary};
+use axum::extract::rejection::QueryRejection;
+use axum::extract::{DefaultBodyLimit, Path, Query, State};
 use axum::http::StatusCode;
+use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
+use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Router, middleware};
 use serde::Deserialize;
@@ -30,10 +34,10 @@ pub fn router(access: Access, live: Arc<Live>) -> Router {
         .route("/api/tare", post(tare))
         .route("/api/mark", post(mark))
         .route("/api/source", post(source))
-        .route("/api/record", post(not_recorded))
-        .route("/api/recordings", get(not_recorded))
-        .route("/api/recordings/{name}", get(not_recorded))
-        .route("/api/recordings/{name}/file", get(not_recorded))
+        .route("/api/record", post(record))
+        .route("/api/recordings", get(recordings))
+        .route("/api/recordings/{name}", get(recording))
+        .route("/api/recordings/{name}/file", get(recording_file))
         .route("/api/{*unknown}", get(unknown).post(unknown))
         .fallback(get(page::page))
         .layer(DefaultBodyLimit::max(MOST_BYTES))
@@ -82,34 +86,125 @@ async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBod
         ));
     }
     // A session that ends is waited for, and a board is prepared.
-    let begun = tokio::task::spawn_blocking(move || live.begin_simulated()).await;
-    match begun {
-        Ok(result) => done(result),
+    blocking(move || live.begin_simulated()).await.map(|()| JsonAnswer(json!({})))
+}
+
+fn done(result: Result<(), LiveError>) -> Answer {
+    result.map(|()| JsonAnswer(json!({}))).map_err(|error| refusal(&error))
+}
+
+fn refusal(error: &LiveError) -> Refusal {
+    let (status, help) = match error {
+        LiveError::NoSession => (StatusCode::CONFLICT, "choose a source first"),
+        LiveError::Behind => (StatusCode::SERVICE_UNAVAILABLE, "try it again"),
+        LiveError::NotSimulated => (StatusCode::CONFLICT, "start `palpate serve` with a rig"),
+        LiveError::Source(_) | LiveError::Columns(_) => {
+            (StatusCode::BAD_REQUEST, "start `palpate serve` with another source")
+        }
+        LiveError::Thread(_) => (StatusCode::INTERNAL_SERVER_ERROR, "start palpate again"),
+        LiveError::NoFolder => (StatusCode::CONFLICT, "start `palpate serve` with --record FOLDER"),
+        LiveError::Recording(RecordingError::File { error, .. })
+            if error.kind() == std::io::ErrorKind::NotFound =>
+        {
+            (StatusCode::NOT_FOUND, "GET /api/recordings lists them")
+        }
+        LiveError::Recording(RecordingError::GoesOn { .. }) => {
+            (StatusCode::CONFLICT, "end the recording that goes on first")
+        }
+        LiveError::Recording(_) => (StatusCode::BAD_REQUEST, "GET /api/recordings lists recordings"),
+    };
+    Refusal::new(status, error.to_string(), help)
+}
+
+#[derive(Deserialize)]
+struct Record {
+    on: bool,
+    name: Option<String>,
+}
+
+async fn record(State(live): State<Arc<Live>>, JsonBody(Record { on, name }): JsonBody<Record>) -> Answer {
+    // A recording that ends is written to its last byte first.
+    blocking(move || {
+        let status = if on { live.begin_recording(name.as_deref()).map(Some) } else { live.end_recording() };
+        status.map(|status| json!({ "recording": status }))
+    })
+    .await
+    .map(JsonAnswer)
+}
+
+async fn recordings(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Vec<RecordingSummary>>, Refusal> {
+    blocking(move || live.list_recordings()).await.map(JsonAnswer)
+}
+
+/// Part of a recording, and how finely it is told.
+#[derive(Deserialize)]
+struct Part {
+    from_s: Option<f64>,
+    to_s: Option<f64>,
+    points: Option<usize>,
+}
+
+/// Samples of a part of a recording unless more or fewer are asked for, and at most.
+const POINTS: (usize, usize) = (2000, 20_000);
+
+async fn recording(
+    State(live): State<Arc<Live>>,
+    Path(name): Path<String>,
+    part: Result<Query<Part>, QueryRejection>,
+) -> Result<JsonAnswer<Excerpt>, Refusal> {
+    let Query(Part { from_s, to_s, points }) = part.map_err(|error| {
+        Refusal::new(StatusCode::BAD_REQUEST, error.body_text(), "write ?from_s=0&to_s=60&points=2000")
+    })?;
+    let span_s = (from_s.unwrap_or(0.0), to_s.unwrap_or(f64::INFINITY));
+    let points = points.unwrap_or(POINTS.0).clamp(1, POINTS.1);
+    blocking(move || live.read_recording(&name, span_s, points)).await.map(JsonAnswer)
+}
+
+/// Most bytes of a recording that is sent whole; it is held in memory meanwhile.
+const MOST_OF_A_FILE: u64 = 256 << 20;
+
+async fn recording_file(
+    State(live): State<Arc<Live>>,
+    Path(name): Path<String>,
+) -> Result<Response, Refusal> {
+    let path = live.recording_path(&name).map_err(|error| refusal(&error))?;
+    let read = tokio::task::spawn_blocking(move || {
+        let bytes = std::fs::metadata(&path)?.len();
+        if bytes > MOST_OF_A_FILE {
+            return Ok(Err(bytes));
+        }
+        std::fs::read(&path).map(Ok)
+    });
+    match read.await.map_err(|error| std::io::Error::other(error.to_string())).flatten() {
+        Ok(Ok(bytes)) => {
+            let as_file = format!("attachment; filename=\"{name}\"");
+            let headers =
+                [(CONTENT_TYPE, "application/octet-stream"), (CONTENT_DISPOSITION, as_file.as_str())];
+            Ok((headers, bytes).into_response())
+        }
+        Ok(Err(bytes)) => Err(Refusal::new(
+            StatusCode::PAYLOAD_TOO_LARGE,
+            format!("{name} has {bytes} bytes; at most {MOST_OF_A_FILE} are sent"),
+            "copy it from the folder of recordings",
+        )),
+        Err(error) => Err(Refusal::new(
+            StatusCode::NOT_FOUND,
+            format!("{name} cannot be read: {error}"),
+            "GET /api/recordings lists them",
+        )),
+    }
+}
+
+/// Does what may wait for a disk or a thread.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, LiveError> + Send + 'static,
+) -> Result<T, Refusal> {
+    match tokio::task::spawn_blocking(work).await {
+        Ok(done) => done.map_err(|error| refusal(&error)),
         Err(error) => {
             Err(Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, error.to_string(), "start palpate again"))
         }
     }
-}
-
-fn done(result: Result<(), LiveError>) -> Answer {
-    result.map(|()| JsonAnswer(json!({}))).map_err(|error| {
-        let (status, help) = match error {
-            LiveError::NoSession => (StatusCode::CONFLICT, "choose a source first"),
-            LiveError::Behind => (StatusCode::SERVICE_UNAVAILABLE, "try it again"),
-            LiveError::NotSimulated => (StatusCode::CONFLICT, "start `palpate serve` with a rig"),
-            LiveError::Source(_) => (StatusCode::BAD_REQUEST, "start `palpate serve` with another source"),
-            LiveError::Thread(_) => (StatusCode::INTERNAL_SERVER_ERROR, "start palpate again"),
-        };
-        Refusal::new(status, error.to_string(), help)
-    })
-}
-
-async fn not_recorded() -> Refusal {
-    Refusal::new(
-        StatusCode::NOT_IMPLEMENTED,
-        "this version of palpate does not record sessions from the browser",
-        "take the samples from /api/stream?rate=all",
-    )
 }
 
 async fn unknown() -> Refusal {

@@ -1,6 +1,7 @@
 //! Description of a session: what it locates with, on which surface, and how well that can be done.
 
 use crate::frame::Channel;
+use crate::recording::RecordingStatus;
 use palpate_estimators::description;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::setup::Setup;
@@ -57,6 +58,17 @@ impl SessionInfo {
     /// The same, while a session of this source runs.
     pub fn with_source(self, source: Option<String>) -> Self {
         Self { source, ..self }
+    }
+
+    /// The same, where sessions are recorded in a folder: its name, and the state of the recording that goes on.
+    pub fn with_recording(self, recording: Option<(String, Option<RecordingStatus>)>) -> Self {
+        let recording = recording.map(|(folder, status)| match status {
+            Some(RecordingStatus { name, bytes, seconds, problem, .. }) => {
+                json!({ "folder": folder, "name": name, "bytes": bytes, "seconds": seconds, "problem": problem })
+            }
+            None => json!({ "folder": folder, "name": null, "bytes": 0, "seconds": 0 }),
+        });
+        Self { recording, ..self }
     }
 }
 
