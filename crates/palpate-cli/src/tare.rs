@@ -204,12 +204,6 @@ impl<'a> Taring<'a> {
         let moved = self.tare.baseline().iter().zip(self.tare.learnt()).map(|(today, learnt)| today - learnt);
         let most = moved.enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let Some((channel, value)) = most else { return };
-        if self.source == Source::Auto && value == 0.0 {
-            remark!(
-                "palpate: warning: --tare auto found no untouched reading; the offsets are the calibration's"
-            );
-            return;
-        }
         let sensor = &self.locator.setup.layout().sensors()[channel];
         let from = match self.source {
             Source::Auto => "found untouched readings".to_owned(),
@@ -226,10 +220,9 @@ impl<'a> Taring<'a> {
     pub fn finish(&self, source: &str) -> Result<(), Failure> {
         match self.source {
             Source::First(needed) if self.count < needed => {
-                let held =
-                    if self.count == 1 { "1 reading".to_owned() } else { format!("{} readings", self.count) };
                 let complaint = format!(
-                    "--tare {needed}: {source} holds {held}; the first {needed} are to be the untouched ones"
+                    "--tare {needed}: {source} holds {} readings; the first {needed} are to be the untouched ones",
+                    self.count
                 );
                 return Err(Complaint::new(complaint).help("give fewer, or record longer").into());
             }
