@@ -155,6 +155,8 @@ fn a_file_that_is_cut_off_anywhere_is_read_up_to_there() {
                 last = summary.readings;
                 opened += 1;
             }
+            // Of a file of a few bytes nothing says that it is MCAP.
+            Err(RecordingError::NotMcap { .. }) if step < 8 => {}
             Err(error) => assert!(matches!(error, RecordingError::NotOurs { .. }), "{error}"),
         }
     }

@@ -77,11 +77,15 @@ impl Decoder {
         }
     }
 
-    /// Names the values of frames that have no names: channels, time, number of the frame, and others, which are left out.
+    /// Names the values of frames that have no names: channels, time, number of the frame, and others, which are left out. Without any they stay the
+    /// channels in their order.
     ///
     /// # Errors
     /// [`ColumnsError`] unless every channel is named once.
     pub fn set_columns(&mut self, columns: &[String]) -> Result<(), ColumnsError> {
+        if columns.is_empty() {
+            return Ok(());
+        }
         let names = self.text.names();
         let roles: Vec<Role> = columns.iter().map(|column| names.role(column)).collect();
         let columns = columns.join(",");
@@ -421,7 +425,9 @@ mod tests {
     fn messages_are_whole() {
         let mut decoder = decoder();
         let mut verdicts = Vec::new();
-        for message in [b"1,2".as_slice(), b"3,4\n5,6\n", b"[7,8]", &binary(9..11), &binary(11..12)[..19]] {
+        let ended = binary(11..12);
+        let unended = &ended[..ended.len() - 1];
+        for message in [b"1,2".as_slice(), b"3,4\n5,6\n", b"[7,8]", &binary(9..11), unended] {
             decoder.receive_message(message, |frame| verdicts.push(frame.unwrap().reading[0]));
         }
         assert_eq!(verdicts, [1.0, 3.0, 5.0, 7.0, 9.0, 10.0, 11.0]);
