@@ -4,6 +4,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 use std::process::Command;
+use std::time::SystemTime;
 
 use anyhow::{Context, Result};
 
@@ -24,6 +25,12 @@ pub fn build(root: &Path) -> Result<bool> {
     if !(install(root)? && run::shown(&mut npm(root, &["run", "--silent", "build"]))?) {
         return Ok(false);
     }
+    // Cargo does not see files that were not there when it compiled what holds them.
+    let holder = root.join("crates/palpate-live/src/server/page.rs");
+    let touched = fs::File::options().append(true).open(&holder);
+    touched
+        .and_then(|file| file.set_modified(SystemTime::now()))
+        .with_context(|| format!("cannot touch {}", holder.display()))?;
     let bytes = size(&root.join("web/dist/assets"))?;
     println!("web/dist: {bytes} bytes of scripts and styles; at most {MOST_BYTES}");
     Ok(bytes <= MOST_BYTES)

@@ -7,7 +7,7 @@ use super::project::{File, Project};
 const EVERYWHERE: [&str; 5] = ["api", "dev", "etc", "proc", "usr"];
 
 /// Hosts that readers are sent to, or that name a format. Packages are named, not the registries that hold them.
-const HOSTS: [&str; 4] = ["doi.org", "example.org", "www.apache.org", "www.w3.org"];
+const HOSTS: [&str; 5] = ["127.0.0.1", "doi.org", "example.org", "www.apache.org", "www.w3.org"];
 
 /// Files that package managers write, which name the registries they use.
 const LOCKS: [&str; 3] = ["Cargo.lock", "package-lock.json", "uv.lock"];
