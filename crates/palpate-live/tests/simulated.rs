@@ -57,6 +57,10 @@ fn a_finger_is_followed_from_touch_down_to_lift_off() {
     let median_m = errors_m[errors_m.len() / 2];
     assert!(median_m < 0.3e-3, "{median_m}");
     assert_eq!(session.counters().readings, 8000);
+    // 5 µm, learnt while nothing touches.
+    for channel in session.health() {
+        assert!((4e-6..6e-6).contains(&channel.noise_sd), "{channel:?}");
+    }
     assert!((session.rate_hz() - 200.0).abs() < 2.0, "{}", session.rate_hz());
     assert_eq!(board.next_at(), Duration::from_secs(40));
 }

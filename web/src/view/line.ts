@@ -44,7 +44,8 @@ export class LineView {
       const mm = MM[channel.unit];
       const value = deflections?.[i];
       const usable = channel.measure === "deflection" && channel.x_mm !== null && mm !== undefined;
-      return usable && value !== undefined && Number.isFinite(value) ? [{ x: channel.x_mm!, y: value * mm }] : [];
+      // Deflections are negative downward, pixels positive.
+      return usable && value !== undefined && Number.isFinite(value) ? [{ x: channel.x_mm!, y: -value * mm }] : [];
     });
     this.exaggeration = null;
     if (measured.length < 2) return () => 0;

@@ -18,7 +18,7 @@ pub struct ChannelHealth {
     pub state: ChannelState,
     /// Lowest and highest value so far, in its SI unit or raw.
     pub range: [f64; 2],
-    /// Standard deviation of the noise of a reading, from differences of readings that follow one another, in its SI unit or raw.
+    /// Standard deviation of the noise of a reading, from untouched readings that follow one another, in its SI unit or raw; 0 before there were two.
     pub noise_sd: f64,
 }
 
@@ -29,9 +29,12 @@ pub struct HealthWatch {
     /// Ends of the range of each, where they are known.
     limits: Vec<Option<(f64, f64)>>,
     last: Vec<f64>,
+    /// The reading before the last.
+    before: Vec<f64>,
     same: Vec<u32>,
     at_end: Vec<u32>,
-    readings: u64,
+    /// Pairs of readings that the noise was learnt from.
+    pairs: u64,
 }
 
 impl HealthWatch {
@@ -48,9 +51,10 @@ impl HealthWatch {
             channels: layout.names().iter().map(health).collect(),
             limits: layout.sensors().iter().map(|sensor| sensor.channel.range).collect(),
             last: vec![f64::NAN; count],
+            before: vec![f64::NAN; count],
             same: vec![0; count],
             at_end: vec![0; count],
-            readings: 0,
+            pairs: 0,
         }
     }
 
@@ -59,21 +63,26 @@ impl HealthWatch {
         &self.channels
     }
 
+    /// Learns the noise from the last two readings, of which nothing touched: their difference has twice the variance of one. A mean over the last few
+    /// hundred.
+    pub fn learn_noise(&mut self) {
+        self.pairs += 1;
+        let weight = 1.0 / self.pairs.min(300) as f64;
+        let differences = self.last.iter().zip(&self.before).map(|(last, before)| last - before);
+        for (channel, difference) in self.channels.iter_mut().zip(differences) {
+            let variance = channel.noise_sd.powi(2);
+            channel.noise_sd = (variance + weight * (0.5 * difference * difference - variance)).sqrt();
+        }
+    }
+
     /// Takes the next reading.
     pub fn add(&mut self, reading: &[f64], mut tell: impl FnMut(Event)) {
-        self.readings += 1;
+        self.before.clone_from(&self.last);
         for (i, value) in reading.iter().copied().enumerate() {
             let channel = &mut self.channels[i];
             channel.range = [channel.range[0].min(value), channel.range[1].max(value)];
             let same = self.last[i].to_bits() == value.to_bits();
             self.same[i] = if same { self.same[i].saturating_add(1) } else { 0 };
-            if self.readings > 1 {
-                // The difference of two readings has twice the variance of one; a mean over the last few hundred.
-                let weight = 1.0 / (self.readings - 1).min(300) as f64;
-                let variance = 0.5 * (value - self.last[i]).powi(2);
-                channel.noise_sd =
-                    (channel.noise_sd.powi(2) + weight * (variance - channel.noise_sd.powi(2))).sqrt();
-            }
             let ends = self.limits[i].is_some_and(|(low, high)| value <= low || value >= high);
             self.at_end[i] = if ends { self.at_end[i].saturating_add(1) } else { 0 };
             self.last[i] = value;

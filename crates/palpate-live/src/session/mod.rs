@@ -71,6 +71,8 @@ pub struct Session<'a> {
     contact: ContactWatch,
     health: HealthWatch,
     counters: Counters,
+    /// Whether the last reading was `no_contact`.
+    was_untouched: bool,
 }
 
 impl<'a> Session<'a> {
@@ -87,6 +89,7 @@ impl<'a> Session<'a> {
             contact: ContactWatch::new(extent),
             health: HealthWatch::new(locator.setup.layout()),
             counters: Counters::default(),
+            was_untouched: false,
             channels,
         }
     }
@@ -196,6 +199,11 @@ impl<'a> Session<'a> {
         }
         self.contact
             .add(at.elapsed, &estimate, |event| out.push(Output::Event(EventRecord { time_s, event })));
+        let is_untouched = estimate.status == Status::NoContact;
+        if is_untouched && self.was_untouched {
+            self.health.learn_noise();
+        }
+        self.was_untouched = is_untouched;
         let number = self.counters.readings;
         self.counters.readings += 1;
         let reading = frame.reading;
