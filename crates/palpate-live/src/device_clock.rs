@@ -52,7 +52,7 @@ struct Line {
 }
 
 impl Line {
-    fn at(self, device_s: f64) -> f64 {
+    fn offset_at(self, device_s: f64) -> f64 {
         self.offset_s + self.slope * device_s
     }
 }
@@ -134,7 +134,7 @@ impl Epoch {
         let point = Point { device_s, offset_s: host_s - device_s };
         self.add(point);
         // Not after the arrival, and not before it by more than ever was seen.
-        let above_s = (point.offset_s - self.line.at(device_s)).clamp(0.0, self.spread_s);
+        let above_s = (point.offset_s - self.line.offset_at(device_s)).clamp(0.0, self.spread_s);
         arrival.saturating_sub(Duration::from_secs_f64(above_s))
     }
 
@@ -156,7 +156,7 @@ impl Epoch {
                 self.fit();
             }
         }
-        let above_s = point.offset_s - self.line.at(point.device_s);
+        let above_s = point.offset_s - self.line.offset_at(point.device_s);
         if above_s < 0.0 {
             // Below the envelope, which is lowered onto it until the next fit.
             self.line.offset_s += above_s;
@@ -168,7 +168,7 @@ impl Epoch {
     fn fit(&mut self) {
         self.line = envelope(&self.bins);
         let line = self.line;
-        let above_s = |point: Point| point.offset_s - line.at(point.device_s);
+        let above_s = |point: Point| point.offset_s - line.offset_at(point.device_s);
         self.spread_s = self.bins.iter().map(|bin| above_s(bin.high)).fold(0.0, f64::max);
     }
 }

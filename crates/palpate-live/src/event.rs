@@ -8,12 +8,12 @@ use serde::Serialize;
 pub struct EventRecord {
     /// Seconds since 1970-01-01 00:00 UTC.
     pub time_s: f64,
-    /// What happened.
+    /// The event itself.
     #[serde(flatten)]
     pub event: Event,
 }
 
-/// What happened in a session.
+/// Event of a session.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
@@ -44,17 +44,17 @@ pub enum Event {
     },
     /// Something touches.
     TouchDown {
-        /// Where, and how hard.
+        /// Position and force.
         #[serde(flatten)]
         contact: ContactRecord,
     },
     /// A contact has moved by more than is uncertain of it.
     Move {
-        /// Where it is, and how hard.
+        /// Position and force.
         #[serde(flatten)]
         contact: ContactRecord,
     },
-    /// Nothing touches any more.
+    /// The contact has gone.
     LiftOff {
         /// Seconds since it was touched.
         seconds: f64,
@@ -63,7 +63,7 @@ pub enum Event {
     OutsideModel,
     /// Contacts beside the first.
     SecondContact {
-        /// Where it is, and how hard.
+        /// Position and force.
         #[serde(flatten)]
         contact: ContactRecord,
     },

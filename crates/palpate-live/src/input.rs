@@ -5,7 +5,7 @@ use crate::stamp::Stamp;
 /// Input of a session's thread.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Input {
-    /// What a source brought.
+    /// An arrival of a source.
     Arrived(Arrived),
     /// A user's wish.
     Command(Command),
@@ -13,7 +13,7 @@ pub enum Input {
     Stop,
 }
 
-/// What a source brings.
+/// Arrival of a source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Arrival {
     /// The device is there, and its bytes begin with a frame; its name.
@@ -35,7 +35,7 @@ pub enum Arrival {
 pub struct Arrived {
     /// The instant at which its last byte was there.
     pub at: Stamp,
-    /// What arrived.
+    /// Its kind, with the bytes.
     pub arrival: Arrival,
 }
 

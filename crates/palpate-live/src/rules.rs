@@ -67,7 +67,7 @@ pub enum Condition {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{problem}")]
 pub struct RuleError {
-    /// What is wrong.
+    /// The problem.
     pub problem: String,
     /// The bytes of the file that are meant.
     pub span: Option<Range<usize>>,
@@ -125,7 +125,7 @@ impl Rules {
             return Err(RuleError { problem: "there is no [[rule]]".to_owned(), span: None });
         }
         if let Some(beyond) = file.rule.get(MOST) {
-            return Err(at(beyond.span(), format!("there are more than {MOST} rules")));
+            return Err(error_at(beyond.span(), format!("there are more than {MOST} rules")));
         }
         let rules = file.rule.into_iter().enumerate().map(|(i, rule)| Rule::read(i + 1, rule));
         rules.collect::<Result<_, _>>().map(Self)
@@ -144,7 +144,7 @@ impl Rule {
         let topic = given.topic.get_ref();
         if topic.is_empty() || topic.len() > 1000 || topic.contains(['+', '#', '\0']) {
             let problem = "`topic` must have 1 to 1000 bytes, and none of + and #".to_owned();
-            return Err(at(given.topic.span(), problem));
+            return Err(error_at(given.topic.span(), problem));
         }
         let hold = match &given.hold {
             None => Duration::ZERO,
@@ -156,15 +156,18 @@ impl Rule {
         let of_contact = [&given.x, &given.y, &given.force].into_iter().flatten().next();
         let condition = match (given.event, of_contact) {
             (Some(event), Some(_)) => {
-                return Err(at(event.span(), "`event` does not go with `x`, `y` and `force`".to_owned()));
+                return Err(error_at(
+                    event.span(),
+                    "`event` does not go with `x`, `y` and `force`".to_owned(),
+                ));
             }
             (Some(event), None) => {
                 if let Some(hold) = &given.hold {
-                    return Err(at(hold.span(), "`hold` does not go with `event`".to_owned()));
+                    return Err(error_at(hold.span(), "`hold` does not go with `event`".to_owned()));
                 }
                 if !EVENTS.contains(&event.get_ref().as_str()) {
                     let known = EVENTS.join(", ");
-                    return Err(at(
+                    return Err(error_at(
                         event.span(),
                         format!("`event` is `{}`; known are {known}", event.get_ref()),
                     ));
@@ -173,7 +176,10 @@ impl Rule {
             }
             (None, Some(_)) => Condition::Contact { x_m, y_m, force_n, hold },
             (None, None) => {
-                return Err(at(span, "the rule has no `x`, `y`, `force` or `event` to act on".to_owned()));
+                return Err(error_at(
+                    span,
+                    "the rule has no `x`, `y`, `force` or `event` to act on".to_owned(),
+                ));
             }
         };
         Ok(Self {
@@ -185,13 +191,13 @@ impl Rule {
     }
 }
 
-fn at(span: Range<usize>, problem: String) -> RuleError {
+fn error_at(span: Range<usize>, problem: String) -> RuleError {
     RuleError { problem, span: Some(span) }
 }
 
 fn quantity(key: &str, dimension: Dimension, text: &Spanned<String>) -> Result<f64, RuleError> {
     let value = Quantity::parse_as(text.get_ref(), dimension);
-    value.map_err(|error| at(text.span(), format!("`{key}`: {error}")))
+    value.map_err(|error| error_at(text.span(), format!("`{key}`: {error}")))
 }
 
 fn duration(hold: &Spanned<String>) -> Result<Duration, RuleError> {
@@ -199,7 +205,7 @@ fn duration(hold: &Spanned<String>) -> Result<Duration, RuleError> {
     if (0.0..=3600.0).contains(&seconds) {
         return Ok(Duration::from_secs_f64(seconds));
     }
-    Err(at(hold.span(), format!("`hold` is {}; it must be from 0 s to 3600 s", hold.get_ref())))
+    Err(error_at(hold.span(), format!("`hold` is {}; it must be from 0 s to 3600 s", hold.get_ref())))
 }
 
 fn band(
@@ -214,7 +220,10 @@ fn band(
         return Ok(Some(band));
     }
     let (low, high) = (low.get_ref(), high.get_ref());
-    Err(at(ends.span(), format!("`{key}` is from {low} to {high}; the first must be less than the second")))
+    Err(error_at(
+        ends.span(),
+        format!("`{key}` is from {low} to {high}; the first must be less than the second"),
+    ))
 }
 
 /// Watch over the rules in the course of a session.

@@ -245,7 +245,7 @@ fn receive(arrived: &Arrived, decoder: &mut Decoder, hand_on: impl FnMut(Result<
     false
 }
 
-/// What a reading led to: a row for the journal, or something else that is waited for.
+/// Takes the outcome of a reading: a row for the journal, or another step that is waited for.
 fn take(progress: Progress, guide: &Guide, journal: &mut Journal) -> Result<(), Failure> {
     match progress {
         Progress::None => return Ok(()),
@@ -262,7 +262,7 @@ fn take(progress: Progress, guide: &Guide, journal: &mut Journal) -> Result<(), 
     Ok(())
 }
 
-/// How far the last press is off the mean of the others of its place and force, in words; nothing where there are none.
+/// Deviation of the last press from the mean of the others of its place and force, in words; empty where there are none.
 fn repeatability(rows: &[Row]) -> String {
     let Some(last) = rows.last() else { return String::new() };
     let others: Vec<&Row> = rows[..rows.len() - 1]

@@ -1,12 +1,13 @@
 //! `palpate locate`: readings in, estimates out, line by line.
 
 use crate::failure::{Complaint, Failure};
-use crate::json::{Fields, Object, fields, object};
+use crate::json::object;
 use crate::lines::{Lines, Readings, Records};
 use crate::tare::{Taken, TareOption, Taring};
 use crate::{input, output};
 use palpate_estimators::digit::{DigitShape, ShapePoint};
-use palpate_estimators::estimator::{ContactEstimate, Estimate, Locator, Mode, Uncertainty};
+use palpate_estimators::estimate_record::{ContactRecord, EstimateRecord};
+use palpate_estimators::estimator::{ContactEstimate, Estimate, Locator, Uncertainty};
 use palpate_estimators::recording::csv_row;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::normal_interval_95;
@@ -144,7 +145,7 @@ fn csv(estimate: &Estimate, line: u64, extent: Extent) -> String {
     });
     let (low_n, high_n) = force_95_n(contact).unzip();
     cells.extend([low_n, high_n].map(|end_n| end_n.map_or_else(String::new, |end_n| format!("{end_n:.4}"))));
-    cells.push(trade_off(contact).unwrap_or_default().to_owned());
+    cells.push(ContactRecord::new(contact, extent).trade_off.unwrap_or_default().to_owned());
     cells.push(estimate.status.name().to_owned());
     csv_row(cells)
 }
@@ -156,21 +157,17 @@ fn json(
     extent: Extent,
     shape: Option<&DigitShape>,
 ) -> Result<String, Failure> {
-    let mode = |mode: &Mode| {
-        object! { ..contact_fields(&mode.contact, extent), "probability": mode.probability }
-    };
-    let modes: Vec<_> = estimate.modes.as_slice().iter().map(mode).collect();
-    let further = estimate.further.as_slice().iter();
-    let further: Vec<_> = further.map(|contact| Object(contact_fields(contact, extent))).collect();
-    let object = object! {
-        "line": line,
-        ..contact_fields(&estimate.contact, extent),
-        "status": estimate.status.name(),
-        "modes"?: Some(modes).filter(|modes| !modes.is_empty()),
-        "further"?: Some(further).filter(|further| !further.is_empty()),
-        "shape"?: shape.map(|shape| shape.points.iter().map(shape_point).collect::<Vec<_>>()),
-    };
-    json_line(&object)
+    /// The record of an estimate, with its line and shape.
+    #[derive(Serialize)]
+    struct Line<S> {
+        line: u64,
+        #[serde(flatten)]
+        estimate: EstimateRecord,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        shape: Option<Vec<S>>,
+    }
+    let shape = shape.map(|shape| shape.points.iter().map(shape_point).collect());
+    json_line(&Line { line, estimate: EstimateRecord::new(estimate, extent), shape })
 }
 
 fn json_line(object: &impl Serialize) -> Result<String, Failure> {
@@ -195,27 +192,4 @@ fn force_95_n(contact: &ContactEstimate) -> Option<(f64, f64)> {
         (sd_n > 0.0 && sd_n.is_finite()).then(|| normal_interval_95(force_n, sd_n))
     };
     uncertainty.force_95_n.or_else(|| contact.force_n.and_then(normal))
-}
-
-/// The words for an estimate near an end, of a force that is not known.
-fn trade_off(contact: &ContactEstimate) -> Option<&'static str> {
-    contact.uncertainty.and_then(|uncertainty| uncertainty.force_95_n).map(|_| "force and position")
-}
-
-fn contact_fields(contact: &ContactEstimate, extent: Extent) -> impl Fields + use<> {
-    let uncertainty = contact.uncertainty.as_ref();
-    let mm = |(low, high): (f64, f64)| [low * 1e3, high * 1e3];
-    // JSON has no infinity: what is not known at all is left out.
-    let sd = |variance: f64| Some(variance.sqrt()).filter(|sd| *sd > 0.0 && sd.is_finite());
-    fields! {
-        "x_mm": contact.position.x_m * 1e3,
-        "y_mm"?: extent.if_plane(contact.position.y_m * 1e3),
-        "force_n"?: contact.force_n,
-        "x_95_mm"?: uncertainty.map(|uncertainty| mm(uncertainty.x_95_m)),
-        "y_95_mm"?: uncertainty.and_then(|uncertainty| extent.if_plane(mm(uncertainty.y_95_m))),
-        "sd_mm"?: uncertainty.and_then(|u| sd(u.covariance[0] + u.covariance[3])).map(|sd_m| sd_m * 1e3),
-        "force_95_n"?: uncertainty.and_then(|u| u.force_95_n).map(|(low_n, high_n)| [low_n, high_n]),
-        "trade_off"?: trade_off(contact),
-        "sd_force_n"?: uncertainty.and_then(|u| sd(u.covariance[5])),
-    }
 }

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 pub struct Arguments {
     /// The rig
     rig: PathBuf,
-    /// Where it is plugged in: pty, pty:PATH, tcp://:PORT, udp://HOST:PORT, mqtt://HOST/TOPIC, or - for stdout
+    /// Plug of the board: pty, pty:PATH, tcp://:PORT, udp://HOST:PORT, mqtt://HOST/TOPIC, or - for stdout
     #[arg(long, value_name = "LINK", default_value = "pty")]
     to: LinkUrl,
     /// Readings a second

@@ -15,7 +15,7 @@ pub struct Press {
     pub force_n: Option<f64>,
 }
 
-/// What is waited for.
+/// Next step that a guide waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Waiting {
@@ -31,10 +31,10 @@ pub enum Waiting {
     Nothing,
 }
 
-/// What a reading led to.
+/// Outcome of a reading.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Progress {
-    /// Nothing yet.
+    /// No change.
     None,
     /// Something else is waited for.
     Waits(Waiting),
@@ -72,7 +72,7 @@ impl Guide {
         &self.plan
     }
 
-    /// What is waited for.
+    /// The step that it waits for.
     pub fn waiting(&self) -> Waiting {
         self.waiting
     }

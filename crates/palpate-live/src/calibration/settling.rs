@@ -1,4 +1,4 @@
-//! Whether a surface is untouched, pressed, and at rest: what readings say in their course.
+//! Untouched, pressed, at rest, let go: the state of a surface by the course of its readings.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -117,7 +117,7 @@ impl Baseline {
     }
 }
 
-/// Whether the means of both halves of a stretch agree, by noise and by a share of a press of `size` standard deviations.
+/// True where the means of both halves of a stretch agree, by noise and by a share of a press of `size` standard deviations.
 fn rests(readings: &[&[f64]], baseline: &Baseline, size: f64) -> bool {
     let (first, second) = readings.split_at(readings.len() / 2);
     let sd_of_difference = (1.0 / first.len() as f64 + 1.0 / second.len() as f64).sqrt();

@@ -22,7 +22,7 @@ pub fn object(line: &[u8], names: &Names, role: impl FnMut(usize, &[u8]) -> Role
 
 type Json<'de> = serde_json::Deserializer<serde_json::de::SliceRead<'de>>;
 
-/// What reading says of the values of a line; bytes that are no JSON, or more than one value, are malformed.
+/// Outcome of reading the values of a line; bytes that are no JSON, or more than one value, are malformed.
 fn verdict<'de>(
     line: &'de [u8],
     read: impl FnOnce(&mut Json<'de>) -> serde_json::Result<Result<(), BadFrame>>,

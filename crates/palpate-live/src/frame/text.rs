@@ -4,7 +4,7 @@ use super::json;
 use super::names::{Filling, Names, Role};
 use super::{BadFrame, Frame};
 
-/// What a line of text is.
+/// Reading of a line of text.
 #[derive(Debug)]
 pub enum Line {
     /// Blank, or a comment.
@@ -53,7 +53,7 @@ impl TextReader {
     pub fn read(&mut self, line: &[u8]) -> Result<Line, BadFrame> {
         let line = line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line).trim_ascii();
         let Some(first) = line.first() else { return Ok(Line::Nothing) };
-        let marks = Marks::of(line);
+        let marks = Marks::found_in(line);
         if marks.has(Marks::CONTROL) || std::str::from_utf8(line).is_err() {
             return Err(BadFrame::Encoding);
         }
@@ -71,7 +71,7 @@ impl TextReader {
     }
 
     fn fields(&mut self, line: &[u8], marks: Marks) -> Result<Line, BadFrame> {
-        let separator = Separator::of(line, marks);
+        let separator = Separator::found_in(line, marks);
         let fields = Fields { rest: Some(line), separator };
         if marks.has(Marks::NAMED) && fields.clone().next().is_some_and(|field| named(field).is_some()) {
             return self.named(fields, separator).map(Line::Whole);
@@ -203,7 +203,7 @@ impl Marks {
         kinds
     };
 
-    fn of(line: &[u8]) -> Self {
+    fn found_in(line: &[u8]) -> Self {
         Self(line.iter().fold(0, |marks, byte| marks | Self::KINDS[usize::from(*byte)]))
     }
 
@@ -217,7 +217,7 @@ pub fn is_text(bytes: &[u8]) -> bool {
     bytes.iter().all(|byte| matches!(byte, b'\t' | b'\r' | b'\n') || !byte.is_ascii_control())
 }
 
-/// What stands between the values of a line.
+/// Separator of the values of a line.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Separator {
     Comma,
@@ -227,7 +227,7 @@ enum Separator {
 }
 
 impl Separator {
-    fn of(line: &[u8], marks: Marks) -> Self {
+    fn found_in(line: &[u8], marks: Marks) -> Self {
         if marks.has(Marks::SEMICOLON) {
             Self::Semicolon
         } else if marks.has(Marks::TAB) {

@@ -31,7 +31,7 @@ pub struct RecordedChannel {
     pub unit: String,
 }
 
-/// What a recorder must know to record a session.
+/// Session to record: its head, units and topics.
 #[derive(Clone, Debug)]
 pub(super) struct Subject {
     pub head: Head,

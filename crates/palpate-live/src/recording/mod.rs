@@ -26,7 +26,7 @@ pub enum RecordingError {
     /// The file cannot be made, opened or read.
     #[error("cannot {verb} {path}: {error}")]
     File {
-        /// What was to be done.
+        /// The action that failed.
         verb: &'static str,
         /// The file.
         path: String,
@@ -64,7 +64,7 @@ pub enum RecordingError {
     NotOurs {
         /// The file.
         path: String,
-        /// What it lacks.
+        /// The missing part.
         lacks: &'static str,
     },
     /// The record cannot be written in MCAP.

@@ -178,7 +178,7 @@ impl Thinning {
         let mut sample = Map::new();
         sample.insert("number".to_owned(), reading.number.into());
         sample.insert("time_s".to_owned(), (pending.reading.unix_ns as f64 * 1e-9).into());
-        sample.insert("reading".to_owned(), reading.of(&self.channels)?.into());
+        sample.insert("reading".to_owned(), reading.in_order(&self.channels)?.into());
         if let Some(estimate) = &pending.estimate
             && let Ok(estimate) = serde_json::from_slice::<Map<String, Value>>(&estimate.data)
             && estimate.get("number") == sample.get("number")
@@ -197,12 +197,12 @@ struct ReadingIn {
 }
 
 impl ReadingIn {
-    fn of(&self, channels: &[RecordedChannel]) -> Option<Vec<f64>> {
+    fn in_order(&self, channels: &[RecordedChannel]) -> Option<Vec<f64>> {
         channels.iter().map(|channel| self.values.get(&channel.name)?.as_f64()).collect()
     }
 }
 
-/// What a recording holds, one by one.
+/// One message of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Recorded {
     /// A reading, as the board sent it.
@@ -254,7 +254,7 @@ impl Playback {
         Ok(Self { file, chunk: 0, messages: Vec::new().into_iter(), bad_messages: 0 })
     }
 
-    /// What it says of itself.
+    /// Its head: version, source, channels, locator.
     pub fn head(&self) -> &Head {
         &self.file.head
     }
@@ -288,7 +288,7 @@ impl Playback {
         match message.topic {
             0 => {
                 let reading: ReadingIn = serde_json::from_slice(data).ok()?;
-                let values = reading.of(&self.file.head.channels)?;
+                let values = reading.in_order(&self.file.head.channels)?;
                 Some(Recorded::Reading { number: reading.number, unix_ns, values })
             }
             1 => {

@@ -27,7 +27,7 @@ impl RecordingSwitch {
         Ok(Self { subject: Arc::new(Subject::new(locator, source)?), reports, recorder: Arc::default() })
     }
 
-    /// What its recordings say of themselves.
+    /// Head of its recordings: version, source, channels, locator.
     pub fn head(&self) -> &Head {
         &self.subject.head
     }

@@ -75,7 +75,7 @@ impl Access {
     }
 
     /// The same, of a server that listens at this address.
-    pub(super) fn at(self, address: IpAddr) -> Self {
+    pub(super) fn listening_at(self, address: IpAddr) -> Self {
         Self { address: Some(address), ..self }
     }
 
@@ -209,7 +209,7 @@ mod tests {
     fn access(address: &str, token: Option<&str>) -> Result<Access, AccessError> {
         let address: SocketAddr = address.parse().unwrap();
         let access = Access::new(address, token.map(str::to_owned), vec!["bench.lab".to_owned()]);
-        access.map(|access| access.at(address.ip()))
+        access.map(|access| access.listening_at(address.ip()))
     }
 
     #[test]

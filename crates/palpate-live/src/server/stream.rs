@@ -20,7 +20,7 @@ const MOST_WAITING: usize = 1 << 20;
 /// A browser that takes nothing for so long is let go.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// What a browser wants.
+/// Query of a browser that follows the stream.
 #[derive(Debug, Deserialize)]
 pub struct Wish {
     #[serde(default)]

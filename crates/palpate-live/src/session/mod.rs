@@ -71,7 +71,7 @@ pub struct Session<'a> {
     contact: ContactWatch,
     health: HealthWatch,
     counters: Counters,
-    /// Whether the last reading was `no_contact`.
+    /// True after a reading of status `no_contact`.
     was_untouched: bool,
 }
 
@@ -222,7 +222,7 @@ impl<'a> Session<'a> {
         out.push(Output::Event(EventRecord { time_s, event }));
     }
 
-    /// Whether something touches, by the last readings.
+    /// True while something touches, by the last readings.
     pub fn is_touched(&self) -> bool {
         self.contact.is_touched()
     }

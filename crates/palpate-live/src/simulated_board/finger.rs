@@ -15,11 +15,11 @@ pub struct Finger {
     typical_n: f64,
     touch: Touch,
     script: Option<Vec<Waypoint>>,
-    /// Where a stage holds it: on the surface, or lifted.
+    /// Held by a stage: on the surface, or lifted.
     held: Option<Option<Contact>>,
 }
 
-/// Where a script has the finger at a time; lifted without a contact.
+/// Waypoint of a script: a time, and the contact then; lifted without one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Waypoint {
     time_s: f64,
@@ -34,7 +34,7 @@ pub struct ScriptError {
     pub line: usize,
     /// Its text.
     pub text: String,
-    /// What is wrong with it.
+    /// Its problem.
     pub problem: &'static str,
 }
 
@@ -135,7 +135,7 @@ impl Finger {
     /// Does what a line of a stage says: `finger x y force` in mm and N holds it there, `lift` lifts it, `reset` lets it go its own way again.
     ///
     /// # Errors
-    /// What is wrong with the line, in words.
+    /// Its problem, in words.
     pub fn obey(&mut self, line: &str) -> Result<(), &'static str> {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words.as_slice() {
@@ -188,7 +188,7 @@ impl Finger {
     }
 }
 
-/// Where a script has the finger: between two waypoints on the surface evenly on the way, else where the last one says.
+/// Contact of a script at a time: between two waypoints on the surface evenly on the way, else that of the last one.
 fn scripted(script: &[Waypoint], time_s: f64) -> Option<Contact> {
     let next = script.partition_point(|waypoint| waypoint.time_s <= time_s);
     let last = script.get(next.checked_sub(1)?)?;

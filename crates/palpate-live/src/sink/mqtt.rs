@@ -38,7 +38,7 @@ pub struct MqttUrl {
 pub struct MqttUrlError {
     /// The text.
     pub text: String,
-    /// What is wrong with it.
+    /// Its problem.
     pub problem: &'static str,
 }
 
@@ -115,7 +115,7 @@ impl MqttSink {
     /// A client of a broker, which need not be there yet. Rules publish their messages beside; troubles are told to the session through `reports`.
     ///
     /// # Errors
-    /// Where there is no thread for it.
+    /// No thread for it.
     pub fn new(
         url: &MqttUrl,
         channels: &[Channel],

@@ -83,7 +83,7 @@ impl Drop for Source {
     }
 }
 
-/// Where a source's thread puts what it brings.
+/// Outlet of a source's thread: takes its arrivals to the session.
 pub(crate) struct Outlet {
     to: SyncSender<Input>,
     clock: HostClock,

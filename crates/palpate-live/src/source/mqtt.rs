@@ -96,7 +96,7 @@ fn connection(broker: &Address) -> (AsyncClient, EventLoop) {
     (client, events)
 }
 
-/// What the broker says next, while `look` is called now and then; `None` once the source is to end.
+/// The broker's next packet, while `look` is called now and then; `None` once the source is to end.
 async fn next(
     outlet: &Outlet,
     events: &mut EventLoop,

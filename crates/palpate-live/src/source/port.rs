@@ -1,4 +1,4 @@
-//! What serial ports, TCP and UDP share: they are opened, read until they go away, and opened again.
+//! Ports of all kinds, serial, TCP and UDP: opened, read until they go away, and opened again.
 
 use super::{BackOff, LOOK, Outlet, forget};
 use crate::input::Arrival;
@@ -91,7 +91,7 @@ fn is_wait(error: &io::Error) -> bool {
 pub struct Stream<T> {
     /// The stream.
     pub stream: T,
-    /// What its end means.
+    /// Meaning of its end.
     pub end: &'static str,
 }
 

@@ -101,7 +101,7 @@ pub enum SourceUrlError {
     Parameter {
         /// The URL.
         text: String,
-        /// What is wrong with it, and what it may be.
+        /// Its problem, and the values allowed.
         problem: String,
     },
 }

@@ -42,7 +42,7 @@ impl Firmware {
         }
     }
 
-    /// What stops a machine at once: of GRBL bytes that it heeds in the middle of anything.
+    /// Bytes that stop a machine at once; those of GRBL are ones that it heeds in the middle of anything.
     const fn stop(self) -> &'static [u8] {
         match self {
             Self::Marlin => b"M112\n",
@@ -51,7 +51,7 @@ impl Firmware {
     }
 }
 
-/// Where a surface lies in a machine, and how fast it is pressed; lengths in metres, in the machine's coordinates.
+/// Place of a surface in a machine, and the speeds of pressing it; lengths in metres, in the machine's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageSetup {
     /// The finger's x and y over the surface's left support, or over its lower left corner.
@@ -60,7 +60,7 @@ pub struct StageSetup {
     pub touch_z_m: f64,
     /// Height above that at which it travels; greater than 0.
     pub clearance_m: f64,
-    /// How far it presses below that; greater than 0.
+    /// Depth of a press below that; greater than 0.
     pub depth_m: f64,
     /// Speed of travel in m/s; greater than 0.
     pub travel_m_per_s: f64,
@@ -93,12 +93,12 @@ pub enum StageError {
     /// Its line is broken.
     #[error("the line to the machine is broken: {0}")]
     Line(#[from] io::Error),
-    /// Nothing that it says names its firmware.
+    /// A machine whose words name no firmware.
     #[error(
         "the machine says neither that it is Marlin nor that it is GRBL; it said: {said:?}. Is the baud rate right?"
     )]
     Unknown {
-        /// What it said.
+        /// Its words.
         said: String,
     },
     /// It refused a line.
@@ -114,7 +114,7 @@ pub enum StageError {
     Silent {
         /// The line.
         line: String,
-        /// How long it was waited for.
+        /// Seconds that it was waited for.
         seconds: u64,
     },
     /// Somebody, or a limit, stopped it.

@@ -15,7 +15,7 @@ const MOST_WAITING: usize = 1 << 16;
 /// Longest line that moves the finger.
 const LONGEST: usize = 1 << 10;
 
-/// Where a simulated board is plugged in.
+/// Plug of a simulated board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LinkUrl {
     /// `-`: the standard output.
@@ -124,7 +124,7 @@ impl Link {
         Ok(Self { way, name, waiting: Vec::new(), received: Vec::new(), unread: 0 })
     }
 
-    /// Where it is reached: the path of a pseudo-terminal, the address of a socket.
+    /// Its name to whoever connects: the path of a pseudo-terminal, the address of a socket.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -132,7 +132,7 @@ impl Link {
     /// Sends a frame, without waiting for anybody.
     ///
     /// # Errors
-    /// Where the link is of no use any more, as stdout whose reader has gone.
+    /// The link is of no use any more, as stdout whose reader has gone.
     pub fn send(&mut self, frame: &[u8]) -> std::io::Result<()> {
         match &mut self.way {
             Way::Stdout(out) => {
@@ -201,7 +201,7 @@ impl Link {
     /// Goes away, as a board whose cable is pulled: a client is hung up, a pseudo-terminal closed and another opened. Datagrams and messages know no connection.
     ///
     /// # Errors
-    /// Where there is no other pseudo-terminal.
+    /// No other pseudo-terminal.
     pub fn disconnect(&mut self) -> std::io::Result<()> {
         self.drop_client();
         #[cfg(unix)]
