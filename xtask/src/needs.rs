@@ -66,8 +66,8 @@ pub const NODE: Need = Need {
     name: "Node with npm",
     variable: None,
     found: |_, _| {
-        let recent = "const [major, minor] = process.versions.node.split('.').map(Number); process.exit(major * 100 + minor < 2019)";
-        run::answers("node", &["-e", recent]) && run::answers("npm", &["--version"])
+        run::answer("node", &["--version"]).is_some_and(|version| is_recent_node(&version))
+            && run::answers("npm", &["--version"])
     },
     packages: &["nodejs", "npm"],
     without: Without::Skips {
@@ -177,6 +177,13 @@ impl Need {
     }
 }
 
+/// Whether what `node --version` prints, as `v20.19.1`, is 20.19 or later: what the dashboard's build asks for.
+fn is_recent_node(version: &str) -> bool {
+    let mut numbers =
+        version.trim().trim_start_matches('v').split('.').map_while(|number| number.parse::<u32>().ok());
+    matches!((numbers.next(), numbers.next()), (Some(major), Some(minor)) if (major, minor) >= (20, 19))
+}
+
 fn may_install() -> bool {
     Path::new("/etc/debian_version").exists() && run::answers("apt-get", &["--version"]) && is_root()
 }
@@ -203,6 +210,16 @@ mod tests {
         let install = "apt-get -y -qq install --no-install-recommends chromium fonts-dejavu-core";
         assert!(commands[1].ends_with(install), "{commands:?}");
         assert!(commands.iter().all(|command| command.contains("DEBIAN_FRONTEND=noninteractive")));
+    }
+
+    #[test]
+    fn node_is_recent_from_20_19_on() {
+        for recent in ["v20.19.0\n", "v20.20.2", "v22.1.0", "v100.0.0"] {
+            assert!(is_recent_node(recent), "{recent}");
+        }
+        for old in ["v20.18.3", "v18.20.4\n", "", "v", "node"] {
+            assert!(!is_recent_node(old), "{old}");
+        }
     }
 
     #[test]
