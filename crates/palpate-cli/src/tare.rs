@@ -11,7 +11,7 @@ use palpate_estimators::fit::{FitTask, Locate};
 use palpate_estimators::influence::Influence;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
-use palpate_mechanics::units::Quantity;
+use palpate_mechanics::units::{Quantity, format_count};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -92,7 +92,7 @@ pub struct Taring<'a> {
     locator: &'a Locator,
     source: Source,
     tare: Tare<Vec<f64>>,
-    /// Readings that have made the baseline.
+    /// Readings that have made the baseline, or, where it is followed, untouched readings that were found.
     count: u64,
     /// The first of them, to see whether they are untouched ones.
     kept: Vec<Vec<f64>>,
@@ -162,7 +162,8 @@ impl<'a> Taring<'a> {
             Source::First(_) | Source::File(_) => self.tare.apply(reading, &mut self.tared)?,
             Source::Auto => {
                 let method = &self.locator.method;
-                self.tare.follow(reading, &mut self.tared, |tared| method.locate(tared))?;
+                let estimate = self.tare.follow(reading, &mut self.tared, |tared| method.locate(tared))?;
+                self.count += u64::from(estimate.status == Status::NoContact);
             }
         }
         reading.copy_from_slice(&self.tared);
@@ -206,11 +207,26 @@ impl<'a> Taring<'a> {
         let Some((channel, value)) = most else { return };
         let sensor = &self.locator.setup.layout().sensors()[channel];
         let from = match self.source {
-            Source::Auto => "found untouched readings".to_owned(),
+            Source::Auto => format!("{} untouched readings that were found", format_count(self.count)),
             Source::First(_) | Source::File(_) => format!("the mean of {} readings", self.count),
         };
         let moved = Quantity { value, dimension: sensor.kind.dimension() };
         remark!("palpate: tare from {from}; {} has moved most, by {moved}", sensor.name);
+    }
+
+    /// Says what was followed, and warns where too few readings were untouched for a baseline.
+    fn say_followed(&self, source: &str) {
+        if self.count > 0 {
+            self.say();
+        }
+        if self.count < u64::from(Tare::<Vec<f64>>::SETTLED) {
+            let found = if self.count == 0 { "no".to_owned() } else { format!("only {}", self.count) };
+            remark!(
+                "palpate: warning: --tare auto found {found} untouched reading{} in {source}, and so the baseline may be that of a touch; \
+                 leave the surface alone for a moment, or tare by --tare N or --tare FILE",
+                if self.count > 1 { "s" } else { "" }
+            );
+        }
     }
 
     /// The end of the readings of `source`.
@@ -226,7 +242,7 @@ impl<'a> Taring<'a> {
                 );
                 return Err(Complaint::new(complaint).help("give fewer, or record longer").into());
             }
-            Source::Auto => self.say(),
+            Source::Auto => self.say_followed(source),
             Source::First(_) | Source::File(_) => {}
         }
         Ok(())

@@ -242,13 +242,16 @@ pub fn format_count(count: u64) -> String {
     text
 }
 
-/// A length in metres as people read it: millimetres with at most four decimals, "44.4444 mm".
+/// A length in metres as people read it: millimetres with at most four decimals, "44.4444 mm", and scientific from 10¹⁵ mm on.
 pub fn format_length_mm(length_m: f64) -> String {
     format!("{} mm", rounded(length_m * 1e3, 4))
 }
 
-/// Decimal notation with at most `decimals` decimals and no trailing zeros.
+/// Decimal notation with at most `decimals` decimals and no trailing zeros; scientific where that would be a row of zeros.
 fn rounded(value: f64, decimals: usize) -> String {
+    if value.abs() >= 1e15 {
+        return format!("{value:.decimals$e}");
+    }
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }

@@ -97,6 +97,26 @@ fn what_a_tare_takes_is_said_and_its_rows_stay_in_their_places() {
 }
 
 #[test]
+fn an_automatic_tare_says_how_many_untouched_readings_it_found() {
+    let (folder, mut board) = fitted();
+    let touch = Touch { position_mm: 150.0, force_n: 2.0 };
+    let mut told = |touches: &[Touch]| {
+        fs::write(folder.path().join("few.csv"), board.recording(touches)).unwrap();
+        let output = run(folder.path(), &["locate", "board.json", "few.csv", "--tare", "auto"]);
+        said(&output);
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let touched = told(&[touch; 30]);
+    assert!(touched.contains("found no untouched reading in few.csv"), "{touched}");
+    assert!(!touched.contains("moved most"), "{touched}");
+    let short = told(&[[Touch::NONE; 5].as_slice(), &[touch; 30]].concat());
+    assert!(short.contains("found only 5 untouched readings") && short.contains("moved most"), "{short}");
+    let enough = told(&[[Touch::NONE; 60].as_slice(), &[touch; 30]].concat());
+    assert!(enough.contains("tare from 60 untouched readings that were found"), "{enough}");
+    assert!(!enough.contains("warning"), "{enough}");
+}
+
+#[test]
 fn bad_tares_are_refused() {
     let (folder, mut board) = fitted();
     let file = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();

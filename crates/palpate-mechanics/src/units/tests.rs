@@ -101,6 +101,7 @@ fn quantities_are_shown_with_a_readable_prefix() {
     ];
     assert_eq!(shown, expected);
     assert_eq!([format_length_mm(0.4 / 9.0), format_length_mm(-1e-9)], ["44.4444 mm", "0 mm"]);
+    assert_eq!(format_length_mm(1.7976931348623157e305), "1.7977e308 mm");
 }
 
 const SYMBOLS: [&str; 8] = ["", "nm", "um", "mm", "kN", "GPa", "ue", "%"];
