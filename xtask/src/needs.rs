@@ -106,7 +106,7 @@ const NEEDS: [Need; 7] = [
         found: |_, named| named.unwrap_or(Path::new("/usr/sbin/mosquitto")).is_file(),
         packages: &["mosquitto"],
         without: Without::Skips {
-            tests: &["crates/palpate-live/tests/sources.rs"],
+            tests: &["crates/palpate-live/tests/connections/broker.rs"],
             remedy: "install Debian's mosquitto, or name the program in PALPATE_MOSQUITTO",
         },
     },

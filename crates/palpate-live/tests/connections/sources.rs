@@ -1,0 +1,149 @@
+//! Sources over real parts: a pseudo-terminal and sockets; devices that go away and come back.
+
+use crate::bench::{Bench, PATIENCE, lines};
+use palpate_live::input::Arrival;
+use palpate_live::source::{SendError, Source};
+use palpate_live::stamp::HostClock;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream, UdpSocket};
+use std::path::Path;
+use std::sync::mpsc::sync_channel;
+use std::time::{Duration, Instant};
+
+/// The least of several, which other work on the machine has delayed least.
+fn least(times: usize, measure: impl Fn() -> Duration) -> Duration {
+    (0..times).map(|_| measure()).min().unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_serial_port_is_read_unplugged_and_read_again() {
+    use serialport::{SerialPort, TTYPort};
+    let folder = tempfile::tempdir().unwrap();
+    let device = folder.path().join("board");
+    let plug = || {
+        let (board, host) = TTYPort::pair().unwrap();
+        let _ = std::fs::remove_file(&device);
+        std::os::unix::fs::symlink(host.name().unwrap(), &device).unwrap();
+        board
+    };
+    let bench = Bench::open(&format!("serial://{}?baud=115200", device.display()));
+    let why = bench.lost();
+    assert!(why.contains("board") && why.contains("as soon as it is plugged in"), "{why}");
+    assert_eq!(bench.source.send(b"x"), Err(SendError::Away));
+    for _ in 0..2 {
+        let mut board = plug();
+        board.set_timeout(PATIENCE).unwrap();
+        bench.opened();
+        let sent = lines(0..2000);
+        let mut taken = Vec::new();
+        for part in sent.chunks(1000) {
+            board.write_all(part).unwrap();
+            taken.extend(bench.bytes(part.len()));
+        }
+        assert_eq!(taken, sent);
+        bench.source.send(b"zero\n").unwrap();
+        let mut command = [0; 5];
+        board.read_exact(&mut command).unwrap();
+        assert_eq!(&command, b"zero\n");
+        drop(board);
+        bench.lost();
+    }
+}
+
+#[test]
+fn a_server_that_goes_away_is_connected_to_again() {
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let at = server.local_addr().unwrap();
+    let bench = Bench::open(&format!("tcp://{at}"));
+    let serve = |server: &TcpListener| -> TcpStream {
+        let (mut board, _) = server.accept().unwrap();
+        bench.opened();
+        let sent = lines(0..20_000);
+        std::thread::scope(|scope| {
+            scope.spawn(|| board.write_all(&sent).unwrap());
+            assert_eq!(bench.bytes(sent.len()), sent);
+        });
+        bench.source.send(b"zero\n").unwrap();
+        let mut command = [0; 5];
+        board.read_exact(&mut command).unwrap();
+        assert_eq!(&command, b"zero\n");
+        board
+    };
+    drop(serve(&server));
+    let why = bench.lost();
+    assert!(why.contains("closed the connection"), "{why}");
+    drop(serve(&server));
+    // Now nobody listens for a while.
+    drop(server);
+    bench.lost();
+    let why = bench.lost();
+    assert!(why.contains("cannot connect to 127.0.0.1"), "{why}");
+    let server = loop {
+        if let Ok(server) = TcpListener::bind(at) {
+            break server;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    };
+    serve(&server);
+}
+
+#[test]
+fn datagrams_are_messages() {
+    let port = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let bench = Bench::open(&format!("udp://127.0.0.1:{port}"));
+    bench.opened();
+    assert_eq!(bench.source.send(b"x"), Err(SendError::OneWay));
+    let board = UdpSocket::bind("127.0.0.1:0").unwrap();
+    for n in 0..1000 {
+        let message = lines(n..n + 1);
+        board.send_to(&message, ("127.0.0.1", port)).unwrap();
+        assert_eq!(bench.next(), Arrival::Message(message));
+    }
+}
+
+#[test]
+fn every_source_ends_within_100_ms() {
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let at = server.local_addr().unwrap();
+    let udp = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let urls = [
+        format!("tcp://{at}"),
+        // Nobody answers at an address for documentation (RFC 5737).
+        "tcp://192.0.2.1:5000".to_owned(),
+        "mqtt://192.0.2.1/values".to_owned(),
+        format!("udp://127.0.0.1:{udp}"),
+        "serial:///dev/no-such-port".to_owned(),
+    ];
+    for url in urls {
+        let took = least(5, || {
+            let bench = Bench::open(&url);
+            std::thread::sleep(Duration::from_millis(150));
+            bench.end()
+        });
+        assert!(took < Duration::from_millis(100), "{url}: {took:?}");
+    }
+}
+
+#[test]
+fn a_source_ends_while_the_session_is_behind() {
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let (to, _arrivals) = sync_channel(1);
+    let url = format!("tcp://{}", server.local_addr().unwrap()).parse().unwrap();
+    let source = Source::open(&url, Path::new("."), HostClock::new(), to).unwrap();
+    let (mut board, _) = server.accept().unwrap();
+    board.set_write_timeout(Some(Duration::from_millis(300))).unwrap();
+    // Nobody takes arrivals, so that at some time the board cannot send any more: nothing grows without bound.
+    let mut sent = 0;
+    while board.write_all(&[b'1'; 1 << 16]).is_ok() {
+        sent += 1 << 16;
+        assert!(sent < 1 << 30, "{sent} bytes went somewhere");
+    }
+    drop(source);
+    let start = Instant::now();
+    board.set_write_timeout(Some(PATIENCE)).unwrap();
+    // The source closes the connection as it ends.
+    while board.write_all(&[b'1'; 1 << 16]).is_ok() {
+        assert!(start.elapsed() < PATIENCE);
+    }
+}
