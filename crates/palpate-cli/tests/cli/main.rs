@@ -10,6 +10,7 @@ mod digit;
 mod init;
 mod learnt;
 mod limit;
+mod live;
 mod nuisances;
 mod outputs;
 mod plane;

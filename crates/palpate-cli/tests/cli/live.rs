@@ -1,0 +1,136 @@
+//! `record`, `replay` and `simulated-board` from outside: what is recorded is located again, and a killed process leaves a file that opens.
+
+use crate::support::command::{complained, folder, palpate, run, said};
+use crate::support::examples::NOISY_BEAM;
+use serde_json::Value;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// A thousand readings a second of a simulated board.
+const BOARD: &str = "simulated:rig.toml?rate=1000";
+
+/// A folder with a rig and its locator.
+fn bench() -> TempDir {
+    let folder = folder(NOISY_BEAM);
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    folder
+}
+
+/// Lines of JSON.
+fn objects(text: &str) -> Vec<Value> {
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+#[test]
+fn a_recording_is_located_again_to_the_last_bit() {
+    let folder = bench();
+    let record = ["record", "locator.json", "--from", BOARD, "--out", "press.mcap"];
+    let told = said(&run(folder.path(), &[&record[..], &["--seconds", "1.5", "--json"]].concat()));
+    let samples: Vec<Value> =
+        objects(&told).into_iter().filter(|object| object["event"].is_null()).collect();
+    assert!(samples.len() > 500, "{}", samples.len());
+
+    let output = run(folder.path(), &["replay", "press.mcap", "--json"]);
+    let replayed = objects(&said(&output));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("each as recorded to the last bit"));
+    assert_eq!(replayed.len(), samples.len());
+    for (again, sample) in replayed.iter().zip(&samples) {
+        for key in ["number", "time_s", "x_mm", "x_95_mm", "status"] {
+            assert_eq!(again[key], sample[key], "{key}: {sample}");
+        }
+    }
+    let rows = said(&run(folder.path(), &["replay", "press.mcap"]));
+    assert_eq!(rows.lines().count(), samples.len() + 1);
+
+    // The file is a source, as fast as the session takes it; and nothing is written over.
+    let again = ["record", "locator.json", "--from", "file:press.mcap?speed=0", "--out", "again.mcap"];
+    said(&run(folder.path(), &again));
+    assert_eq!(said(&run(folder.path(), &["replay", "again.mcap"])).lines().count(), rows.lines().count());
+    let refused = complained(&run(folder.path(), &record), 2);
+    assert!(refused.contains("press.mcap: it is there already"), "{refused}");
+}
+
+/// Begins to record with lines of JSON on stdout.
+fn begin(folder: &Path) -> Child {
+    let arguments = ["record", "locator.json", "--from", BOARD, "--out", "press.mcap", "--json"];
+    palpate(folder).args(arguments).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+#[test]
+fn a_killed_process_loses_the_last_tenth_of_a_second_at_most() {
+    let folder = bench();
+    let mut child = begin(folder.path());
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let start = Instant::now();
+    let mut told = Vec::new();
+    while start.elapsed() < Duration::from_secs(2) || told.len() < 1000 {
+        told.push(lines.next().unwrap().unwrap());
+    }
+    // SIGKILL: nothing of the process runs any more.
+    child.kill().unwrap();
+    child.wait().unwrap();
+    told.extend(lines.map_while(Result::ok));
+    // The last line may be torn.
+    let last = told.iter().rev().find_map(|line| serde_json::from_str::<Value>(line).ok()).unwrap();
+    let kept = objects(&said(&run(folder.path(), &["replay", "press.mcap", "--json"])));
+    let time = |object: &Value| object["time_s"].as_f64().unwrap();
+    let lost_s = time(&last) - time(kept.last().unwrap());
+    println!("{} readings kept, the last {:.0} ms lost", kept.len(), 1e3 * lost_s);
+    assert!(lost_s < 0.1, "{lost_s} s lost");
+}
+
+#[test]
+fn a_board_over_tcp_is_recorded_with_its_faults() {
+    let folder = bench();
+    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let to = format!("tcp://:{port}");
+    let arguments =
+        ["simulated-board", "rig.toml", "--to", &to, "--rate", "500 Hz", "--drop", "0.02", "--torn", "0.02"];
+    let mut board = palpate(folder.path())
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let from = format!("tcp://127.0.0.1:{port}");
+    let record =
+        ["record", "locator.json", "--from", &from, "--out", "press.mcap", "--seconds", "3"];
+    let told = said(&run(folder.path(), &record));
+    board.kill().unwrap();
+    board.wait().unwrap();
+    let number = |after: &str| -> u64 {
+        let end = told.find(after).unwrap();
+        let text = told[..end].trim_end().rsplit(' ').next().unwrap();
+        text.replace(',', "").parse().unwrap()
+    };
+    assert!(number("readings in") > 200, "{told}");
+    assert!(number("bad frames") > 0, "{told}");
+}
+
+#[test]
+fn bad_input_is_refused_with_its_place() {
+    let folder = bench();
+    let refused = |arguments: &[&str]| complained(&run(folder.path(), arguments), 2);
+    let record = ["record", "locator.json", "--out", "never.mcap", "--from"];
+    for (url, what) in [
+        ("serial://", "serial://"),
+        ("carrier-pigeon://roof", "carrier-pigeon://roof"),
+        ("simulated:rig.toml?rate=0", "rate"),
+        ("tcp://host:99999", "99999"),
+    ] {
+        let told = refused(&[&record[..], &[url]].concat());
+        assert!(told.contains(what), "{url}: {told}");
+    }
+    fs::write(folder.path().join("rules.toml"), "[[rule]]\nname = \"a\"\nx = [\"0 mm\", \"9 N\"]\n").unwrap();
+    let rules = ["simulated:rig.toml", "--mqtt", "mqtt://127.0.0.1:1/a", "--rules", "rules.toml"];
+    let told = refused(&[&record[..], &rules].concat());
+    assert!(told.contains("rules.toml:3:"), "{told}");
+    fs::write(folder.path().join("no.mcap"), "no recording").unwrap();
+    let told = refused(&["replay", "no.mcap"]);
+    assert!(told.contains("no.mcap"), "{told}");
+    assert!(!folder.path().join("never.mcap").exists());
+}

@@ -1,0 +1,19 @@
+//! Any bytes, read as a recording: refused in words, or read to its end.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use palpate_live::recording::{Playback, read};
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+/// A file of this process, which every input is written over.
+static PATH: LazyLock<PathBuf> =
+    LazyLock::new(|| std::env::temp_dir().join(format!("palpate-fuzz-{}.mcap", std::process::id())));
+
+fuzz_target!(|bytes: &[u8]| {
+    std::fs::write(&*PATH, bytes).expect("the temporary folder can be written");
+    if let Ok(mut playback) = Playback::open(&PATH) {
+        while let Ok(Some(_)) = playback.next_recorded() {}
+        let _ = read(&PATH, 0.0, 1e9, 50);
+    }
+});

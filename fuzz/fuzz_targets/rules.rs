@@ -1,0 +1,12 @@
+//! Any text, read as a rule file: an error's place lies in the text, and a rule that is accepted can be published.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use palpate_live::rules::Rules;
+
+fuzz_target!(|text: &str| {
+    if let Err(error) = Rules::from_toml(text) {
+        let span = error.span.clone().unwrap_or(0..0);
+        assert!(text.get(span).is_some(), "{error:?}");
+    }
+});
