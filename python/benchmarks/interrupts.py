@@ -52,17 +52,16 @@ def calls() -> Iterator[tuple[str, Call]]:
     """Everything that takes long, with sizes that take some seconds."""
     beam = pp.Setup(pp.Beam("400 mm", "40 mm", "1.2 mm", "200 GPa"), pp.deflection(8, noise="5 um"), force="3 N")
     few, many = beam.simulate(pp.even(10), repeats=10), beam.simulate(pp.even(300), repeats=10)
-    fine = pp.Setup(
-        pp.Plate("300 mm", "200 mm", "2 mm", "70 GPa", 0.33, edges="simple", elements=128), pp.deflection((4, 4), noise="0.1 um"), force="5 N"
-    )
-    plate = pp.Setup(
-        pp.Plate("300 mm", "200 mm", "2 mm", "70 GPa", 0.33, edges="simple", elements=24), pp.deflection((4, 4), noise="0.1 um"), force="5 N"
-    )
+
+    def plate_of(elements: int) -> pp.Setup:
+        """A plate that is not solved yet: once it is, it stays so."""
+        surface = pp.Plate("300 mm", "200 mm", "2 mm", "70 GPa", 0.33, edges="simple", elements=elements)
+        return pp.Setup(surface, pp.deflection((4, 4), noise="0.1 um"), force="5 N")
+
+    plate = plate_of(24)
     on_plate = plate.simulate(pp.grid(30, 20), repeats=5)
     measured = pp.Setup(pp.Measured("400 mm"), pp.raw(8))
     with_forces = measured.recording(many.readings, many.x, force=many.force * np.tile([1.0, 1.5, 2.0], 1000))
-
-    on_fine = fine.recording(on_plate.readings, on_plate.x, on_plate.y, force=5.0)
 
     yield "fit, Network", lambda: pp.Network(aggregate_error=1e-12, max_epochs=2_000_000_000).fit(few)
     yield "fit_many, Network", lambda: pp.Network(aggregate_error=1e-12, max_epochs=2_000_000).fit_many(few, range(100))
@@ -70,23 +69,24 @@ def calls() -> Iterator[tuple[str, Call]]:
     yield "fit, GaussianProcess", lambda: pp.GaussianProcess().fit(many)
     yield "fit, Influence of a beam", lambda: pp.Influence().fit(beam.simulate(pp.even(300), repeats=100))
     yield "fit, Influence of a plate", lambda: pp.Influence().fit(on_plate)
-    yield "fit, Influence of a fine plate", lambda: pp.Influence().fit(on_fine)
+    yield "fit, Influence of a fine plate", lambda: pp.Influence().fit(plate_of(128).recording(on_plate.readings, on_plate.x, on_plate.y, force=5.0))
     yield "fit, Influence of a measured surface", lambda: pp.Influence().fit(with_forces)
     yield "fit, Neighbours", lambda: pp.Neighbours().fit(beam.simulate(pp.even(300), repeats=100))
     yield "fit, ClosedForm", lambda: pp.ClosedForm().fit(beam.simulate(pp.even(300), repeats=100))
     yield "fit, Centroid", lambda: pp.Centroid().fit(beam.simulate(pp.even(300), repeats=100))
     yield "fit, Auto", lambda: pp.Auto().fit(many)
 
-    yield "limit of a fine plate", lambda: pp.limit(fine)
+    yield "limit of a fine plate", lambda: pp.limit(plate_of(128))
     yield "limit, every 1 mm", lambda: pp.limit(plate, every="1 mm")
     yield "place_sensors", lambda: pp.place_sensors(beam, sites="0.5 mm", verify=50)
-    yield "place_sensors on a fine plate", lambda: pp.place_sensors(fine)
+    yield "place_sensors on a fine plate", lambda: pp.place_sensors(plate_of(128))
     yield "place_training", lambda: pp.place_training(beam, count=10)
     yield "next_press", lambda: pp.next_press(plate.simulate(pp.grid(6, 5)))
     yield "compare", lambda: pp.compare(many)
     yield "cross_validate", lambda: pp.cross_validate(pp.GaussianProcess(), many)
     yield "study", lambda: pp.Study("paper").run(100)
-    yield "simulate on a fine plate", lambda: fine.simulate(pp.grid(30, 20), repeats=10)
+    yield "simulate on a fine plate", lambda: plate_of(128).simulate(pp.grid(30, 20), repeats=10)
+    yield "simulate on a plate of 256 elements", lambda: plate_of(256).simulate(pp.grid(30, 20), repeats=10)
     yield "simulate, 4 million readings", lambda: beam.simulate(pp.even(400), repeats=10_000)
     motion = pp.Motion("50 mm", "350 mm", speed="0.2 m/s", passes=20)
     yield "simulate_moving", lambda: pp.simulate_moving(beam, motion, rate="5 kHz", density="7850 kg/m3")
@@ -103,7 +103,8 @@ def calls() -> Iterator[tuple[str, Call]]:
     yield "evaluate", lambda: of_plate.evaluate(again)
     yield "tare, 300,000 readings", lambda: locator.tare(readings[:300_000])
     yield "load_profile", lambda: locator.load_profile(many.readings)
-    yield "simulate_loads", lambda: pp.simulate_loads(fine, pp.UniformLoad(["50 mm", "50 mm"], ["100 mm", "80 mm"], "5 N"), repeats=1000)
+    patch = pp.UniformLoad(["50 mm", "50 mm"], ["100 mm", "80 mm"], "5 N")
+    yield "simulate_loads on a fine plate", lambda: pp.simulate_loads(plate_of(128), patch, repeats=1000)
 
 
 def main() -> None:

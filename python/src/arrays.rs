@@ -19,12 +19,27 @@ pub enum Readings<'py> {
     Many(PyReadonlyArray2<'py, f64>),
 }
 
-/// Readings by these channels: an array of the shape (channels) or (readings, channels), or whatever makes one; of a data frame the columns
-/// of the channels.
+/// Readings by these channels, of which there is at least one: an array of the shape (channels) or (readings, channels), or whatever makes
+/// one; of a data frame the columns of the channels.
 ///
 /// # Errors
 /// `ValueError` with shapes and bounds for another shape, and for what is no array of numbers.
 pub fn readings<'py>(value: &Bound<'py, PyAny>, channels: &[String]) -> PyResult<Readings<'py>> {
+    let readings = readings_or_none(value, channels)?;
+    match &readings {
+        Readings::Many(many) if many.shape()[0] == 0 => Err(refused(format!(
+            "readings of the shape {} have 0 rows; there must be at least 1",
+            in_words(many.shape())
+        ))),
+        _ => Ok(readings),
+    }
+}
+
+/// The same, of which there may be none.
+///
+/// # Errors
+/// As of [`readings`], but for the number of rows.
+pub fn readings_or_none<'py>(value: &Bound<'py, PyAny>, channels: &[String]) -> PyResult<Readings<'py>> {
     let array = if is_plain(value) {
         value.clone()
     } else {

@@ -8,7 +8,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use palpate::estimators::fit::ReadingError;
 use palpate::estimators::recording::{self, Row};
 use palpate::estimators::setup;
-use palpate::estimators::simulate::{CleanSensors, simulate_contacts};
+use palpate::estimators::simulate::{CleanSensors, SimulateError, simulate_contacts_watched};
 use palpate::mechanics::contact::{Contact, OffSurface, Position};
 use palpate::mechanics::surface::{Extent, SurfaceSpec};
 use palpate::mechanics::units::format_length_mm;
@@ -23,6 +23,7 @@ use crate::quantities::force_n;
 use crate::sections;
 use crate::surface;
 use crate::training::{self, Training, checked_force};
+use crate::work;
 
 /// A surface with its sensors, all checked: what a reading comes from.
 ///
@@ -227,7 +228,7 @@ impl Setup {
         if let Some(force) = force {
             training = training.with_force(checked_force(&force)?);
         }
-        let recording = py.detach(|| self.0.simulate(&training, seed)).map_err(refused)?;
+        let recording = work::run_quietly(py, |watch| self.0.simulate_watched(&training, seed, watch))?;
         Ok(Recording::new(self.0.clone(), recording))
     }
 
@@ -263,8 +264,9 @@ impl Setup {
             .zip(forces_n)
             .map(|(position, force_n)| Contact { position, force_n })
             .collect();
-        let recording =
-            py.detach(|| simulate_contacts(&self.0, &contacts, repeats, seed)).map_err(refused)?;
+        let recording = work::run_quietly(py, |watch| {
+            simulate_contacts_watched(&self.0, &contacts, repeats, seed, watch)
+        })?;
         Ok(Recording::new(self.0.clone(), recording))
     }
 
@@ -295,15 +297,15 @@ impl Setup {
         };
         let model = self.0.surface().model().ok_or_else(|| refused("a measured surface has no model"))?;
         OffSurface::check("position", &positions, self.extent()).map_err(refused)?;
-        let readings = py.detach(|| {
-            model.check_solution().map_err(refused)?;
-            let sensors = CleanSensors::new(model, self.0.layout());
-            let contacts = positions.iter().zip(&forces_n);
-            Ok::<_, PyErr>(
-                contacts
-                    .flat_map(|(&position, &force_n)| sensors.reading(Contact { position, force_n }))
-                    .collect::<Vec<f64>>(),
-            )
+        let readings = work::run_quietly(py, |watch| {
+            model.check_solution_watched(watch)?;
+            let sensors = CleanSensors::new_watched(model, self.0.layout(), watch)?;
+            let mut readings: Vec<f64> = Vec::new();
+            for (&position, &force_n) in positions.iter().zip(&forces_n) {
+                watch.round()?;
+                readings.extend(sensors.reading(Contact { position, force_n }));
+            }
+            Ok::<_, SimulateError>(readings)
         })?;
         readings.to_pyarray(py).reshape([positions.len(), self.0.layout().len()])
     }
@@ -457,7 +459,7 @@ impl Setup {
         nuisance: Option<&Bound<'py, PyAny>>,
         time: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Recording> {
-        let Readings::Many(readings) = arrays::readings(readings, &self.channels())? else {
+        let Readings::Many(readings) = arrays::readings_or_none(readings, &self.channels())? else {
             return Err(refused(format!(
                 "readings of one dimension; a recording has the shape (rows, {})",
                 self.0.layout().len()

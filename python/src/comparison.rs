@@ -132,11 +132,12 @@ pub fn compare<'py>(
             return Err(refused("`calibrations` is 0; it must be at least 1"));
         }
         (None, Some(training)) => {
-            let trials = py.detach(|| {
-                Calibration::from_training(bench, &training.0)?.at_forces_of_use().trials(calibrations, seed)
+            let trials = work::run_quietly(py, |watch| {
+                let calibration = Calibration::from_training(bench, &training.0)?.at_forces_of_use();
+                calibration.trials_watched(calibrations, seed, watch)
             });
             let how = format!("{calibrations} simulated calibrations");
-            (trials.map_err(refused)?, "simulation".to_owned(), how)
+            (trials?, "simulation".to_owned(), how)
         }
         (None, None) => {
             return Err(refused("nothing to compare on: give a recording, or `training` to simulate it"));

@@ -7,7 +7,7 @@ use palpate::estimators::estimator::{
 };
 use palpate::estimators::fit::ReadingError;
 use palpate::estimators::setup;
-use palpate::estimators::simulate::simulate_loads as simulate;
+use palpate::estimators::simulate::simulate_loads_watched as simulate;
 use palpate::mechanics::contact::Position;
 use palpate::mechanics::surface::{Extent, UniformLoad};
 use palpate::rig::RigSections;
@@ -42,8 +42,8 @@ pub fn load_profile<'py>(
     let channels = setup.layout().len();
     let told = work::run_with(py, progress, None, |watch| {
         let sensors = match &subject {
-            Subject::Locator(locator) => locator.load_sensors(),
-            other => LoadSensors::from_setup(other.setup()),
+            Subject::Locator(locator) => locator.load_sensors_watched(watch),
+            other => LoadSensors::from_setup_watched(other.setup(), watch),
         };
         let profiler = Profiler::new(sensors.map_err(Refused::Sensors)?);
         let of_truth = patch_limits(profiler.sensors(), &truth);
@@ -97,7 +97,7 @@ pub fn simulate_loads<'py>(
     if repeats == 0 {
         return Err(refused("`repeats` is 0; it must be at least 1"));
     }
-    let readings = py.detach(|| simulate(setup, &loads, repeats, seed)).map_err(refused)?;
+    let readings = work::run_quietly(py, |watch| simulate(setup, &loads, repeats, seed, watch))?;
     Fields::of_rows(py, &readings)
 }
 

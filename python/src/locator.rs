@@ -9,7 +9,7 @@ use palpate::estimators::batch::{BLOCK, BatchError, BatchOptions};
 use palpate::estimators::estimator;
 use palpate::estimators::evaluation;
 use palpate::estimators::setup;
-use palpate::estimators::simulate::simulate_at;
+use palpate::estimators::simulate::simulate_at_watched;
 use palpate::numerics::watch::Watch;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -174,7 +174,9 @@ impl Locator {
                 return Err(refused("`tare` needs a recording: simulated readings do not drift"));
             }
             None => {
-                let simulated = py.detach(|| simulate_at(&self.setup, &all_over(extent), 1, seed));
+                let simulated = work::run_quietly(py, |watch| {
+                    simulate_at_watched(&self.setup, &all_over(extent), 1, seed, watch)
+                });
                 made =
                     simulated.map_err(|error| refused(format!("{error}; give a recording to judge by")))?;
                 &made

@@ -8,9 +8,10 @@ use palpate::rig;
 use pyo3::prelude::*;
 
 use crate::bench::{Recording, Setup};
-use crate::errors::{io_error, of_rig, refused};
+use crate::errors::{io_error, of_rig};
 use crate::estimator::Estimator;
 use crate::training::Training;
+use crate::work;
 
 /// A rig: surface, sensors, contact, training positions and estimator of one TOML file.
 ///
@@ -97,7 +98,7 @@ impl Rig {
     /// Recording
     #[pyo3(signature = (*, seed=0))]
     fn simulate(&self, py: Python<'_>, seed: u64) -> PyResult<Recording> {
-        let recording = py.detach(|| self.inner.simulate(seed)).map_err(refused)?;
+        let recording = work::run_quietly(py, |watch| self.inner.simulate_watched(seed, watch))?;
         Ok(Recording::new(self.setup.clone(), recording))
     }
 

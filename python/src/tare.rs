@@ -4,10 +4,24 @@ use numpy::{PyArray1, PyArrayMethods};
 use palpate::estimators::estimator::{Locator, Tare, TareError};
 use palpate::estimators::fit::Locate;
 use palpate::estimators::recording::Recording;
+use palpate::numerics::watch::{Cancelled, Watch};
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Readings};
 use crate::errors::refused;
+use crate::work;
+
+/// Readings between two looks for Ctrl-C.
+const READINGS_EACH: usize = 256;
+
+/// The cause for which readings were not tared.
+#[derive(Debug, thiserror::Error)]
+enum Stopped {
+    #[error("{0}")]
+    Tare(#[from] TareError),
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+}
 
 /// Readings less what the channels read untouched today, as `untouched` says, and what calibration learnt that they do added.
 ///
@@ -27,22 +41,30 @@ pub fn tare<'py>(
         Readings::Many(many) => (many.as_slice()?, Some(many.as_array().nrows())),
     };
     let mut tared = vec![0.0; values.len()];
-    let slots = || values.chunks_exact(channels.len());
     match untouched {
-        Some(untouched) => {
-            add_untouched(&mut tare, untouched, channels)?;
-            let apply = |(reading, tared): (&[f64], &mut [f64])| tare.apply(reading, tared);
-            py.detach(|| slots().zip(tared.chunks_exact_mut(channels.len())).try_for_each(apply))
-                .map_err(refused)?;
+        Some(untouched) => add_untouched(&mut tare, untouched, channels)?,
+        None => check_tells_untouched(locator, "give `untouched`")?,
+    }
+    let follows = untouched.is_none();
+    let mut taring = |watch: Watch<'_>| -> Result<(), Stopped> {
+        let slots = values.chunks_exact(channels.len()).zip(tared.chunks_exact_mut(channels.len()));
+        for (i, (reading, tared)) in slots.enumerate() {
+            if i.is_multiple_of(READINGS_EACH) {
+                watch.round()?;
+            }
+            if follows {
+                tare.follow(reading, tared, |tared| locator.method.locate(tared))?;
+            } else {
+                tare.apply(reading, tared)?;
+            }
         }
-        None => {
-            check_tells_untouched(locator, "give `untouched`")?;
-            let follow = |(reading, tared): (&[f64], &mut [f64])| {
-                tare.follow(reading, tared, |tared| locator.method.locate(tared)).map(|_| ())
-            };
-            py.detach(|| slots().zip(tared.chunks_exact_mut(channels.len())).try_for_each(follow))
-                .map_err(refused)?;
-        }
+        Ok(())
+    };
+    if rows.is_none_or(|rows| rows <= READINGS_EACH) {
+        // A thread of its own would take longer.
+        py.detach(|| taring(Watch::NONE)).map_err(refused)?;
+    } else {
+        work::run_quietly(py, taring)?;
     }
     let array = PyArray1::from_vec(py, tared);
     Ok(match rows {
@@ -62,6 +84,7 @@ pub fn tared_recording(
     recording: &Recording,
     tare: &Bound<'_, PyAny>,
 ) -> PyResult<Recording> {
+    let py = tare.py();
     let mut taring = of_calibration(locator)?;
     let mut tared = recording.clone();
     let text = tare.extract::<std::borrow::Cow<'_, str>>().ok();
@@ -71,11 +94,16 @@ pub fn tared_recording(
                 locator,
                 "give the number of the first untouched readings, or such readings",
             )?;
-            for (row, tared) in recording.rows.iter().zip(&mut tared.rows) {
-                let followed =
-                    taring.follow(&row.reading, &mut tared.reading, |tared| locator.method.locate(tared));
-                followed.map_err(refused)?;
-            }
+            let rows = &mut tared.rows;
+            work::run_quietly(py, |watch| {
+                for (i, (row, tared)) in recording.rows.iter().zip(rows).enumerate() {
+                    if i.is_multiple_of(READINGS_EACH) {
+                        watch.round()?;
+                    }
+                    taring.follow(&row.reading, &mut tared.reading, |tared| locator.method.locate(tared))?;
+                }
+                Ok::<(), Stopped>(())
+            })?;
             return Ok(tared);
         }
         (Some(other), _) => {
@@ -130,7 +158,7 @@ fn add_untouched(
     untouched: &Bound<'_, PyAny>,
     channels: &[String],
 ) -> PyResult<()> {
-    let added = match arrays::readings(untouched, channels)? {
+    let added = match arrays::readings_or_none(untouched, channels)? {
         Readings::One(one) => tare.add_untouched(one.as_slice()?),
         Readings::Many(many) => {
             let values = many.as_slice()?;

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use palpate::numerics::watch::{Progress, Watch};
 use pyo3::prelude::*;
+use pyo3::types::PyBool;
 
 use crate::errors::of_work;
 
@@ -45,7 +46,16 @@ where
     run_with(py, progress, rounds, work)?.map_err(|error| of_work(&error))
 }
 
-/// The same, with the error of the work as it is.
+/// The same, without a show of progress: of work that is mostly short.
+pub fn run_quietly<T, E>(py: Python<'_>, work: impl FnOnce(Watch<'_>) -> Result<T, E> + Send) -> PyResult<T>
+where
+    T: Send,
+    E: Error + Send + 'static,
+{
+    run(py, Some(PyBool::new(py, false).as_any()), None, work)
+}
+
+/// As [`run`], with the error of the work as it is.
 pub fn run_with<T: Send>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,

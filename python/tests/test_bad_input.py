@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
+from palpate.sklearn import InfluenceRegressor
 
 BEAM = pp.Beam("400 mm", "40 mm", "1.2 mm", "200 GPa")
 
@@ -35,10 +36,23 @@ def refused(call, words, kind=pp.PalpateError):
         (np.array([[None] * 8]), "holds objects (dtype object), such as None"),
         (np.zeros((2, 8), dtype=complex), "has the dtype complex128; it must hold real numbers"),
         (np.ma.masked_array(np.zeros((2, 8)), mask=np.eye(2, 8)), "is masked at (0, 0)"),
+        (np.zeros((0, 8)), "readings of the shape (0, 8) have 0 rows; there must be at least 1"),
+        (np.zeros((0, 7)), "readings of the shape (0, 7) have 7 channels; it must be (8,) or (readings, 8)"),
     ],
 )
 def test_readings_of_another_shape_or_type(locator, readings, words):
     refused(lambda: locator.locate(readings), words)
+
+
+def test_no_readings_are_none_to_anything_that_takes_readings(beam, locator):
+    none, words = np.zeros((0, 8)), "readings of the shape (0, 8) have 0 rows; there must be at least 1"
+    refused(lambda: locator.tare(none), words)
+    refused(lambda: locator.track([], none), words)
+    refused(lambda: locator.load_profile(none), words)
+    refused(lambda: beam.load_profile(none), words)
+    presses = beam.simulate(pp.even(10), force="3 N")
+    regressor = InfluenceRegressor(setup=beam.with_force("3 N")).fit(presses.readings, presses.positions)
+    refused(lambda: regressor.predict(none), "0 sample(s)", ValueError)
 
 
 def test_a_reading_of_the_last_chunk_is_named(locator):

@@ -96,11 +96,6 @@ def test_frames_say_their_units(presses, locator):
     pd.testing.assert_frame_equal(located, frame)
 
 
-def test_what_a_batch_of_none_gives(locator):
-    empty = locator.locate(np.empty((0, 8)))
-    assert len(empty) == 0 and empty.x.shape == (0,) and empty.x_95.shape == (0, 2)
-
-
 def test_readings_are_read_as_they_lie_in_memory(presses, locator):
     readings = presses.readings
     expected = locator.locate(readings).x

@@ -172,6 +172,8 @@ impl Environment {
             "--durations=10",
             // A worker a core: checks of types and most fits have one thread.
             "--numprocesses=auto",
+            // A worker that has none left takes over tests of another, lest a long one run alone at the end.
+            "--dist=worksteal",
             "-p",
             "no:cacheprovider",
         ]);

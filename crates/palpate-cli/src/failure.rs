@@ -38,6 +38,14 @@ impl Failure {
         if Cancelled::caused(error) { Self::stopped() } else { Complaint::new(error).into() }
     }
 
+    /// The same of work about whose input `complaint` says more.
+    pub fn of_work<E>(error: E, complaint: impl FnOnce(E) -> Complaint) -> Self
+    where
+        E: std::error::Error + 'static,
+    {
+        if Cancelled::caused(&error) { Self::stopped() } else { complaint(error).into() }
+    }
+
     /// Prints the message on stderr, and gives the exit code.
     pub fn report(self) -> ExitCode {
         let (message, code) = match self {

@@ -14,8 +14,9 @@ use palpate_mechanics::contact::{Contact, OffSurface, Position};
 use palpate_mechanics::sensing::{ChannelErrors, Layout, LayoutError, Sensor, measure};
 use palpate_mechanics::surface::{Extent, ResponseFunction, Surface, UniformLoad, Unsolvable};
 use palpate_numerics::OutOfRange;
+use palpate_numerics::watch::{Cancelled, Watch};
 
-pub use moving::{MovingContact, MovingContacts, simulate_moving};
+pub use moving::{MovingContact, MovingContacts, simulate_moving, simulate_moving_watched};
 
 /// A rig that cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -41,7 +42,15 @@ pub enum SimulateError {
     /// A position does not lie on the surface.
     #[error(transparent)]
     OffSurface(#[from] OffSurface),
+    /// Whoever watched the work stopped it.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
+
+/// What the watch is told of.
+const STAGE: &str = "simulating";
+/// Readings between two looks whether to go on.
+const READINGS_EACH: usize = 256;
 
 /// The sensors of a layout under a surface with a model, each with its response function.
 pub struct CleanSensors<'a> {
@@ -53,6 +62,18 @@ impl<'a> CleanSensors<'a> {
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Self {
         let function = |sensor: &Sensor| surface.response_function(sensor.kind, sensor.position);
         Self { functions: layout.sensors().iter().map(function).collect() }
+    }
+
+    /// The same, watched while the surface is solved.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch stopped it.
+    pub fn new_watched(surface: &'a dyn Surface, layout: &Layout, watch: Watch) -> Result<Self, Cancelled> {
+        // One by one, as without a watch: solved together they might differ in the last bit.
+        let function =
+            |sensor: &Sensor| surface.response_functions_watched(sensor.kind, &[sensor.position], watch);
+        let functions = layout.sensors().iter().map(function).collect::<Result<Vec<_>, _>>()?;
+        Ok(Self { functions: functions.into_iter().flatten().collect() })
     }
 
     /// Faultless reading of the sensors at `contact`, in the SI unit of each sensor.
@@ -97,10 +118,19 @@ impl<'a> SimulatedBench<'a> {
     /// # Errors
     /// [`SimulateError::NoModel`] for a measured surface, [`SimulateError::Surface`] where the surface's equations are not solved.
     pub fn new(setup: &'a Setup, seed: u64) -> Result<Self, SimulateError> {
+        Self::new_watched(setup, seed, Watch::NONE)
+    }
+
+    /// The same, watched while the surface is solved.
+    ///
+    /// # Errors
+    /// Those of [`SimulatedBench::new`], and [`SimulateError::Cancelled`].
+    pub fn new_watched(setup: &'a Setup, seed: u64, watch: Watch) -> Result<Self, SimulateError> {
         let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
-        surface.check_solution()?;
+        surface.check_solution_watched(watch)?;
         let (placed, errors, rng) = draw_faults(setup, seed);
-        Ok(Self { layout: setup.layout(), sensors: CleanSensors::new(surface, &placed), errors, rng })
+        let sensors = CleanSensors::new_watched(surface, &placed, watch)?;
+        Ok(Self { layout: setup.layout(), sensors, errors, rng })
     }
 
     /// Faultless reading under contacts on the surface, in the SI unit of each sensor: the sum of what each contact alone makes, and 0 under none.
@@ -134,8 +164,21 @@ impl Setup {
     /// # Errors
     /// [`SimulateError`] when the bench lacks a model or a force, or the positions cannot be laid out.
     pub fn simulate(&self, training: &Training, seed: u64) -> Result<Recording, SimulateError> {
+        self.simulate_watched(training, seed, Watch::NONE)
+    }
+
+    /// The same, watched.
+    ///
+    /// # Errors
+    /// Those of [`Setup::simulate`], and [`SimulateError::Cancelled`].
+    pub fn simulate_watched(
+        &self,
+        training: &Training,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<Recording, SimulateError> {
         let positions = training.positions(self.surface().extent())?;
-        simulate_at(&self.pressed_by(training)?, &positions, training.repeats, seed)
+        simulate_at_watched(&self.pressed_by(training)?, &positions, training.repeats, seed, watch)
     }
 }
 
@@ -152,11 +195,25 @@ pub fn simulate_at(
     repeats: usize,
     seed: u64,
 ) -> Result<Recording, SimulateError> {
+    simulate_at_watched(setup, positions, repeats, seed, Watch::NONE)
+}
+
+/// The same, watched.
+///
+/// # Errors
+/// Those of [`simulate_at`], and [`SimulateError::Cancelled`].
+pub fn simulate_at_watched(
+    setup: &Setup,
+    positions: &[Position],
+    repeats: usize,
+    seed: u64,
+    watch: Watch,
+) -> Result<Recording, SimulateError> {
     setup.surface().model().ok_or(SimulateError::NoModel)?;
     let force_n = setup.force_n().ok_or(SimulateError::NoForce)?;
     let contacts: Vec<Contact> =
         positions.iter().map(|position| Contact { position: *position, force_n }).collect();
-    simulate_contacts(setup, &contacts, repeats, seed)
+    simulate_contacts_watched(setup, &contacts, repeats, seed, watch)
 }
 
 /// The same with a force of each contact's own.
@@ -169,13 +226,30 @@ pub fn simulate_contacts(
     repeats: usize,
     seed: u64,
 ) -> Result<Recording, SimulateError> {
+    simulate_contacts_watched(setup, contacts, repeats, seed, Watch::NONE)
+}
+
+/// The same, watched.
+///
+/// # Errors
+/// Those of [`simulate_contacts`], and [`SimulateError::Cancelled`].
+pub fn simulate_contacts_watched(
+    setup: &Setup,
+    contacts: &[Contact],
+    repeats: usize,
+    seed: u64,
+    watch: Watch,
+) -> Result<Recording, SimulateError> {
     let positions: Vec<Position> = contacts.iter().map(|contact| contact.position).collect();
-    let mut bench = SimulatedBench::new(setup, seed)?;
+    let mut bench = SimulatedBench::new_watched(setup, seed, watch)?;
     OffSurface::check("position", &positions, setup.surface().extent())?;
     let mut rows = Vec::new();
     for contact @ Contact { position, force_n } in contacts.iter().copied() {
         let clean = bench.clean(&[contact]);
         for _ in 0..repeats {
+            if rows.len().is_multiple_of(READINGS_EACH) {
+                watch.counted(STAGE, "readings", rows.len(), contacts.len().saturating_mul(repeats))?;
+            }
             let reading = bench.measure(&clean);
             rows.push(Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading });
         }
@@ -196,16 +270,38 @@ pub fn simulate_loads(
     repeats: usize,
     seed: u64,
 ) -> Result<Vec<Vec<f64>>, SimulateError> {
+    simulate_loads_watched(setup, loads, repeats, seed, Watch::NONE)
+}
+
+/// The same, watched.
+///
+/// # Errors
+/// Those of [`simulate_loads`], and [`SimulateError::Cancelled`].
+pub fn simulate_loads_watched(
+    setup: &Setup,
+    loads: &[UniformLoad],
+    repeats: usize,
+    seed: u64,
+    watch: Watch,
+) -> Result<Vec<Vec<f64>>, SimulateError> {
     let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
-    surface.check_solution()?;
+    surface.check_solution_watched(watch)?;
     let (placed, errors, mut rng) = draw_faults(setup, seed);
     // By superposition.
-    let reading = |sensor: &Sensor| {
-        let function = surface.influence_function(sensor.kind, sensor.position);
-        loads.iter().map(|load| load.force_n() * load.mean(&*function)).sum()
-    };
-    let clean: Vec<f64> = placed.sensors().iter().map(reading).collect();
-    Ok((0..repeats).map(|_| measure(setup.layout(), &clean, &errors, &mut rng)).collect())
+    let mut clean = Vec::with_capacity(placed.len());
+    for sensor in placed.sensors() {
+        for function in surface.influence_functions_watched(sensor.kind, &[sensor.position], watch)? {
+            clean.push(loads.iter().map(|load| load.force_n() * load.mean(&*function)).sum());
+        }
+    }
+    let mut readings = Vec::new();
+    for i in 0..repeats {
+        if i.is_multiple_of(READINGS_EACH) {
+            watch.counted(STAGE, "readings", i, repeats)?;
+        }
+        readings.push(measure(setup.layout(), &clean, &errors, &mut rng));
+    }
+    Ok(readings)
 }
 
 /// The places of the sensors, the gains and offsets of the channels, and the stream of their noise.

@@ -16,6 +16,7 @@ use ndarray::linalg::general_mat_mul;
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use super::cholesky::factor_leading;
+use super::watch::{Cancelled, Watch};
 
 /// Columns of L that are stored side by side, at most.
 const PANEL: usize = 64;
@@ -27,6 +28,12 @@ const MOST_ZEROS: f64 = 0.2;
 
 /// As [`MOST_ZEROS`], in supernodes that are large enough.
 const FEW_ZEROS: f64 = 0.02;
+
+/// What the watch is told of.
+const STAGE: &str = "factoring the equations";
+/// Columns whose patterns are found, and multiply-adds of a solution, between two looks whether to go on: some milliseconds.
+const COLUMNS_EACH: usize = 1 << 10;
+const PRODUCTS_EACH: usize = 1 << 23;
 
 /// A symmetric matrix, which grows by columns: its elements on and below the diagonal.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,6 +98,9 @@ pub enum SparseCholeskyError {
         /// Rows of the matrix.
         size: usize,
     },
+    /// Whoever watched the work stopped it.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 impl SparseSymmetric {
@@ -133,16 +143,28 @@ impl SparseCholesky {
     /// # Panics
     /// When an element's row is beyond the last column.
     pub fn new(matrix: &SparseSymmetric) -> Result<Self, SparseCholeskyError> {
+        Self::new_watched(matrix, Watch::NONE)
+    }
+
+    /// The same, watched: from one supernode to the next it may be stopped.
+    ///
+    /// # Errors
+    /// Those of [`SparseCholesky::new`], and [`SparseCholeskyError::Cancelled`].
+    ///
+    /// # Panics
+    /// As [`SparseCholesky::new`].
+    pub fn new_watched(matrix: &SparseSymmetric, watch: Watch) -> Result<Self, SparseCholeskyError> {
         let size = matrix.size();
         let no_memory = SparseCholeskyError::OutOfMemory { size };
-        let supernodes = supernodes(matrix);
+        let supernodes = supernodes(matrix, watch)?;
         let largest = supernodes.iter().map(|node| node.pattern.len()).max().unwrap_or(0);
         let mut space = room(largest * largest).ok_or(no_memory)?;
         space.resize(largest * largest, 0.0);
-        let stored = supernodes.iter().map(Supernode::stored_numbers).sum();
+        let stored: usize = supernodes.iter().map(Supernode::stored_numbers).sum();
         let mut factor = Self { size, panels: Vec::new(), values: room(stored).ok_or(no_memory)? };
         let mut fronts = Fronts::new(size);
         for node in &supernodes {
+            watch.stage(STAGE, factor.values.len() as f64 / stored as f64)?;
             let front = &mut space[..node.pattern.len().pow(2)];
             fronts.assemble(matrix, node, front);
             let square = (node.pattern.len(), node.pattern.len());
@@ -161,21 +183,46 @@ impl SparseCholesky {
     /// # Panics
     /// When b is not as long as the matrix, or a multiple of that.
     pub fn solve_in_place(&self, b: &mut [f64]) {
+        let done = self.solve_in_place_watched(b, Watch::NONE);
+        debug_assert_eq!(done, Ok(()), "nobody watches");
+    }
+
+    /// The same, watched; where it was stopped, b is left unsolved.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch stopped it.
+    ///
+    /// # Panics
+    /// As [`SparseCholesky::solve_in_place`].
+    pub fn solve_in_place_watched(&self, b: &mut [f64], watch: Watch) -> Result<(), Cancelled> {
+        watch.round()?;
         if b.is_empty() {
-            return;
+            return Ok(());
         }
         let count = b.len() / self.size;
         let mut b = ArrayViewMut2::from_shape((count, self.size), b).expect("whole right-hand sides");
         // The numbers of one row, of all right-hand sides, side by side.
         let mut x: Vec<f64> = b.t().iter().copied().collect();
+        let mut products = 0;
+        let mut look = |panel: &Panel| {
+            products += count * panel.columns.len() * (panel.columns.len() + panel.below.len());
+            if products < PRODUCTS_EACH {
+                return Ok(());
+            }
+            products = 0;
+            watch.round()
+        };
         for panel in &self.panels {
+            look(panel)?;
             self.solve_lower(panel, count, &mut x);
         }
         for panel in self.panels.iter().rev() {
+            look(panel)?;
             self.solve_upper(panel, count, &mut x);
         }
         let x = ArrayView2::from_shape((self.size, count), &x).expect("as long as b");
         b.assign(&x.t());
+        Ok(())
     }
 
     /// Number of stored entries of L, some zeros among them.
@@ -291,13 +338,16 @@ impl Supernode {
 /// The supernodes of a matrix. A supernode takes in the column behind it when that is the first row below it, and when it then
 /// stores few zeros (relaxed supernodes: Ashcraft and Grimes, *The influence of relaxed supernode partitions on the multifrontal
 /// method*, 1989).
-fn supernodes(matrix: &SparseSymmetric) -> Vec<Supernode> {
+fn supernodes(matrix: &SparseSymmetric, watch: Watch) -> Result<Vec<Supernode>, Cancelled> {
     let mut supernodes: Vec<Supernode> = Vec::new();
     // Of each column, its children: the supernodes of which it is the first row below.
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); matrix.size()];
     // Of each row, the last supernode that was found to have it in its pattern.
     let mut owner = vec![usize::MAX; matrix.size()];
     for column in 0..matrix.size() {
+        if column % COLUMNS_EACH == 0 {
+            watch.stage(STAGE, 0.0)?;
+        }
         let mut others = mem::take(&mut children[column]);
         let before = others.pop_if(|child| *child + 1 == supernodes.len());
         let mut rows = matrix.rows[matrix.elements(column)].to_vec();
@@ -322,7 +372,7 @@ fn supernodes(matrix: &SparseSymmetric) -> Vec<Supernode> {
             children[*parent].push(index);
         }
     }
-    supernodes
+    Ok(supernodes)
 }
 
 impl<'a> Fronts<'a> {
@@ -396,6 +446,8 @@ mod tests {
     use ndarray::{Array1, Array2, s};
     use proptest::prelude::*;
 
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use super::*;
     use crate::Cholesky;
 
@@ -435,6 +487,25 @@ mod tests {
             }
             lower
         }
+    }
+
+    #[test]
+    fn it_stops_at_whichever_look_says_so() {
+        let (matrix, _) = matrices(&[0.5; 150], 7);
+        let factor = SparseCholesky::new(&matrix).unwrap();
+        let looks = AtomicUsize::new(0);
+        let go_on = |_| looks.fetch_add(1, Ordering::Relaxed) < usize::MAX;
+        SparseCholesky::new_watched(&matrix, Watch::new(&go_on)).unwrap();
+        let all = looks.into_inner();
+        assert!(all > 2, "{all}");
+        for n in 0..all {
+            let looks = AtomicUsize::new(0);
+            let stop = |_| looks.fetch_add(1, Ordering::Relaxed) < n;
+            let stopped = SparseCholesky::new_watched(&matrix, Watch::new(&stop)).err();
+            assert_eq!((stopped, looks.into_inner()), (Some(Cancelled.into()), n + 1));
+        }
+        let stop = |_| false;
+        assert_eq!(factor.solve_in_place_watched(&mut [1.0; 150], Watch::new(&stop)), Err(Cancelled));
     }
 
     fn largest(values: &Array2<f64>) -> f64 {

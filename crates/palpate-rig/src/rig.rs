@@ -6,9 +6,10 @@ use palpate_estimators::estimator::Estimator;
 use palpate_estimators::evaluation::{Calibration, Split};
 use palpate_estimators::recording::{Recording, TimedRecording};
 use palpate_estimators::setup::Setup;
-use palpate_estimators::simulate::{MovingContacts, SimulateError, simulate_moving};
+use palpate_estimators::simulate::{MovingContacts, SimulateError, simulate_moving_watched};
 use palpate_mechanics::surface::UniformLoad;
 use palpate_numerics::OutOfRange;
+use palpate_numerics::watch::Watch;
 
 use crate::error::RigError;
 use crate::sections::RigSections;
@@ -96,7 +97,15 @@ impl Rig {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn simulate(&self, seed: u64) -> Result<Recording, RigSimulationError> {
-        Ok(self.setup.simulate(self.training()?, seed)?)
+        self.simulate_watched(seed, Watch::NONE)
+    }
+
+    /// The same, watched.
+    ///
+    /// # Errors
+    /// Those of [`Rig::simulate`], and [`SimulateError::Cancelled`].
+    pub fn simulate_watched(&self, seed: u64, watch: Watch) -> Result<Recording, RigSimulationError> {
+        Ok(self.setup.simulate_watched(self.training()?, seed, watch)?)
     }
 
     /// The calibration at the training positions, to be simulated.
@@ -114,7 +123,20 @@ impl Rig {
     /// # Errors
     /// [`RigSimulationError`] as for [`Rig::simulate`].
     pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Split>, RigSimulationError> {
-        Ok(self.calibration()?.at_forces_of_use().trials(count, seed)?)
+        self.trials_watched(count, seed, Watch::NONE)
+    }
+
+    /// The same, watched.
+    ///
+    /// # Errors
+    /// Those of [`Rig::trials`], and [`SimulateError::Cancelled`].
+    pub fn trials_watched(
+        &self,
+        count: u64,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<Vec<Split>, RigSimulationError> {
+        Ok(self.calibration()?.at_forces_of_use().trials_watched(count, seed, watch)?)
     }
 
     /// The training positions.
@@ -125,7 +147,7 @@ impl Rig {
         self.training.as_ref().ok_or(RigSimulationError::NoTraining)
     }
 
-    /// Moves the contacts as `[motion]` says; see [`simulate_moving`].
+    /// Moves the contacts as `[motion]` says; see [`palpate_estimators::simulate::simulate_moving`].
     ///
     /// # Errors
     /// [`RigSimulationError`] when the rig has no motion, no model or no force.
@@ -139,9 +161,21 @@ impl Rig {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn simulate_moving(&self, seed: u64) -> Result<TimedRecording, RigSimulationError> {
+        self.simulate_moving_watched(seed, Watch::NONE)
+    }
+
+    /// The same, watched.
+    ///
+    /// # Errors
+    /// Those of [`Rig::simulate_moving`], and [`SimulateError::Cancelled`].
+    pub fn simulate_moving_watched(
+        &self,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<TimedRecording, RigSimulationError> {
         let moving = self.motion.as_ref().ok_or(RigSimulationError::NoMotion)?;
         let pressed = self.pressed_setup().map_err(SimulateError::from)?;
-        Ok(simulate_moving(&pressed, moving, seed)?)
+        Ok(simulate_moving_watched(&pressed, moving, seed, watch)?)
     }
 }
 

@@ -6,6 +6,7 @@ use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::json::object;
 use crate::output::Table;
+use crate::progress::Observer;
 use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
 use crate::tare::{TareOption, tare_splits};
 use crate::target::{Inputs, TargetFolder};
@@ -163,9 +164,11 @@ struct Trials {
 
 fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
     let Some(recording) = arguments.files.read(&rig.setup)? else {
-        let trials = rig.trials(u64::from(arguments.calibrations), arguments.seed);
+        let (count, seed) = (u64::from(arguments.calibrations), arguments.seed);
+        let trials = Observer::of_stages().watch(|watch| rig.trials_watched(count, seed, watch));
         let trials = trials.map_err(|error| {
-            Complaint::about(&arguments.rig, error).help("--data names a recording to compare on")
+            let about = |error| Complaint::about(&arguments.rig, error);
+            Failure::of_work(error, |error| about(error).help("--data names a recording to compare on"))
         })?;
         let calibrations = arguments.calibrations;
         let judged = trials.first().map_or(0, |trial| trial.judged.rows.len());

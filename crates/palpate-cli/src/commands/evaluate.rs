@@ -17,7 +17,7 @@ use palpate_estimators::evaluation::{
     ErrorSummary, Evaluation, Portion, Split, evaluate_splits, percentage_error,
 };
 use palpate_estimators::recording::{Provenance, Recording};
-use palpate_estimators::simulate::simulate_at;
+use palpate_estimators::simulate::simulate_at_watched;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_length_mm};
 use palpate_report::{EvaluationReport, Judged, evaluation_report};
@@ -160,7 +160,9 @@ fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
 fn cross_validated(arguments: &Arguments, rig: Box<Rig>) -> Result<Answers, Failure> {
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
-        None => rig.simulate(arguments.seed).map_err(simulation_complaint)?,
+        None => Observer::of_stages()
+            .watch(|watch| rig.simulate_watched(arguments.seed, watch))
+            .map_err(|error| Failure::of_work(error, simulation_complaint))?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
     let cost = rig.estimator.fit_cost(&rig.setup, &recording);
@@ -185,7 +187,9 @@ fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Fail
         }
         None => simulated(&locator, arguments.seed)?,
     };
-    let evaluation = Evaluation::new(&locator, &recording).map_err(Complaint::new)?;
+    let evaluation = Observer::of_stages()
+        .watch(|watch| Evaluation::new_watched(&locator, &recording, watch))
+        .map_err(|error| Failure::from_error(&error))?;
     Ok(Answers { evaluation, recording: recording.provenance, subject: RigOrLocator::Locator(locator) })
 }
 
@@ -196,7 +200,9 @@ fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
 /// The bench pressed all over: for the paper's beam at every millimetre, on a plane in the middles of about 400 cells.
 fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
     let positions = all_over(locator.setup.surface().extent());
-    Ok(simulate_at(&locator.setup, &positions, 1, seed).map_err(simulation_complaint)?)
+    Observer::of_stages()
+        .watch(|watch| simulate_at_watched(&locator.setup, &positions, 1, seed, watch))
+        .map_err(|error| Failure::of_work(error, simulation_complaint))
 }
 
 fn warn_of_training_data(locator: &Locator, recording: &Recording) {

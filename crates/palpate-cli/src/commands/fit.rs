@@ -49,9 +49,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
-        None => rig.simulate(arguments.seed).map_err(|error| {
-            Complaint::about(&arguments.rig, error).help("--data names a recording to fit")
-        })?,
+        None => {
+            let simulated = Observer::of_stages().watch(|watch| rig.simulate_watched(arguments.seed, watch));
+            simulated.map_err(|error| {
+                let about = |error| Complaint::about(&arguments.rig, error);
+                Failure::of_work(error, |error| about(error).help("--data names a recording to fit"))
+            })?
+        }
     };
     let cost = cost(&rig, &recording, arguments);
     arguments.memory.check(&rig.estimator, cost, &rig.setup, &recording)?;

@@ -4,11 +4,12 @@ use crate::failure::{Complaint, Failure};
 use crate::input::RigOrLocator;
 use crate::lines::{Lines, Readings, Records};
 use crate::output::{self, Table};
+use crate::progress::Observer;
 use crate::target::{Inputs, Target};
 use palpate_estimators::estimator::{
     CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, patch_limits,
 };
-use palpate_estimators::simulate::simulate_loads;
+use palpate_estimators::simulate::simulate_loads_watched;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, UniformLoad};
 use palpate_report::{ProfileReport, profile_report};
@@ -41,11 +42,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Inputs::new([Some(path), arguments.readings.as_ref()].into_iter().flatten().map(PathBuf::as_path));
     let report = arguments.report.as_ref().map(|report| Target::new(report, &inputs)).transpose()?;
     let subject = RigOrLocator::read(path)?;
-    let sensors = match &subject {
-        RigOrLocator::Rig(rig) => LoadSensors::from_setup(&rig.setup),
-        RigOrLocator::Locator(locator) => locator.load_sensors(),
-    };
-    let profiler = Profiler::new(sensors.map_err(|error| sensors_complaint(error, path))?);
+    let sensors = Observer::of_stages().watch(|watch| match &subject {
+        RigOrLocator::Rig(rig) => LoadSensors::from_setup_watched(&rig.setup, watch),
+        RigOrLocator::Locator(locator) => locator.load_sensors_watched(watch),
+    });
+    let sensors = sensors.map_err(|error| Failure::of_work(error, |error| sensors_complaint(error, path)))?;
+    let profiler = Profiler::new(sensors);
     let mut printer = Printer {
         arguments,
         subject: &subject,
@@ -94,8 +96,10 @@ impl Printer<'_> {
             return Err(complaint.help(help).into());
         }
         self.truth = loads;
-        let readings = simulate_loads(self.subject.setup(), loads, 1, self.arguments.seed);
-        for reading in readings.map_err(Complaint::new)? {
+        let (setup, seed) = (self.subject.setup(), self.arguments.seed);
+        let readings =
+            Observer::of_stages().watch(|watch| simulate_loads_watched(setup, loads, 1, seed, watch));
+        for reading in readings.map_err(|error| Failure::from_error(&error))? {
             self.tell(&reading, None)?;
         }
         Ok(())

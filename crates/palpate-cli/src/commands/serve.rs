@@ -122,9 +122,13 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
     }
     let recording = match &arguments.data {
         Some(data) => input::read_recording(&rig.setup, data)?,
-        None => rig
-            .simulate(arguments.seed)
-            .map_err(|error| Complaint::about(path, error).help("--data names a recording to fit"))?,
+        None => {
+            let simulated = Observer::of_stages().watch(|watch| rig.simulate_watched(arguments.seed, watch));
+            simulated.map_err(|error| {
+                let about = |error| Complaint::about(path, error);
+                Failure::of_work(error, |error| about(error).help("--data names a recording to fit"))
+            })?
+        }
     };
     let needed = rig.estimator.positions_needed();
     recording.check_distinct_positions(needed).map_err(Complaint::new)?;

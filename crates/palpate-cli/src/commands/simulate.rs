@@ -1,13 +1,15 @@
 //! `palpate simulate`: a recording from the model.
 
 use crate::failure::{Complaint, Failure};
+use crate::progress::Observer;
 use crate::target::{Inputs, Target};
 use crate::{input, output, target};
 use palpate_estimators::arrangement::{EveryError, every};
 use palpate_estimators::recording;
-use palpate_estimators::simulate::simulate_at;
+use palpate_estimators::simulate::simulate_at_watched;
 use palpate_mechanics::units::format_count;
-use palpate_rig::Rig;
+use palpate_numerics::watch::Watch;
+use palpate_rig::{Rig, RigSimulationError};
 use std::path::PathBuf;
 
 /// Make a recording from the model, with the sensors' noise and faults.
@@ -35,20 +37,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.moving {
         return move_contact(arguments, &rig, &out);
     }
+    let observer = Observer::of_stages();
     let recording = match arguments.every {
-        None => rig.simulate(arguments.seed).map_err(|error| error.to_string()),
+        None => observer.watch(|watch| rig.simulate_watched(arguments.seed, watch)),
         Some(every_m) => {
             let repeats = rig.training.as_ref().map_or(1, |training| training.repeats);
-            simulate_at(
-                &rig.pressed_setup().map_err(|error| Complaint::about(&arguments.rig, error))?,
-                &every(rig.setup.surface().extent(), every_m).map_err(too_many)?,
-                repeats,
-                arguments.seed,
-            )
-            .map_err(|error| error.to_string())
+            let setup = rig.pressed_setup().map_err(|error| Complaint::about(&arguments.rig, error))?;
+            let positions = every(rig.setup.surface().extent(), every_m).map_err(too_many)?;
+            let simulate =
+                |watch: Watch| simulate_at_watched(&setup, &positions, repeats, arguments.seed, watch);
+            observer.watch(simulate).map_err(RigSimulationError::from)
         }
     };
-    let recording = recording.map_err(|error| Complaint::about(&arguments.rig, error))?;
+    drop(observer);
+    let recording = recording
+        .map_err(|error| Failure::of_work(error, |error| Complaint::about(&arguments.rig, error)))?;
     let mut csv = Vec::new();
     recording::write(&recording, rig.setup.surface().extent(), &comment(arguments), &mut csv)
         .map_err(|error| target::cannot("write", out.path(), &error))?;
@@ -62,8 +65,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn move_contact(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure> {
-    let timed =
-        rig.simulate_moving(arguments.seed).map_err(|error| Complaint::about(&arguments.rig, error))?;
+    let timed = Observer::of_stages()
+        .watch(|watch| rig.simulate_moving_watched(arguments.seed, watch))
+        .map_err(|error| Failure::of_work(error, |error| Complaint::about(&arguments.rig, error)))?;
     let mut csv = Vec::new();
     let swings = rig.motion.is_some_and(|moving| moving.beam.is_some());
     let how = if swings { "" } else { ", in balance at every reading, without inertia" };

@@ -137,23 +137,42 @@ fn studies_simulations_and_fits_of_many_rows_end_within_a_second() {
     let folder = bench.path();
     fs::write(folder.join("strip.toml"), FSI_WATER).unwrap();
     fs::write(folder.join("many.csv"), many_rows()).unwrap();
-    let plate = Toml::parse(PLATE).add("surface.elements", 200).to_string();
-    fs::write(folder.join("plate.toml"), plate).unwrap();
-    let long: [&[&str]; 7] = [
+    let long: [&[&str]; 4] = [
         &["study", "paper", "--seeds", "1000", "--out", "paper"],
         &["study", "elliott", "--out", "elliott"],
-        &["simulate", "plate.toml", "--every", "1 mm", "-o", "never.csv"],
         &["fit", "strip.toml", "--data", "many.csv", "-o", "never.json"],
         &["compare", "rig.toml", "--calibrations", "5000"],
-        // A mesh of 200 x 200 elements is factored.
-        &["fit", "plate.toml", "-o", "never.json"],
-        &["limit", "plate.toml"],
     ];
     for (arguments, signal) in long.into_iter().zip(["-INT", "-TERM"].into_iter().cycle()) {
         let mut child = begin(folder, arguments);
         std::thread::sleep(Duration::from_millis(700));
         assert!(child.try_wait().unwrap().is_none(), "{arguments:?} was done before");
         end(child, signal, COMPUTING);
+    }
+    assert!(!folder.join("never.json").exists());
+}
+
+#[test]
+fn the_equations_of_a_plate_are_left_at_a_signal() {
+    let loaded = Toml::parse(PLATE).add("surface.elements", 320).to_string()
+        + "\n[[load]]\nfrom = [\"50 mm\", \"50 mm\"]\nto = [\"90 mm\", \"90 mm\"]\nforce = \"5 N\"\n";
+    let bench = folder(loaded);
+    let folder = bench.path();
+    let long: [&[&str]; 5] = [
+        &["simulate", "rig.toml", "--every", "1 mm", "-o", "never.csv"],
+        &["fit", "rig.toml", "-o", "never.json"],
+        &["limit", "rig.toml"],
+        &["profile", "rig.toml"],
+        &["compare", "rig.toml"],
+    ];
+    for (arguments, signal) in long.into_iter().zip(["-INT", "-TERM"].into_iter().cycle()) {
+        let mut child = begin(folder, arguments);
+        std::thread::sleep(Duration::from_millis(700));
+        assert!(child.try_wait().unwrap().is_none(), "{arguments:?} was done before");
+        let stopped = end(child, signal, WAITING);
+        let stderr = String::from_utf8_lossy(&stopped.stderr);
+        // The work itself stopped: it was not ended with the process.
+        assert!(stderr.contains("nothing was written"), "{arguments:?}: {stderr}");
     }
     assert!(!folder.join("never.csv").exists() && !folder.join("never.json").exists());
 }

@@ -44,7 +44,7 @@ impl ForwardModel {
             Extent::Plane { .. } => ASKED_ON_A_PLANE,
         };
         let positions = cells(extent, side, side);
-        let sensors = CleanSensors::new(surface, setup.layout());
+        let sensors = CleanSensors::new_watched(surface, setup.layout(), watch)?;
         let clean: Vec<Vec<f64>> =
             positions.iter().map(|&position| sensors.reading(Contact { position, force_n })).collect();
         let full_scale = |s: usize| clean.iter().map(|reading| reading[s].abs()).fold(0.0, f64::max);

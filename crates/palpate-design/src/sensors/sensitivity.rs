@@ -1,6 +1,5 @@
 //! Sensitivities of sensors to contacts: the rows that criteria work on.
 
-use std::convert::Infallible;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -105,10 +104,11 @@ impl Sensitivity<'_> {
     /// a plane; 0 where it is saturated.
     pub fn rows(&self, sensors: &[SensorAt]) -> Vec<Vec<Block>> {
         let mut rows = vec![vec![[0.0; LANES]; self.row_size()]; sensors.len()];
-        let Ok(()) = for_each_response(self.surface, sensors, |i, response| {
+        let filled = for_each_response(self.surface, sensors, Watch::NONE, |i, response| {
             self.fill_row(&mut rows[i], response, sensors[i].channel);
-            Ok::<(), Infallible>(())
+            Ok(())
         });
+        debug_assert_eq!(filled, Ok(()), "nobody watches");
         rows
     }
 
@@ -183,12 +183,12 @@ impl Sensitivity<'_> {
                     },
                 )?;
             }
-            None => for_each_response(self.surface, candidates, |i, response| {
+            None => for_each_response(self.surface, candidates, watch, |i, response| {
                 if i.is_multiple_of(TOGETHER) {
                     watch.counted(STAGE, "sensors", i, sites)?;
                 }
                 self.fill_row(&mut table[row(i)], response, candidates[i].channel);
-                Ok::<(), Cancelled>(())
+                Ok(())
             })?,
         }
         Ok(table)
@@ -289,7 +289,7 @@ impl Sensitivity<'_> {
                     ControlFlow::Continue(())
                 })?;
             }
-            None => for_each_response(self.surface, candidates, |i, response| {
+            None => for_each_response(self.surface, candidates, watch, |i, response| {
                 if i.is_multiple_of(TOGETHER) {
                     watch.counted(STAGE, "sensors", i, candidates.len())?;
                 }
@@ -297,7 +297,7 @@ impl Sensitivity<'_> {
                     let reading = response.at(Contact { position, force_n: self.force_n });
                     readings[[row, i]] = whitened(row, i, reading);
                 }
-                Ok::<(), Cancelled>(())
+                Ok(())
             })?,
         }
         Ok(readings)
@@ -305,16 +305,18 @@ impl Sensitivity<'_> {
 }
 
 /// Calls with the index and response function of each sensor, a few of which are solved for together.
-fn for_each_response<E>(
+fn for_each_response(
     surface: &dyn Surface,
     sensors: &[SensorAt],
-    mut take: impl FnMut(usize, &dyn ResponseFunction) -> Result<(), E>,
-) -> Result<(), E> {
+    watch: Watch,
+    mut take: impl FnMut(usize, &dyn ResponseFunction) -> Result<(), Cancelled>,
+) -> Result<(), Cancelled> {
     let mut first = 0;
     for of_a_kind in sensors.chunk_by(|a, b| a.kind == b.kind) {
         for few in of_a_kind.chunks(TOGETHER) {
             let positions: Vec<Position> = few.iter().map(|sensor| sensor.position).collect();
-            for (i, response) in surface.response_functions(few[0].kind, &positions).iter().enumerate() {
+            let responses = surface.response_functions_watched(few[0].kind, &positions, watch)?;
+            for (i, response) in responses.iter().enumerate() {
                 take(first + i, &**response)?;
             }
             first += few.len();

@@ -609,6 +609,14 @@ impl Locator {
     /// # Errors
     /// [`LoadSensorsError`] for a measured surface, a live sensor without noise, or when none is alive.
     pub fn load_sensors(&self) -> Result<LoadSensors<'_>, LoadSensorsError> {
+        self.load_sensors_watched(Watch::NONE)
+    }
+
+    /// The same, watched while the surface is solved.
+    ///
+    /// # Errors
+    /// Those of [`Locator::load_sensors`] and of [`LoadSensors::new_watched`].
+    pub fn load_sensors_watched(&self, watch: Watch) -> Result<LoadSensors<'_>, LoadSensorsError> {
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
                 let channels = beam.influences().map(|channel| {
@@ -617,7 +625,7 @@ impl Locator {
                 });
                 Ok(LoadSensors { extent: self.setup.surface().extent(), channels: channels.collect() })
             }
-            _ => LoadSensors::from_setup(&self.setup),
+            _ => LoadSensors::from_setup_watched(&self.setup, watch),
         }
     }
 }

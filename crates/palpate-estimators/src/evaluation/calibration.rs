@@ -4,7 +4,7 @@ use super::{Evaluation, EvaluationError, Split};
 use crate::arrangement::{Training, all_over};
 use crate::fit::{Fit, FitTask, Fitted, Locate, SeedList};
 use crate::setup::Setup;
-use crate::simulate::{SimulateError, simulate_at, simulate_contacts};
+use crate::simulate::{SimulateError, simulate_at_watched, simulate_contacts_watched};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::ChannelModel;
 use palpate_numerics::OutOfRange;
@@ -137,16 +137,24 @@ impl Calibration {
     /// # Errors
     /// [`SimulateError`] when the setup has no model or no force, or a position lies off the surface.
     pub fn simulate(&self, seed: u64) -> Result<Split, SimulateError> {
+        self.simulate_watched(seed, Watch::NONE)
+    }
+
+    /// The same, watched.
+    ///
+    /// # Errors
+    /// Those of [`Calibration::simulate`], and [`SimulateError::Cancelled`].
+    pub fn simulate_watched(&self, seed: u64, watch: Watch) -> Result<Split, SimulateError> {
         let force_n = self.touched.force_n().ok_or(SimulateError::NoForce)?;
         let presses = self.presses.iter().map(|position| Contact { position: *position, force_n });
         let all: Vec<Contact> = presses.chain(self.contacts()?).collect();
         let rows: Vec<usize> = (0..all.len()).collect();
         let (pressed, touched) = rows.split_at(self.presses.len());
-        let recording = simulate_contacts(&self.touched, &all, 1, seed)?;
+        let recording = simulate_contacts_watched(&self.touched, &all, 1, seed, watch)?;
         let training = if self.pressed.force_n() == self.touched.force_n() {
             recording.subset(pressed)
         } else {
-            simulate_at(&self.pressed, &self.presses, 1, seed)?
+            simulate_at_watched(&self.pressed, &self.presses, 1, seed, watch)?
         };
         Ok(Split { training, judged: recording.subset(touched), offsets: None })
     }
@@ -156,7 +164,15 @@ impl Calibration {
     /// # Errors
     /// [`SimulateError`] as for [`Calibration::simulate`].
     pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Split>, SimulateError> {
-        (0..count).map(|k| self.simulate(seed + k)).collect()
+        self.trials_watched(count, seed, Watch::NONE)
+    }
+
+    /// The same, watched.
+    ///
+    /// # Errors
+    /// Those of [`Calibration::trials`], and [`SimulateError::Cancelled`].
+    pub fn trials_watched(&self, count: u64, seed: u64, watch: Watch) -> Result<Vec<Split>, SimulateError> {
+        (0..count).map(|k| self.simulate_watched(seed + k, watch)).collect()
     }
 
     /// Simulates, fits and judges the method alone.
@@ -182,7 +198,7 @@ impl Calibration {
         watch: Watch,
         fit: impl FnOnce(FitTask) -> Result<Fitted<M>, E>,
     ) -> Result<Calibrated<M>, EvaluationError<E>> {
-        let Split { training, judged, .. } = self.simulate(seed)?;
+        let Split { training, judged, .. } = self.simulate_watched(seed, watch)?;
         let task = FitTask { setup: &self.known, recording: &training, seed, watch };
         let locator = fit(task).map_err(EvaluationError::Fit)?;
         Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
@@ -203,7 +219,7 @@ impl Calibration {
         let (Some(&seed), true) = (seeds.first(), self.is_faultless()) else {
             return seeds.into_iter().map(|seed| self.run(estimator, seed, watch)).collect();
         };
-        let Split { training, judged, .. } = self.simulate(seed)?;
+        let Split { training, judged, .. } = self.simulate_watched(seed, watch)?;
         let mut queue = SeedList::new(seeds);
         let task = FitTask { setup: &self.known, recording: &training, seed, watch };
         estimator.fit_many(task, &mut queue).map_err(EvaluationError::Fit)?;

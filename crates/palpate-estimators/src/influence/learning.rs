@@ -40,12 +40,15 @@ impl LearntInfluence<'_, '_> {
     }
 }
 
+/// What is done with the learnt influence function of a sensor, whose number comes first.
+pub(super) type Take<'t> = dyn FnMut(usize, &LearntInfluence) -> Result<(), Cancelled> + 't;
+
 /// Learns the influence functions of all living sensors at `places`, and hands each, with the sensor's number, to `take`.
 pub(super) fn learn(
     Influence { source, false_alarm_rate, .. }: Influence,
     task: FitTask,
     places: &[Position],
-    take: &mut dyn FnMut(usize, &LearntInfluence),
+    take: &mut Take,
 ) -> Result<Channels, InfluenceFitError> {
     let surface = task.setup.surface().model().ok_or(InfluenceFitError::NoModel)?;
     let layout = task.setup.layout();
@@ -111,16 +114,13 @@ impl<'a> Learning<'a> {
         living: &[usize],
         watch: Watch,
         channels: &mut Channels,
-        take: &mut dyn FnMut(usize, &LearntInfluence),
+        take: &mut Take,
     ) -> Result<(), InfluenceFitError> {
         let Self { source, surface, layout, presses, places } = *self;
         let mean = if source == InfluenceSource::Recording { Mean::Zero } else { Mean::Model };
         let pressed: Vec<Position> = presses.presses.iter().map(|press| press.position).collect();
         let remainders = Remainders::new(surface, kind, &pressed, places, watch)?;
-        let prior = |s: &usize| -> Result<Prior<'a>, Cancelled> {
-            watch.round()?;
-            Ok(Prior::new(surface, &layout.sensors()[*s], mean))
-        };
+        let prior = |s: &usize| Prior::new(surface, &layout.sensors()[*s], mean, watch);
         let priors: Vec<Prior<'a>> = living.iter().map(prior).collect::<Result<_, _>>()?;
         let with = |(prior, &s): (&Prior<'a>, &usize), kept: &[usize]| {
             let noise = presses.noise_variance(layout, s);
@@ -135,7 +135,7 @@ impl<'a> Learning<'a> {
         let has_one_force = presses.presses.windows(2).all(|pair| pair[0].force_n == pair[1].force_n);
         let is_reaction_alone = mean == Mean::Zero && kind == SensorKind::Reaction && has_one_force;
         let told = Told { noise: noise_is_told, offset: is_reaction_alone };
-        let mut hyper = most_probable(&searched, mean, surface.length_m(), told);
+        let mut hyper = most_probable(&searched, mean, surface.length_m(), told, watch)?;
         if source == InfluenceSource::Mechanics {
             hyper = Hyperparameters { noise: hyper.noise, ..Hyperparameters::NONE };
         }
@@ -147,7 +147,7 @@ impl<'a> Learning<'a> {
                 .map_err(|problem| InfluenceFitError::Singular { sensor: s + 1, problem })?;
             channels.offsets[s] = posterior.offset();
             channels.noise_sd[s] = sensor.noise_variance(&hyper).sqrt();
-            take(s, &LearntInfluence { posterior, prior, remainders: &remainders, places });
+            take(s, &LearntInfluence { posterior, prior, remainders: &remainders, places })?;
         }
         Ok(())
     }
@@ -392,7 +392,13 @@ struct Told {
 
 /// The hyperparameters under which the presses of all `sensors`, which are of one kind, are the most probable: steps along one
 /// logarithm at a time, ever smaller.
-fn most_probable(sensors: &[SensorPresses], mean: Mean, length_m: f64, told: Told) -> Hyperparameters {
+fn most_probable(
+    sensors: &[SensorPresses],
+    mean: Mean,
+    length_m: f64,
+    told: Told,
+    watch: Watch,
+) -> Result<Hyperparameters, Cancelled> {
     let hyper = |logs: &[f64; 5]| {
         let power = |i: usize| if logs[i] <= LOWEST[i] { 0.0 } else { 10f64.powf(logs[i]) };
         match mean {
@@ -412,7 +418,10 @@ fn most_probable(sensors: &[SensorPresses], mean: Mean, length_m: f64, told: Tol
             },
         }
     };
-    let evidence = |logs: &[f64; 5]| sensors.iter().map(|s| s.log_evidence(&hyper(logs))).sum::<f64>();
+    let evidence = |logs: &[f64; 5]| {
+        watch.round()?;
+        Ok(sensors.iter().map(|s| s.log_evidence(&hyper(logs))).sum::<f64>())
+    };
     let mut free = vec![2];
     if !told.offset {
         free.push(3);
@@ -430,11 +439,11 @@ fn most_probable(sensors: &[SensorPresses], mean: Mean, length_m: f64, told: Tol
     if mean == Mean::Zero {
         logs[2] = 0.0;
     }
-    let mut best = evidence(&logs);
+    let mut best = evidence(&logs)?;
     for step in [1.0, 0.5, 0.25] {
-        climb(&mut logs, &mut best, &free, step, &evidence);
+        climb(&mut logs, &mut best, &free, step, &evidence)?;
     }
-    hyper(&logs)
+    Ok(hyper(&logs))
 }
 
 /// Steps along each free logarithm while the evidence rises.
@@ -443,8 +452,8 @@ fn climb(
     best: &mut f64,
     free: &[usize],
     step: f64,
-    evidence: &dyn Fn(&[f64; 5]) -> f64,
-) {
+    evidence: &dyn Fn(&[f64; 5]) -> Result<f64, Cancelled>,
+) -> Result<(), Cancelled> {
     const MOST_ROUNDS: usize = 8;
     for _ in 0..MOST_ROUNDS {
         let before = *best;
@@ -453,7 +462,7 @@ fn climb(
                 loop {
                     let mut candidate = *logs;
                     candidate[i] = (candidate[i] + direction).clamp(LOWEST[i], HIGHEST[i]);
-                    let value = evidence(&candidate);
+                    let value = evidence(&candidate)?;
                     if value <= *best {
                         break;
                     }
@@ -465,6 +474,7 @@ fn climb(
             break;
         }
     }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -82,7 +82,7 @@ impl Fit for Influence {
             return Err(InfluenceFitError::OnlyOnMeasured { what: "`structure`" });
         }
         if let Some(surface) = task.setup.surface().model() {
-            surface.check_solution()?;
+            surface.check_solution_watched(task.watch)?;
         }
         if let Extent::Plane { .. } = task.setup.surface().extent() {
             return Ok(InfluenceLocator::Plane(Box::new(self.fit_plane(task)?)));

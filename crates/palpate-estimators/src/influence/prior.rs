@@ -65,7 +65,15 @@ pub(super) struct Parts {
 
 impl<'a> Prior<'a> {
     /// The prior of `sensor` under `surface`.
-    pub fn new(surface: &'a dyn Surface, sensor: &Sensor, mean: Mean) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`] where `watch` stops the solutions.
+    pub fn new(
+        surface: &'a dyn Surface,
+        sensor: &Sensor,
+        mean: Mean,
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
         let Sensor { kind, position, .. } = *sensor;
         let extent = surface.extent();
         // A reaction sensor is part of its support, and does not sit beside it.
@@ -78,14 +86,14 @@ impl<'a> Prior<'a> {
         let mut places = vec![position];
         places.extend(along.iter().flat_map(|(a, b)| [*a, *b]).map(|x_m| Position { x_m, ..position }));
         places.extend(across.iter().flat_map(|(a, b)| [*a, *b]).map(|y_m| Position { y_m, ..position }));
-        let mut functions = surface.influence_functions(kind, &places).into_iter();
+        let mut functions = surface.influence_functions_watched(kind, &places, watch)?.into_iter();
         let function = functions.next().unwrap_or_else(|| surface.influence_function(kind, position));
         let mut beside = |ends: Option<(f64, f64)>| {
             let (before, behind) = ends?;
             Some(([functions.next()?, functions.next()?], behind - before))
         };
         let beside = [beside(along), beside(across)];
-        Self { mean, full_scale: surface.full_scale(kind), function, beside }
+        Ok(Self { mean, full_scale: surface.full_scale(kind), function, beside })
     }
 
     /// The parts at a contact position.
@@ -133,6 +141,8 @@ const MIXED: usize = 40;
 const MIXED_ON_A_PLANE: f64 = 144.0;
 /// Sensors that are solved for between two looks whether to go on, as many as plates have sooner together.
 const SOLVED_TOGETHER: usize = 24;
+/// Positions at which they are asked between two looks.
+const ROWS_EACH: usize = 64;
 /// Stretches between the places at which the largest remainder is looked for: along a line, and along each side of a plane.
 const STRETCHES: usize = 64;
 const STRETCHES_OF_A_SIDE: usize = 12;
@@ -150,10 +160,11 @@ impl Remainders {
         watch: Watch,
     ) -> Result<Self, Cancelled> {
         let mixture = Mixture::new(surface, kind, watch)?;
-        let sizes = mixture.rows(&everywhere(surface.extent()));
+        let sizes = mixture.rows(&everywhere(surface.extent()), watch)?;
         let norm = sizes.outer_iter().map(|row| row.dot(&row)).fold(0.0, f64::max).sqrt();
-        let presses = mixture.rows(presses) / norm;
-        let places = mixture.rows(places) / norm;
+        let presses = mixture.rows(presses, watch)? / norm;
+        let places = mixture.rows(places, watch)? / norm;
+        watch.round()?;
         Ok(Self {
             own: places.outer_iter().map(|row| row.dot(&row)).collect(),
             places: places.dot(&presses.t()),
@@ -181,8 +192,7 @@ impl<'a> Mixture<'a> {
         let (columns, rows) = mixed_sensors(extent);
         let mut functions = Vec::new();
         for places in cells(extent, columns, rows).chunks(SOLVED_TOGETHER) {
-            watch.round()?;
-            functions.extend(surface.influence_functions(mixed, places));
+            functions.extend(surface.influence_functions_watched(mixed, places, watch)?);
         }
         Ok(Self {
             functions,
@@ -192,15 +202,21 @@ impl<'a> Mixture<'a> {
     }
 
     /// A row a position: what each of the mixed sensors would read there.
-    fn rows(&self, positions: &[Position]) -> Array2<f64> {
+    fn rows(&self, positions: &[Position], watch: Watch) -> Result<Array2<f64>, Cancelled> {
         let count = self.functions.len();
-        Array2::from_shape_fn((positions.len(), count + self.taken.len()), |(row, column)| {
-            let at = positions[row];
-            match column.checked_sub(count) {
-                Some(support) => count as f64 * self.taken[support].at(at),
-                None => self.functions[column].at(at) / self.scale,
+        let mut rows = Array2::zeros((positions.len(), count + self.taken.len()));
+        for (i, (mut row, at)) in rows.outer_iter_mut().zip(positions).enumerate() {
+            if i.is_multiple_of(ROWS_EACH) {
+                watch.round()?;
             }
-        })
+            for (column, value) in row.iter_mut().enumerate() {
+                *value = match column.checked_sub(count) {
+                    Some(support) => count as f64 * self.taken[support].at(*at),
+                    None => self.functions[column].at(*at) / self.scale,
+                };
+            }
+        }
+        Ok(rows)
     }
 }
 

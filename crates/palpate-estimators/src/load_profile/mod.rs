@@ -33,6 +33,7 @@ use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
 use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface, UniformLoad, Unsolvable};
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{Cholesky, median, normal_interval_95, normal_quantile};
 use smoothness::{Mixture, Problem};
 
@@ -78,13 +79,26 @@ impl<'a> LoadSensors<'a> {
     /// # Errors
     /// [`LoadSensorsError`] for a live sensor without noise, when none is alive, or for a surface that cannot be solved.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LoadSensorsError> {
-        surface.check_solution()?;
-        let channel = |(sensor, sd): (&Sensor, Option<f64>)| {
-            let noise_sd = sd?;
-            let influence = surface.influence_function(sensor.kind, sensor.position);
-            Some(LoadChannel { influence, offset: 0.0, noise_sd })
+        Self::new_watched(surface, layout, Watch::NONE)
+    }
+
+    /// The same, watched while the surface is solved.
+    ///
+    /// # Errors
+    /// Those of [`LoadSensors::new`]; where the watch stopped it, [`LoadSensorsError::Surface`] with [`Unsolvable::Cancelled`].
+    pub fn new_watched(
+        surface: &'a dyn Surface,
+        layout: &Layout,
+        watch: Watch,
+    ) -> Result<Self, LoadSensorsError> {
+        surface.check_solution_watched(watch)?;
+        let channel = |(sensor, sd): (&Sensor, Option<f64>)| -> Result<_, Cancelled> {
+            let Some(noise_sd) = sd else { return Ok(None) };
+            let mut found = surface.influence_functions_watched(sensor.kind, &[sensor.position], watch)?;
+            Ok(found.pop().map(|influence| LoadChannel { influence, offset: 0.0, noise_sd }))
         };
-        let channels = layout.sensors().iter().zip(layout.reading_sds()?).map(channel).collect();
+        let channels = layout.sensors().iter().zip(layout.reading_sds()?).map(channel);
+        let channels = channels.collect::<Result<_, _>>().map_err(Unsolvable::from)?;
         Ok(Self { extent: surface.extent(), channels })
     }
 
@@ -93,7 +107,16 @@ impl<'a> LoadSensors<'a> {
     /// # Errors
     /// [`LoadSensorsError`] for a surface without a model, a live sensor without noise, or when none is alive.
     pub fn from_setup(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
-        Self::new(setup.surface().model().ok_or(LoadSensorsError::NoModel)?, setup.layout())
+        Self::from_setup_watched(setup, Watch::NONE)
+    }
+
+    /// The same, watched while the surface is solved.
+    ///
+    /// # Errors
+    /// Those of [`LoadSensors::from_setup`] and of [`LoadSensors::new_watched`].
+    pub fn from_setup_watched(setup: &'a Setup, watch: Watch) -> Result<Self, LoadSensorsError> {
+        let model = setup.surface().model().ok_or(LoadSensorsError::NoModel)?;
+        Self::new_watched(model, setup.layout(), watch)
     }
 
     /// The channels that live.

@@ -3,7 +3,7 @@
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{CleanSensors, SimulateError};
+use super::{CleanSensors, READINGS_EACH, STAGE, SimulateError};
 use crate::recording::{Recording, Row, TimedRecording};
 use crate::setup::Setup;
 use palpate_mechanics::contact::Contact;
@@ -11,6 +11,7 @@ use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
 use palpate_mechanics::surface::Motion;
 use palpate_mechanics::surface::modal::{ModalBeam, ModalResponse};
 use palpate_numerics::OutOfRange;
+use palpate_numerics::watch::Watch;
 
 /// Modes of the beam that swing; the others follow the contact at once. The tenth is a hundred times as fast as the first.
 const MODES: usize = 10;
@@ -88,9 +89,22 @@ pub fn simulate_moving(
     moving: &MovingContacts,
     seed: u64,
 ) -> Result<TimedRecording, SimulateError> {
+    simulate_moving_watched(setup, moving, seed, Watch::NONE)
+}
+
+/// The same, watched.
+///
+/// # Errors
+/// Those of [`simulate_moving`], and [`SimulateError::Cancelled`].
+pub fn simulate_moving_watched(
+    setup: &Setup,
+    moving: &MovingContacts,
+    seed: u64,
+    watch: Watch,
+) -> Result<TimedRecording, SimulateError> {
     let force_n = setup.force_n().ok_or(SimulateError::NoForce)?;
     let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
-    surface.check_solution()?;
+    surface.check_solution_watched(watch)?;
     let layout = setup.layout();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let errors = ChannelErrors::draw(layout, &mut rng);
@@ -98,10 +112,13 @@ pub fn simulate_moving(
     let times_s: Vec<f64> = (0..count).map(|i| i as f64 / moving.rate_hz).collect();
     let mut under = match moving.beam {
         Some(beam) => Under::Swings(beam.at_rest(MODES, &moving.contacts_at(0.0, force_n))),
-        None => Under::Balances(CleanSensors::new(surface, layout)),
+        None => Under::Balances(CleanSensors::new_watched(surface, layout, watch)?),
     };
     let (mut rows, mut second) = (Vec::with_capacity(count), Vec::new());
     for (i, time_s) in times_s.iter().enumerate() {
+        if i.is_multiple_of(READINGS_EACH) {
+            watch.counted(STAGE, "readings", i, count)?;
+        }
         let contacts = moving.contacts_at(*time_s, force_n);
         if let (Under::Swings(response), Some(before)) = (&mut under, i.checked_sub(1)) {
             advance(response, moving, force_n, (times_s[before], *time_s));

@@ -329,7 +329,7 @@ impl SmoothTracker {
     /// [`Cancelled`] when the watch stopped it.
     pub fn smoothed(&self, watch: Watch) -> Result<Vec<Track>, Cancelled> {
         /// Readings between two looks at the watch.
-        const EACH: usize = 64;
+        const EACH: usize = 16;
         let mut smoothed = self.tracks.clone();
         // The contacts at the reading after, as all readings show them.
         let mut later: Option<(u64, Belief)> = None;

@@ -100,7 +100,7 @@ impl<'a> CramerRaoBound<'a> {
         };
         let channels: Vec<Channel> =
             layout.sensors().iter().zip(layout.reading_sds()?).filter_map(channel).collect();
-        surface.check_solution()?;
+        surface.check_solution_watched(watch)?;
         let scales: Vec<f64> =
             channels.iter().map(|channel| surface.full_scale(channel.kind) / channel.sd).collect();
         let responses = Responses::new(surface, layout, watch)?;

@@ -86,7 +86,7 @@ impl<'a> Responses<'a> {
             watch
                 .stage("influence functions of the sensors", functions.len() as f64 / sensors.len() as f64)?;
             let positions: Vec<Position> = together.iter().map(|(_, position)| *position).collect();
-            functions.extend(surface.response_functions(together[0].0, &positions));
+            functions.extend(surface.response_functions_watched(together[0].0, &positions, watch)?);
         }
         Ok(Self::BySensor(functions))
     }

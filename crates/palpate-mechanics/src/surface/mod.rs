@@ -30,6 +30,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
 use palpate_numerics::OutOfRange;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// An elastic surface with a model.
 ///
@@ -48,6 +49,20 @@ pub trait Surface: Send + Sync {
         sensors.iter().map(|sensor| self.influence_function(kind, *sensor)).collect()
     }
 
+    /// The same, watched while the surface is solved.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch stopped it.
+    fn influence_functions_watched(
+        &self,
+        kind: SensorKind,
+        sensors: &[Position],
+        watch: Watch,
+    ) -> Result<Vec<Arc<dyn InfluenceFunction + '_>>, Cancelled> {
+        watch.round()?;
+        Ok(self.influence_functions(kind, sensors))
+    }
+
     /// The response function of a sensor: its influence times the force, unless the surface bends too far for that.
     fn response_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn ResponseFunction + '_> {
         Arc::new(Proportional(self.influence_function(kind, sensor)))
@@ -60,6 +75,20 @@ pub trait Surface: Send + Sync {
         sensors: &[Position],
     ) -> Vec<Arc<dyn ResponseFunction + '_>> {
         sensors.iter().map(|sensor| self.response_function(kind, *sensor)).collect()
+    }
+
+    /// The same, watched while the surface is solved.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch stopped it.
+    fn response_functions_watched(
+        &self,
+        kind: SensorKind,
+        sensors: &[Position],
+        watch: Watch,
+    ) -> Result<Vec<Arc<dyn ResponseFunction + '_>>, Cancelled> {
+        watch.round()?;
+        Ok(self.response_functions(kind, sensors))
     }
 
     /// Readings of many sensors, contact by contact; `None` where a surface has nothing that is sooner than their influence
@@ -101,7 +130,15 @@ pub trait Surface: Send + Sync {
     /// # Errors
     /// [`Unsolvable`], with what is singular or out of balance.
     fn check_solution(&self) -> Result<(), Unsolvable> {
-        Ok(())
+        self.check_solution_watched(Watch::NONE)
+    }
+
+    /// The same, watched; where it was stopped, the surface is as it was before.
+    ///
+    /// # Errors
+    /// As [`Surface::check_solution`], and [`Unsolvable::Cancelled`].
+    fn check_solution_watched(&self, watch: Watch) -> Result<(), Unsolvable> {
+        Ok(watch.round()?)
     }
 
     /// The largest magnitude that `influence` has for this `kind`, over all sensor and contact positions.

@@ -21,6 +21,9 @@ use super::learning::{LearntInfluence, learn};
 use crate::fit::FitTask;
 use palpate_mechanics::contact::Position;
 
+/// Nodes that are filled between two looks whether to go on.
+const NODES_EACH: usize = 16;
+
 /// Fits the influence functions of a line with a model.
 pub(super) fn fit(config: Influence, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
     let mut table =
@@ -28,6 +31,9 @@ pub(super) fn fit(config: Influence, task: FitTask) -> Result<BeamLocator, Influ
     let around = around_nodes(&table);
     let fill = &mut |s: usize, learnt: &LearntInfluence| {
         for node in 0..table.nodes() {
+            if node.is_multiple_of(NODES_EACH) {
+                task.watch.round()?;
+            }
             let [left, here, right] = [3 * node, 3 * node + 1, 3 * node + 2];
             let (rise, run_m) =
                 (learnt.mean(right) - learnt.mean(left), around[right].x_m - around[left].x_m);
@@ -36,6 +42,7 @@ pub(super) fn fit(config: Influence, task: FitTask) -> Result<BeamLocator, Influ
             table.slopes[at] = rise / run_m;
             table.variances[at] = learnt.variance(here);
         }
+        Ok(())
     };
     let channels = learn(config, task, &around, fill)?;
     Ok(BeamLocator::new(table, channels, config.force_belief(task.setup), config.contacts))

@@ -19,6 +19,9 @@ use super::learning::{LearntInfluence, learn};
 use crate::fit::FitTask;
 use palpate_mechanics::contact::Position;
 
+/// Nodes that are filled between two looks whether to go on.
+const NODES_EACH: usize = 16;
+
 /// Fits the influence functions of a plane with a model.
 pub(super) fn fit(config: Influence, task: FitTask) -> Result<PlaneLocator, InfluenceFitError> {
     if config.contacts > 1 {
@@ -28,9 +31,13 @@ pub(super) fn fit(config: Influence, task: FitTask) -> Result<PlaneLocator, Infl
     let places: Vec<Position> = (0..table.nodes()).map(|node| table.node(node)).collect();
     let fill = &mut |s: usize, learnt: &LearntInfluence| {
         for node in 0..table.nodes() {
+            if node.is_multiple_of(NODES_EACH) {
+                task.watch.round()?;
+            }
             table.values[node * table.sensors + s] = learnt.mean(node);
             table.variances[node * table.sensors + s] = learnt.variance(node);
         }
+        Ok(())
     };
     let channels = learn(config, task, &places, fill)?;
     Ok(PlaneLocator::new(table, channels, config.force_belief(task.setup)))

@@ -6,6 +6,7 @@ use super::spec::{self, PlateSpec};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 use crate::surface::{ContactLoad, InfluenceFunction, ReadingsByContact};
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Bicubic patches over the plate, with their own degrees of freedom.
 ///
@@ -19,7 +20,16 @@ pub(super) struct PlateInfluence {
 impl PlateInfluence {
     /// The influence functions of sensors of this `kind` at `sensors`; 0 everywhere for a raw channel, or a reaction where
     /// there is no support.
-    pub fn of_all(spec: &PlateSpec, solved: &Solved, kind: SensorKind, sensors: &[Position]) -> Vec<Self> {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch stopped the solutions.
+    pub fn of_all(
+        spec: &PlateSpec,
+        solved: &Solved,
+        kind: SensorKind,
+        sensors: &[Position],
+        watch: Watch,
+    ) -> Result<Vec<Self>, Cancelled> {
         let reads: Vec<Reads> =
             sensors.iter().map(|sensor| Reads::new(spec, solved, kind, *sensor)).collect();
         let load = |reads: &Reads| match reads {
@@ -27,13 +37,13 @@ impl PlateInfluence {
             Reads::Contact(_) | Reads::Nothing => None,
         };
         let loads: Vec<_> = reads.iter().filter_map(load).collect();
-        let mut solutions = solved.solutions(&loads).into_iter();
+        let mut solutions = solved.solutions(&loads, watch)?.into_iter();
         let degrees = reads.into_iter().filter_map(|reads| match reads {
             Reads::Shape(..) => solutions.next(),
             Reads::Contact(degrees) => Some(degrees),
             Reads::Nothing => Some(vec![0.0; solved.mesh.degrees()]),
         });
-        degrees.map(|degrees| Self { mesh: solved.mesh, degrees }).collect()
+        Ok(degrees.map(|degrees| Self { mesh: solved.mesh, degrees }).collect())
     }
 
     /// Bytes that this one takes.
@@ -164,7 +174,9 @@ impl ReadingsByContact for PlateReadings<'_> {
             self.sensors.iter().map(reading).collect()
         };
         let each = loads.chunks(TOGETHER).flat_map(|loads| {
-            self.solved.solutions(loads).into_iter().zip(loads).map(readings).collect::<Vec<_>>()
+            // Nobody watches so few solutions.
+            let solutions = self.solved.solutions(loads, Watch::NONE).unwrap_or_default();
+            solutions.into_iter().zip(loads).map(readings).collect::<Vec<_>>()
         });
         each.collect()
     }
@@ -192,7 +204,7 @@ pub(super) fn full_scales(spec: &PlateSpec) -> [f64; SensorKind::ALL.len()] {
         // Supports that only the finer mesh can tell apart.
         coarse.elements = spec.elements;
     }
-    match Solved::new(&coarse) {
+    match Solved::new(&coarse, Watch::NONE) {
         Ok(solved) => SensorKind::ALL.map(|kind| largest(&coarse, &solved, kind)),
         Err(_) => [f64::NAN; SensorKind::ALL.len()],
     }
@@ -204,7 +216,7 @@ fn largest(spec: &PlateSpec, solved: &Solved, kind: SensorKind) -> f64 {
         SensorKind::Reaction => spec.supports.iter().map(|support| support.position).collect(),
         SensorKind::Deflection | SensorKind::Slope | SensorKind::Strain => grid(spec),
     };
-    let functions = PlateInfluence::of_all(spec, solved, kind, &sensors);
+    let functions = PlateInfluence::of_all(spec, solved, kind, &sensors, Watch::NONE).unwrap_or_default();
     functions.iter().map(PlateInfluence::largest).fold(0.0, f64::max)
 }
 

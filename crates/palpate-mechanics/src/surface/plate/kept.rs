@@ -21,12 +21,15 @@ pub(super) struct Kept {
 
 impl Kept {
     /// The influence functions of some sensors; `solve` is asked once for all that are not kept.
-    pub fn of_all(
+    ///
+    /// # Errors
+    /// That of `solve`; then nothing new is kept.
+    pub fn of_all<E>(
         &self,
         kind: SensorKind,
         sensors: &[Position],
-        solve: impl FnOnce(&[Position]) -> Vec<PlateInfluence>,
-    ) -> Vec<Arc<PlateInfluence>> {
+        solve: impl FnOnce(&[Position]) -> Result<Vec<PlateInfluence>, E>,
+    ) -> Result<Vec<Arc<PlateInfluence>>, E> {
         let key = |at: &Position| (kind, [at.x_m.to_bits(), at.y_m.to_bits()]);
         let mut found: HashMap<Key, Arc<PlateInfluence>> = {
             let kept = self.functions.lock().unwrap_or_else(PoisonError::into_inner);
@@ -36,11 +39,11 @@ impl Kept {
             sensors.iter().filter(|at| !found.contains_key(&key(at))).copied().collect();
         if !missing.is_empty() {
             let solved: Vec<_> =
-                missing.iter().map(key).zip(solve(&missing).into_iter().map(Arc::new)).collect();
+                missing.iter().map(key).zip(solve(&missing)?.into_iter().map(Arc::new)).collect();
             self.keep(&solved);
             found.extend(solved);
         }
-        sensors.iter().filter_map(|at| found.get(&key(at)).cloned()).collect()
+        Ok(sensors.iter().filter_map(|at| found.get(&key(at)).cloned()).collect())
     }
 
     /// Keeps functions, and where these are then too many, none from before.

@@ -14,7 +14,7 @@ mod supports;
 pub use spec::{Edge, Edges, PlateError, PlateSpec, PointSupport, PointSupportKind, Unsolvable};
 
 use std::fmt;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +26,7 @@ use crate::contact::Position;
 use crate::sensing::SensorKind;
 use influence::{NotANumber, PlateInfluence, PlateReadings, full_scales};
 use kept::Kept;
+use palpate_numerics::watch::{Cancelled, Watch};
 use solved::Solved;
 
 /// A plate that was checked, whose equations are factored when they are first asked for, once for all its clones.
@@ -66,6 +67,8 @@ pub struct Plate {
 #[derive(Default)]
 struct Computed {
     solved: OnceLock<Result<Solved, Unsolvable>>,
+    /// Held while one thread solves, for which the others wait.
+    solving: Mutex<()>,
     influences: Kept,
     full_scales: OnceLock<[f64; SensorKind::ALL.len()]>,
 }
@@ -126,7 +129,7 @@ impl Plate {
     /// # Errors
     /// [`PlateError::Unsolvable`] when they are singular to working precision, or there is not the memory.
     pub fn solve(&self) -> Result<(), PlateError> {
-        self.solved().map(|_| ()).map_err(|reason| PlateError::Unsolvable { reason })
+        self.solved(Watch::NONE).map(|_| ()).map_err(|reason| PlateError::Unsolvable { reason })
     }
 
     /// Stored numbers of the factor of its equations.
@@ -134,11 +137,27 @@ impl Plate {
     /// # Errors
     /// As [`Plate::solve`].
     pub fn factor_size(&self) -> Result<usize, PlateError> {
-        self.solved().map(Solved::stored_numbers).map_err(|reason| PlateError::Unsolvable { reason })
+        let solved = self.solved(Watch::NONE);
+        solved.map(Solved::stored_numbers).map_err(|reason| PlateError::Unsolvable { reason })
     }
 
-    fn solved(&self) -> Result<&Solved, Unsolvable> {
-        self.computed.solved.get_or_init(|| Solved::new(&self.spec)).as_ref().map_err(|reason| *reason)
+    /// The factored equations, or why there are none. Work that was stopped leaves nothing behind: the next one who asks begins anew.
+    fn solved(&self, watch: Watch) -> Result<&Solved, Unsolvable> {
+        let Computed { solved, solving, .. } = &*self.computed;
+        if solved.get().is_none() {
+            let _alone = solving.lock().unwrap_or_else(PoisonError::into_inner);
+            if solved.get().is_none() {
+                let result = Solved::new(&self.spec, watch);
+                match result {
+                    Err(stopped) if Cancelled::caused(&stopped) => return Err(Cancelled.into()),
+                    result => drop(solved.set(result)),
+                }
+            }
+        }
+        match solved.get() {
+            Some(result) => result.as_ref().map_err(|reason| *reason),
+            None => Err(Cancelled.into()),
+        }
     }
 }
 
@@ -154,12 +173,25 @@ impl Surface for Plate {
         kind: SensorKind,
         sensors: &[Position],
     ) -> Vec<Arc<dyn InfluenceFunction + '_>> {
-        let Ok(solved) = self.solved() else {
-            return sensors.iter().map(|_| Arc::new(NotANumber) as Arc<dyn InfluenceFunction>).collect();
+        let functions = self.influence_functions_watched(kind, sensors, Watch::NONE);
+        functions.unwrap_or_else(|Cancelled| not_a_number(sensors))
+    }
+
+    fn influence_functions_watched(
+        &self,
+        kind: SensorKind,
+        sensors: &[Position],
+        watch: Watch,
+    ) -> Result<Vec<Arc<dyn InfluenceFunction + '_>>, Cancelled> {
+        watch.round()?;
+        let solved = match self.solved(watch) {
+            Ok(solved) => solved,
+            Err(Unsolvable::Cancelled(cancelled)) => return Err(cancelled),
+            Err(_) => return Ok(not_a_number(sensors)),
         };
-        let solve = |sensors: &[Position]| PlateInfluence::of_all(&self.spec, solved, kind, sensors);
-        let all = self.computed.influences.of_all(kind, sensors, solve).into_iter();
-        all.map(|function| function as Arc<dyn InfluenceFunction>).collect()
+        let solve = |sensors: &[Position]| PlateInfluence::of_all(&self.spec, solved, kind, sensors, watch);
+        let all = self.computed.influences.of_all(kind, sensors, solve)?.into_iter();
+        Ok(all.map(|function| function as Arc<dyn InfluenceFunction>).collect())
     }
 
     fn response_functions(
@@ -167,8 +199,16 @@ impl Surface for Plate {
         kind: SensorKind,
         sensors: &[Position],
     ) -> Vec<Arc<dyn ResponseFunction + '_>> {
-        let influences = self.influence_functions(kind, sensors).into_iter();
-        influences.map(|influence| Arc::new(Proportional(influence)) as Arc<dyn ResponseFunction>).collect()
+        proportional(self.influence_functions(kind, sensors))
+    }
+
+    fn response_functions_watched(
+        &self,
+        kind: SensorKind,
+        sensors: &[Position],
+        watch: Watch,
+    ) -> Result<Vec<Arc<dyn ResponseFunction + '_>>, Cancelled> {
+        Ok(proportional(self.influence_functions_watched(kind, sensors, watch)?))
     }
 
     /// By reciprocity; `None` when [`Plate::solve`] fails.
@@ -176,7 +216,7 @@ impl Surface for Plate {
         &self,
         sensors: &[(SensorKind, Position)],
     ) -> Option<Arc<dyn ReadingsByContact + '_>> {
-        Some(Arc::new(PlateReadings::new(&self.spec, self.solved().ok()?, sensors)))
+        Some(Arc::new(PlateReadings::new(&self.spec, self.solved(Watch::NONE).ok()?, sensors)))
     }
 
     fn solution_cost(&self, sensors: usize, solving: Solving) -> Option<SolutionCost> {
@@ -196,8 +236,9 @@ impl Surface for Plate {
         Some(SolutionCost { memory_bytes, seconds_once, seconds_each: multiply_adds / PRODUCTS })
     }
 
-    fn check_solution(&self) -> Result<(), Unsolvable> {
-        self.solved().map(|_| ())
+    fn check_solution_watched(&self, watch: Watch) -> Result<(), Unsolvable> {
+        watch.round()?;
+        self.solved(watch).map(|_| ())
     }
 
     fn is_supported_at(&self, position: Position) -> bool {
@@ -223,6 +264,15 @@ impl Surface for Plate {
     fn extent(&self) -> Extent {
         self.spec.extent()
     }
+}
+
+fn not_a_number<'a>(sensors: &[Position]) -> Vec<Arc<dyn InfluenceFunction + 'a>> {
+    sensors.iter().map(|_| Arc::new(NotANumber) as Arc<dyn InfluenceFunction>).collect()
+}
+
+fn proportional<'a>(influences: Vec<Arc<dyn InfluenceFunction + 'a>>) -> Vec<Arc<dyn ResponseFunction + 'a>> {
+    let influences = influences.into_iter();
+    influences.map(|influence| Arc::new(Proportional(influence)) as Arc<dyn ResponseFunction>).collect()
 }
 
 impl PartialEq for Plate {

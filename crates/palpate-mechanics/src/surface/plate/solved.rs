@@ -12,6 +12,7 @@ use super::spec::{Edge, Edges, MOST_IMBALANCE, PlateSpec, PointSupportKind, Unso
 use super::supports::SupportForces;
 use crate::contact::Position;
 use palpate_numerics::small::add_multiple;
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{SparseCholesky, SparseSymmetric};
 
 /// The factored equations of a plate.
@@ -50,17 +51,19 @@ impl Solved {
     /// Sets up and factors the equations of a plate that was checked, and solves them for forces all over it.
     ///
     /// # Errors
-    /// [`Unsolvable`] when they are singular to working precision, too large for the memory that there is, or a solution is not in balance.
-    pub fn new(spec: &PlateSpec) -> Result<Self, Unsolvable> {
+    /// [`Unsolvable`] when they are singular to working precision, too large for the memory that there is, a solution is not in balance, or the
+    /// watch stopped it.
+    pub fn new(spec: &PlateSpec, watch: Watch) -> Result<Self, Unsolvable> {
         let mesh = Mesh::new(spec.extent(), spec.elements);
         let motions = RigidMotions::new(&mesh, spec.edges);
         let unknowns = Unknowns::new(&mesh, spec.edges, motions.nodes());
         let element = element_stiffness(&mesh, spec.flexural_rigidity(), spec.poissons_ratio);
-        let factor = SparseCholesky::new(&stiffness_matrix(&mesh, &unknowns, &element))?;
-        let supports = Supports::new(spec, &mesh, motions, &unknowns, &factor)?;
+        let stiffness = stiffness_matrix(&mesh, &unknowns, &element, watch)?;
+        let factor = SparseCholesky::new_watched(&stiffness, watch)?;
+        let supports = Supports::new(spec, &mesh, motions, &unknowns, &factor, watch)?;
         let balance = Balance::new(&mesh, spec.edges, &unknowns, &element);
         let solved = Self { mesh, unknowns, factor, element, supports, balance };
-        solved.check(spec)?;
+        solved.check(spec, watch)?;
         Ok(solved)
     }
 
@@ -71,19 +74,24 @@ impl Solved {
 
     /// All degrees of freedom under each of `loads`, a functional and what the solution is multiplied by; NaN where a solution is not in
     /// balance.
-    pub fn solutions(&self, loads: &[(Functional, f64)]) -> Vec<Vec<f64>> {
-        let each = loads.chunks(TOGETHER).flat_map(|loads| {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch stopped it.
+    pub fn solutions(&self, loads: &[(Functional, f64)], watch: Watch) -> Result<Vec<Vec<f64>>, Cancelled> {
+        let mut all = Vec::with_capacity(loads.len());
+        for loads in loads.chunks(TOGETHER) {
+            watch.round()?;
             let functionals: Vec<&Functional> = loads.iter().map(|(functional, _)| functional).collect();
-            let solved = self.solve(&functionals);
+            let solved = self.solve(&functionals, watch)?;
             let times = |(shape, (_, factor)): (Shape, &(Functional, f64))| {
                 let factor = if shape.is_balanced() { *factor } else { f64::NAN };
                 let mut degrees = self.unknowns.expand(&shape.bent, factor);
                 self.supports.motions.add(&mut degrees, factor, &shape.moved);
                 degrees
             };
-            solved.into_iter().zip(loads).map(times).collect::<Vec<_>>()
-        });
-        each.collect()
+            all.extend(solved.into_iter().zip(loads).map(times));
+        }
+        Ok(all)
     }
 
     /// The force of a point support on the plate, positive upward, under a downward unit force, as degrees of freedom of a
@@ -103,9 +111,9 @@ impl Solved {
 
     /// Shapes under loads, few enough for one sweep; those out of balance are refined, by what their residuals do to the plate
     /// (Golub and Van Loan, *Matrix Computations*, 3.5.3).
-    fn solve(&self, loads: &[&Functional]) -> Vec<Shape> {
+    fn solve(&self, loads: &[&Functional], watch: Watch) -> Result<Vec<Shape>, Cancelled> {
         let each = |load: &&Functional| self.unknowns.gathered(load.iter().copied());
-        let solved = self.swept(&loads.iter().map(each).collect::<Vec<_>>());
+        let solved = self.swept(&loads.iter().map(each).collect::<Vec<_>>(), watch)?;
         let mut shapes: Vec<Shape> = solved.into_iter().map(Shape::held).collect();
         for (shape, load) in shapes.iter_mut().zip(loads) {
             self.hold(shape, load, &load.iter().copied());
@@ -120,7 +128,7 @@ impl Solved {
             let residuals: Vec<Vec<f64>> =
                 off.iter().zip(&loads).map(|(shape, load)| self.residual(shape, load)).collect();
             let each = |residual: &Vec<f64>| self.unknowns.gathered(residual.iter().copied().enumerate());
-            let changes = self.swept(&residuals.iter().map(each).collect::<Vec<_>>());
+            let changes = self.swept(&residuals.iter().map(each).collect::<Vec<_>>(), watch)?;
             for (((shape, load), residual), change) in off.iter_mut().zip(loads).zip(&residuals).zip(changes)
             {
                 let mut better = Shape::held(change);
@@ -132,14 +140,14 @@ impl Solved {
                 }
             }
         }
-        shapes
+        Ok(shapes)
     }
 
     /// K₀ₕ⁻¹·f for each of some loads.
-    fn swept(&self, loads: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    fn swept(&self, loads: &[Vec<f64>], watch: Watch) -> Result<Vec<Vec<f64>>, Cancelled> {
         let mut together = loads.concat();
-        self.factor.solve_in_place(&mut together);
-        together.chunks_exact(self.unknowns.count().max(1)).map(<[f64]>::to_vec).collect()
+        self.factor.solve_in_place_watched(&mut together, watch)?;
+        Ok(together.chunks_exact(self.unknowns.count().max(1)).map(<[f64]>::to_vec).collect())
     }
 
     /// The residual of a load: f + B·r − K₀·u, by degree of freedom; 0 where an edge holds it.
@@ -196,14 +204,14 @@ impl Solved {
     }
 
     /// Solves for forces on a grid, the edges included.
-    fn check(&self, spec: &PlateSpec) -> Result<(), Unsolvable> {
+    fn check(&self, spec: &PlateSpec, watch: Watch) -> Result<(), Unsolvable> {
         const ALONG: usize = 3;
         let at = |i: usize, size_m: f64| i as f64 / ALONG as f64 * size_m;
         let row =
             |j| (0..=ALONG).map(move |i| Position { x_m: at(i, spec.length_m), y_m: at(j, spec.width_m) });
         let places: Vec<Position> = (0..=ALONG).flat_map(row).collect();
         let loads: Vec<Functional> = places.iter().map(|place| deflection_at(&self.mesh, *place)).collect();
-        let shapes = self.solve(&loads.iter().collect::<Vec<_>>());
+        let shapes = self.solve(&loads.iter().collect::<Vec<_>>(), watch)?;
         match shapes.iter().zip(places).find(|(shape, _)| !shape.is_balanced()) {
             Some((shape, at)) => Err(Unsolvable::OutOfBalance { share: shape.imbalance, at }),
             None => Ok(()),
@@ -252,15 +260,16 @@ impl Supports {
         motions: RigidMotions,
         unknowns: &Unknowns,
         factor: &SparseCholesky,
+        watch: Watch,
     ) -> Result<Self, Unsolvable> {
         let deflections: Vec<Functional> =
             spec.supports.iter().map(|support| deflection_at(mesh, support.position)).collect();
         let solution = |load: &Functional| {
             let mut u = unknowns.gathered(load.iter().copied());
-            factor.solve_in_place(&mut u);
-            u
+            factor.solve_in_place_watched(&mut u, watch)?;
+            Ok(u)
         };
-        let solutions: Vec<Vec<f64>> = deflections.iter().map(solution).collect();
+        let solutions = deflections.iter().map(solution).collect::<Result<Vec<_>, Cancelled>>()?;
         let own = |i: usize| match spec.supports[i].kind {
             PointSupportKind::Simple => 0.0,
             PointSupportKind::Elastic { stiffness_n_per_m } => 1.0 / stiffness_n_per_m,
@@ -456,14 +465,24 @@ fn held_degrees(mesh: &Mesh, edges: Edges, column: usize, row: usize) -> [bool; 
 pub(super) type Functional = Vec<(usize, f64)>;
 
 /// The stiffness matrix of equal elements, of the unknowns only.
-fn stiffness_matrix(mesh: &Mesh, unknowns: &Unknowns, element: &ElementStiffness) -> SparseSymmetric {
+fn stiffness_matrix(
+    mesh: &Mesh,
+    unknowns: &Unknowns,
+    element: &ElementStiffness,
+    watch: Watch,
+) -> Result<SparseSymmetric, Cancelled> {
+    /// Columns between two looks whether to go on.
+    const EACH: usize = 1 << 12;
     let mut matrix = SparseSymmetric::with_capacity(unknowns.count() * NEIGHBOURS * NODE_DEGREES / 2);
     for unknown in 0..unknowns.count() {
+        if unknown % EACH == 0 {
+            watch.round()?;
+        }
         let column = element_column(mesh, element, unknowns.degree(unknown));
         let elements = column.entries(mesh);
         matrix.push_column(elements.filter_map(|(degree, value)| Some((unknowns.place(degree)?, value))));
     }
-    matrix
+    Ok(matrix)
 }
 
 /// A node couples with itself and the eight around it.

@@ -263,6 +263,9 @@ pub enum Unsolvable {
         /// Position of the force.
         at: Position,
     },
+    /// Whoever watched the work stopped it.
+    #[error("{0}")]
+    Cancelled(#[from] palpate_numerics::watch::Cancelled),
 }
 
 impl Unsolvable {

@@ -6,6 +6,7 @@ mod mesh;
 mod properties;
 mod refusals;
 mod series;
+mod stopped;
 
 use super::*;
 
