@@ -56,6 +56,7 @@ mod recording;
 mod rig;
 mod sections;
 mod sensors;
+mod stage;
 mod study;
 mod surface;
 mod training;
@@ -65,6 +66,7 @@ pub use error::{RigError, RigProblem};
 pub use first_rig::{FirstRig, FirstRigError, Hints};
 pub use rig::{Rig, RigSimulationError};
 pub use sections::RigSections;
+pub use stage::Stage;
 pub use study::{Arm, AskedLayout, Judging, Study};
 
 #[cfg(test)]

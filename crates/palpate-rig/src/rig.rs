@@ -13,6 +13,7 @@ use palpate_numerics::watch::Watch;
 
 use crate::error::RigError;
 use crate::sections::RigSections;
+use crate::stage::Stage;
 
 /// A bench, where to press it, and the method that then locates: all checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +30,8 @@ pub struct Rig {
     pub motion: Option<MovingContacts>,
     /// Candidates and constraints of a sensor design, where the rig says.
     pub design: Option<SensorDesign>,
+    /// The machine that presses by itself, where the rig says.
+    pub stage: Option<Stage>,
 }
 
 impl Rig {
@@ -66,6 +69,7 @@ impl Rig {
             loads: sections.loads(setup.surface())?,
             motion: sections.motion(&setup)?,
             design: sections.design(&setup)?,
+            stage: sections.stage()?,
             setup,
         })
     }

@@ -16,6 +16,7 @@ use crate::estimator::EstimatorKeys;
 use crate::motion::{self, MotionKeys};
 use crate::recording::RecordingKeys;
 use crate::sensors::{self, SensorsKeys};
+use crate::stage::{Stage, StageKeys};
 use crate::surface::SurfaceKeys;
 use crate::training::{ContactKeys, LoadKeys, TrainingKeys, check_force};
 use crate::values::OneOrMany;
@@ -66,6 +67,8 @@ pub(crate) struct RigFile {
     pub load: Vec<At<LoadKeys>>,
     /// Candidates of a sensor design, and its constraints.
     pub design: Option<At<DesignKeys>>,
+    /// The machine that presses by itself.
+    pub stage: Option<StageKeys>,
 }
 
 /// Greatest number of values that a recording of the training positions should hold in memory.
@@ -174,6 +177,14 @@ impl RigSections {
     /// [`RigError`] for candidates or constraints that do not go with the setup.
     pub fn design(&self, setup: &Setup) -> Result<Option<SensorDesign>, RigError> {
         self.0.design.as_ref().map(|keys| keys.build(setup)).transpose()
+    }
+
+    /// `[stage]`
+    ///
+    /// # Errors
+    /// [`RigError`] for what no machine can do.
+    pub fn stage(&self) -> Result<Option<Stage>, RigError> {
+        self.0.stage.as_ref().map(StageKeys::build).transpose()
     }
 }
 
