@@ -65,7 +65,7 @@ fn plan(rig: &Rig) -> Vec<Press> {
     let positions = training.positions(rig.setup.surface().extent()).unwrap();
     positions
         .iter()
-        .flat_map(|position| std::iter::repeat_n(Press { position: *position, force_n: Some(FORCE_N) }, 3))
+        .flat_map(|position| std::iter::repeat_n(Press { position: *position, force_n: Some(FORCE_N), depth_m: None }, 3))
         .collect()
 }
 
@@ -120,7 +120,7 @@ fn presses_can_be_taken_back_left_out_and_ended() {
     assert!(rows.iter().filter(|row| row.touches()).count() >= 2);
     guide.stop();
     assert_eq!((guide.waiting(), guide.next_press()), (Waiting::Nothing, None));
-    guide.extend([Press { position: Position::along(0.2), force_n: Some(FORCE_N) }]);
+    guide.extend([Press { position: Position::along(0.2), force_n: Some(FORCE_N), depth_m: None }]);
     assert_eq!(hand.obey(&mut guide, 2000).iter().filter(|row| row.touches()).count(), 1);
 }
 

@@ -36,7 +36,7 @@ fn every_line_is_accounted_for_and_memory_stays_flat() {
         creep_s: 5.0,
     };
     let mut board =
-        SimulatedBoard::new(&rig.setup, &BoardConfig { rate_hz: RATE_HZ, seed: 1 }, Finger::random(&rig, 1))
+        SimulatedBoard::new(&rig.setup, &BoardConfig { rate_hz: RATE_HZ, seed: 1, load_cell: None }, Finger::random(&rig, 1))
             .unwrap()
             .with_faults(faults, 1);
     let mut session = Session::new(&locator, &SessionConfig::default());

@@ -5,24 +5,27 @@ use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::simulate::SimulatedBench;
 use palpate_live::calibration::{Guide, Press, Progress, Waiting};
-use palpate_live::stage::{Firmware, GcodeStage, SimulatedMachine, StageError, StageSetup};
+use palpate_live::stage::{Firmware, GcodeStage, SimulatedMachine, StageError};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::units::mm;
-use palpate_rig::Rig;
+use palpate_rig::{Rig, Stage};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
+const DEPTH_M: f64 = 1.5e-3;
 
-fn stage_setup() -> StageSetup {
-    StageSetup {
+fn stage_setup() -> Stage {
+    Stage {
         origin_m: (mm(15.0), mm(40.0)),
         touch_z_m: mm(52.0),
         clearance_m: mm(5.0),
-        depth_m: mm(1.5),
+        depths_m: vec![DEPTH_M],
         travel_m_per_s: mm(50.0),
         press_m_per_s: mm(2.0),
+        load_cell: None,
+        force_limit_n: None,
     }
 }
 
@@ -43,7 +46,7 @@ fn the_finger_is_where_the_lines_send_it_of_either_firmware() {
         stage.home().unwrap();
         stage.travel(Position::along(mm(123.0))).unwrap();
         assert_eq!(machine.contact(), None);
-        stage.press().unwrap();
+        stage.press(DEPTH_M).unwrap();
         let contact = machine.contact().unwrap();
         assert!((contact.position.x_m - mm(123.0)).abs() < 1e-9 && (contact.force_n - 3.0).abs() < 1e-9);
         stage.lift().unwrap();
@@ -59,7 +62,7 @@ fn a_stop_reaches_the_machine_and_nothing_moves_after_it() {
         let mut stage = GcodeStage::connect(machine.clone(), stage_setup(), Arc::clone(&stop)).unwrap();
         stage.home().unwrap();
         stop.store(true, Ordering::Relaxed);
-        assert!(matches!(stage.press(), Err(StageError::Stopped)));
+        assert!(matches!(stage.press(DEPTH_M), Err(StageError::Stopped)));
         assert!(machine.is_stopped());
         assert_eq!(machine.contact(), None);
     }
@@ -68,7 +71,7 @@ fn a_stop_reaches_the_machine_and_nothing_moves_after_it() {
 #[test]
 fn numbers_out_of_range_are_refused_with_their_bound() {
     let machine = SimulatedMachine::new(Firmware::Grbl, stage_setup(), rig().setup.surface().extent(), 3.0);
-    let setup = StageSetup { depth_m: 0.0, ..stage_setup() };
+    let setup = Stage { depths_m: vec![0.0], ..stage_setup() };
     let error = GcodeStage::connect(machine, setup, Arc::default()).unwrap_err().to_string();
     assert!(error.contains("the depth") && error.contains("greater than 0"), "{error}");
 }
@@ -81,7 +84,7 @@ fn a_machine_calibrates_by_itself_to_the_limit() {
     let force_n = rig.setup.force_n().unwrap();
     let positions = training.positions(rig.setup.surface().extent()).unwrap();
     let plan = positions.iter().flat_map(|position| {
-        std::iter::repeat_n(Press { position: *position, force_n: Some(force_n) }, training.repeats)
+        std::iter::repeat_n(Press { position: *position, force_n: Some(force_n), depth_m: None }, training.repeats)
     });
     let machine =
         SimulatedMachine::new(Firmware::Marlin, stage_setup(), rig.setup.surface().extent(), force_n);
@@ -100,7 +103,7 @@ fn a_machine_calibrates_by_itself_to_the_limit() {
         match (guide.waiting(), guide.next_press()) {
             (Waiting::Press, Some((_, press))) => {
                 stage.travel(press.position).unwrap();
-                stage.press().unwrap();
+                stage.press(DEPTH_M).unwrap();
             }
             (Waiting::Release, _) => stage.lift().unwrap(),
             (Waiting::Nothing, _) => break,

@@ -1,24 +1,23 @@
-//! `palpate calibrate`: a calibration by hand, guided press by press.
+//! `palpate calibrate`: a calibration by hand, guided press by press, or by a machine.
 
 use crate::failure::{Complaint, Failure};
 use crate::progress::{self, Observer};
 use crate::remark::remark;
 use crate::target::{Inputs, Target};
-use crate::{input, output, target};
-use palpate_design::positions::{PositionDesign, next_press};
-use palpate_estimators::evaluation::cross_validate;
+use crate::{input, output};
 use palpate_estimators::fit::{Fit, FitTask};
-use palpate_estimators::recording::{self, Column, Columns, Recording, Row};
-use palpate_live::calibration::{Guide, Press, Progress, Waiting};
-use palpate_live::frame::{BadFrame, Channel, Decoder, Frame};
-use palpate_live::input::{Arrival, Arrived, Input};
+use palpate_live::calibration::{
+    self, Calibration, CalibrationError, DepthKnowledge, Journal, JournalError, Machine, MachineError,
+    MachineNote, Note, PlanError, Press, Waiting,
+};
+use palpate_live::input::Input;
 use palpate_live::pipeline::WAITING;
 use palpate_live::source::{Source, SourceUrl};
+use palpate_live::stage::{StageThread, StageUrl};
 use palpate_live::stamp::HostClock;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_length_mm;
-use palpate_rig::Rig;
-use std::collections::BTreeMap;
+use palpate_rig::{Rig, Stage};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel, sync_channel};
 use std::time::Duration;
@@ -27,6 +26,7 @@ use std::time::Duration;
 ///
 /// Positions and repeats are those of the rig's [training]. Every press is in the file of presses before the next one is asked for, and --resume
 /// goes on from there. Between presses the surface is let go, and what it reads then is recorded too: offsets and drift follow from it.
+/// With --stage a machine presses by itself, as the rig's [stage] says: Enter or Ctrl-C stops it at once.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The rig file
@@ -34,6 +34,9 @@ pub struct Arguments {
     /// Source of the readings: `serial:///dev/ttyACM0`, `tcp://host:port`, `udp://:port`, `mqtt://host/topic`, `file:recording.mcap`, `-` for stdin
     #[arg(long, value_name = "SOURCE")]
     from: SourceUrl,
+    /// A machine that presses: `gcode:serial:///dev/ttyUSB0?baud=115200` or `gcode:tcp://host:port`, of Marlin or GRBL firmware
+    #[arg(long, value_name = "MACHINE")]
+    stage: Option<StageUrl>,
     /// The recording of the presses
     #[arg(long, value_name = "FILE.csv")]
     presses: PathBuf,
@@ -51,241 +54,221 @@ pub struct Arguments {
     seed: u64,
 }
 
-/// Presses so far, and the file that has them.
-struct Journal<'a> {
-    rig_path: &'a Path,
-    rig: &'a Rig,
-    columns: Columns,
-    target: Target,
-    rows: Vec<Row>,
-    /// Seconds by which the times of new rows come after those of the file.
-    later_s: f64,
-}
+/// Longest time without a look at keys, signals and the machine.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = Inputs::new([arguments.rig.as_path()]);
     let out = Target::new(&arguments.out, &inputs)?;
+    Target::new(&arguments.presses, &inputs)?;
     let rig = input::read_rig(&arguments.rig)?;
-    let mut journal = Journal::open(arguments, &rig, &inputs)?;
-    let mut guide = Guide::new(plan(arguments, &rig, &journal.rows)?);
-    if let Some((_, press)) = guide.next_press() {
+    let stage = stage(arguments, &rig)?;
+    let journal = journal(arguments, &rig, stage.as_ref())?;
+    let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
+    let plan = calibration::plan(&rig, arguments.force, depths_m, journal.rows())
+        .map_err(|error| about_plan(&arguments.rig, error))?;
+    if let Some(press) = plan.first() {
         let extent = rig.setup.surface().extent();
-        remark!("{} presses to go; the first at {}", guide.plan().len(), place(press, extent));
-        remark!("r and Enter takes the last press back, s leaves the next out, q ends here");
-        press_all(arguments, &mut guide, &mut journal)?;
+        remark!("{} presses to go; the first at {}", plan.len(), place(*press, extent));
+        let columns = arguments.from.columns();
+        let calibration = Calibration::new(&rig.setup, stage.as_ref(), columns, plan, journal)
+            .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
+        press_all(arguments, &rig, stage, calibration)?;
     }
     finish(arguments, &rig, &out)
 }
 
-/// The presses of the rig's training positions that are not among those of before.
-fn plan(arguments: &Arguments, rig: &Rig, before: &[Row]) -> Result<Vec<Press>, Failure> {
-    let training = rig.training().map_err(|error| Complaint::about(&arguments.rig, error))?;
-    let positions = training
-        .positions(rig.setup.surface().extent())
-        .map_err(|error| Complaint::about(&arguments.rig, error))?;
-    let force_n = arguments.force.or(training.force_n).or(rig.setup.force_n());
-    let mut plan = Vec::new();
-    for position in positions {
-        let done = before.iter().filter(|row| row.touches() && row.position == position).count();
-        let left = training.repeats.saturating_sub(done);
-        plan.extend(std::iter::repeat_n(Press { position, force_n }, left));
+/// The stage of the rig, where a machine presses.
+fn stage(arguments: &Arguments, rig: &Rig) -> Result<Option<Stage>, Failure> {
+    if arguments.stage.is_none() {
+        return Ok(None);
     }
-    Ok(plan)
+    let Some(stage) = &rig.stage else {
+        let complaint = Complaint::about(&arguments.rig, "--stage needs the rig's section [stage]");
+        return Err(complaint.help("docs/live.md says how: origin, touch and depths at least").into());
+    };
+    if arguments.force.is_some() && (stage.load_cell.is_some() || stage.depths_m.len() > 1) {
+        let why = if stage.load_cell.is_some() {
+            "the load cell measures the force"
+        } else {
+            "presses of several depths have several forces"
+        };
+        return Err(Complaint::new(format!("--force does not go with the rig's [stage]: {why}"))
+            .help("leave --force out")
+            .into());
+    }
+    Ok(Some(stage.clone()))
 }
 
-impl<'a> Journal<'a> {
-    /// The file of presses, empty, or with the presses that it had.
-    fn open(arguments: &'a Arguments, rig: &'a Rig, inputs: &Inputs) -> Result<Self, Failure> {
-        let path = &arguments.presses;
-        let target = Target::new(path, inputs)?;
-        let columns = columns(rig).map_err(|complaint| Complaint::about(&arguments.rig, complaint))?;
-        let mut journal =
-            Self { rig_path: &arguments.rig, rig, columns, target, rows: Vec::new(), later_s: 0.0 };
-        if path.exists() {
-            if !arguments.resume {
-                let complaint = Complaint::new(format!("{} is there already", path.display()));
-                return Err(complaint
-                    .help("--resume goes on with its presses; another name begins anew")
-                    .into());
-            }
-            journal.rows = input::read_recording(&rig.setup, path)?.rows;
-            let last_s = journal.rows.iter().filter_map(|row| row.time_s).fold(0.0, f64::max);
-            // The time between two runs is not known; what drifted in it is told by the untouched rows of both.
-            journal.later_s = last_s + 60.0;
+/// The file of presses, empty, or with the presses that it had.
+fn journal(arguments: &Arguments, rig: &Rig, stage: Option<&Stage>) -> Result<Journal, Failure> {
+    let path = &arguments.presses;
+    let before = match (path.exists(), arguments.resume) {
+        (false, _) => Vec::new(),
+        (true, true) => input::read_recording(&rig.setup, path)?.rows,
+        (true, false) => {
+            let complaint = Complaint::new(format!("{} is there already", path.display()));
+            return Err(complaint.help("--resume goes on with its presses; another name begins anew").into());
         }
-        Ok(journal)
-    }
+    };
+    let depth = if stage.is_some() { DepthKnowledge::Known } else { DepthKnowledge::Unknown };
+    Journal::new(&rig.setup, path, pressed_for(&arguments.rig), before, depth)
+        .map_err(|error| about_journal(&arguments.rig, error))
+}
 
-    fn add(&mut self, row: Row) -> Result<(), Failure> {
-        let time_s = row.time_s.map(|time_s| time_s + self.later_s);
-        self.rows.push(Row { time_s, ..row });
-        self.save()
-    }
+/// Comment of a file of presses.
+pub fn pressed_for(rig: &Path) -> String {
+    format!("palpate {}, pressed for {}", env!("CARGO_PKG_VERSION"), rig.display())
+}
 
-    /// Takes the last press out, with the untouched rows after it.
-    fn take_back(&mut self) -> Result<(), Failure> {
-        if let Some(last) = self.rows.iter().rposition(Row::touches) {
-            self.rows.truncate(last);
-            self.save()?;
-        }
-        Ok(())
-    }
+/// A complaint about a rig that does not say where to press.
+pub fn about_plan(rig: &Path, error: PlanError) -> Failure {
+    Complaint::about(rig, error).into()
+}
 
-    /// Presses that were recorded.
-    fn presses(&self) -> usize {
-        self.rows.iter().filter(|row| row.touches()).count()
-    }
-
-    fn save(&self) -> Result<(), Failure> {
-        let mut rows = self.rows.clone();
-        // An untouched row is told from a press by its force, where presses have one.
-        if self.columns.force.is_none() || rows.iter().any(|row| row.force_n.is_none()) {
-            rows.retain(Row::touches);
-        }
-        let recording = Recording::new(self.rig.setup.layout(), "calibration", rows);
-        let comment =
-            format!("palpate {}, pressed for {}", env!("CARGO_PKG_VERSION"), self.rig_path.display());
-        let mut csv = Vec::new();
-        recording::write_as(&recording, &self.columns, &comment, &mut csv)
-            .map_err(|error| target::cannot("write", self.target.path(), &error))?;
-        self.target.write(&csv)
+/// A complaint about presses that cannot be kept.
+pub fn about_journal(rig: &Path, error: JournalError) -> Failure {
+    let complaint = match &error {
+        JournalError::Nuisance { .. } | JournalError::Numbered => Complaint::about(rig, &error),
+        _ => Complaint::new(&error),
+    };
+    match error.help() {
+        Some(help) => complaint.help(help).into(),
+        None => complaint.into(),
     }
 }
 
-/// The columns of the file of presses: those that the rig reads.
-fn columns(rig: &Rig) -> Result<Columns, Complaint> {
-    let columns = rig.setup.recording_columns();
-    if let Some(nuisance) = columns.nuisances().next() {
-        return Err(Complaint::new(format!(
-            "presses are recorded without the nuisance coordinate {}",
-            nuisance.column
-        ))
-        .help("leave `nuisance` out of [recording], or record with a program of your own"));
-    }
-    let numbered = columns.channels.iter().any(|channel| matches!(channel.column, Column::Number(_)));
-    if numbered {
-        return Err(Complaint::new("presses are recorded in columns with names")
-            .help("name the channels of [recording] instead of counting them"));
-    }
-    Ok(columns)
-}
-
-/// Presses of a plan, guided; those that are taken go to the journal.
-fn press_all(arguments: &Arguments, guide: &mut Guide, journal: &mut Journal) -> Result<(), Failure> {
+/// Presses of a plan, guided; those that are taken are on disk.
+fn press_all(
+    arguments: &Arguments,
+    rig: &Rig,
+    stage: Option<Stage>,
+    mut calibration: Calibration,
+) -> Result<(), Failure> {
+    let keys = (arguments.from != SourceUrl::Stdin).then(keys);
     let (to, inputs) = sync_channel(WAITING);
     let _source = Source::open(&arguments.from, Path::new("."), HostClock::new(), to)
         .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
-    let keys = (arguments.from != SourceUrl::Stdin).then(keys);
-    let mut decoder = Decoder::new(&Channel::all_of(&journal.rig.setup));
-    decoder
-        .set_columns(arguments.from.columns())
-        .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
-    let mut bad: BTreeMap<BadFrame, u64> = BTreeMap::new();
-    ask(guide, journal);
-    while guide.waiting() != Waiting::Nothing {
+    let mut machine = machine(arguments, stage)?;
+    let extent = rig.setup.surface().extent();
+    if machine.is_none() {
+        remark!("r and Enter takes the last press back, s leaves the next out, q ends here");
+        ask(&calibration, extent);
+    }
+    let mut ended = false;
+    while calibration.guide().waiting() != Waiting::Nothing && !ended {
         if progress::interrupted() {
-            return Err(stopped(arguments, journal));
+            // The machine is stopped as it is dropped.
+            drop(machine);
+            return Err(stopped(arguments, &calibration));
         }
-        match inputs.recv_timeout(Duration::from_millis(50)) {
-            Ok(Input::Arrived(arrived)) => {
-                let mut frames = Vec::new();
-                let ended = receive(&arrived, &mut decoder, |frame| frames.push(frame));
-                for frame in frames {
-                    match frame {
-                        Ok(frame) => take(guide.add(arrived.at.elapsed, &frame.reading), guide, journal)?,
-                        Err(cause) => *bad.entry(cause).or_default() += 1,
-                    }
-                }
-                if ended {
-                    break;
-                }
-            }
+        let mut notes = Vec::new();
+        match inputs.recv_timeout(LOOK_EVERY) {
+            Ok(Input::Arrived(arrived)) => calibration
+                .receive(&arrived, &mut notes)
+                .map_err(|error| cannot_go_on(arguments, &calibration, error))?,
             Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => break,
+            Err(RecvTimeoutError::Disconnected) => ended = true,
         }
-        while let Some(key) = keys.as_ref().and_then(|keys| keys.try_recv().ok()) {
-            press_key(&key, guide, journal)?;
+        ended |= notes.contains(&Note::Ended);
+        say(&notes, &calibration, machine.is_none().then_some(extent));
+        let key = keys.as_ref().and_then(|keys| keys.try_recv().ok());
+        match (&mut machine, key) {
+            (None, Some(key)) => press_key(&key, arguments, &mut calibration, extent)?,
+            (None, None) => {}
+            (Some(machine), key) => step(machine, key.as_deref(), &notes, &mut calibration)
+                .map_err(|error| machine_ended(arguments, &calibration, error))?,
         }
     }
-    for (cause, count) in &bad {
+    for (cause, count) in calibration.bad_frames() {
         remark!("{count} frames were no reading: {}", cause.describe());
     }
-    match guide.waiting() {
-        Waiting::Nothing => Ok(()),
-        _ => Err(Failure::DataLost(format!(
-            "the source ended before all was pressed; {} presses are in {}, and --resume goes on",
-            journal.presses(),
-            arguments.presses.display()
-        ))),
+    if calibration.guide().waiting() != Waiting::Nothing {
+        drop(machine);
+        return Err(Failure::DataLost(format!(
+            "the source ended before all was pressed; {}",
+            goes_on(arguments, &calibration)
+        )));
+    }
+    match machine {
+        Some(machine) => machine.finish().map_err(|error| machine_ended(arguments, &calibration, error)),
+        None => Ok(()),
     }
 }
 
-/// Decodes what arrived; true when there will be no more.
-fn receive(arrived: &Arrived, decoder: &mut Decoder, hand_on: impl FnMut(Result<Frame, BadFrame>)) -> bool {
-    match &arrived.arrival {
-        Arrival::Bytes(bytes) => decoder.receive(bytes, hand_on),
-        Arrival::Message(bytes) => decoder.receive_message(bytes, hand_on),
-        Arrival::Opened(name) => {
-            decoder.open();
-            remark!("readings from {name}");
-        }
-        Arrival::Joined(name) => {
-            decoder.join();
-            remark!("readings from {name}");
-        }
-        Arrival::Lost(why) => {
-            decoder.open();
-            remark!("the source went away: {why}; it is waited for");
-        }
-        Arrival::Ended => {
-            decoder.end(hand_on);
-            return true;
-        }
-    }
-    false
+/// The machine, greeted, where one presses.
+fn machine(arguments: &Arguments, stage: Option<Stage>) -> Result<Option<Machine>, Failure> {
+    let (Some(url), Some(stage)) = (&arguments.stage, stage) else { return Ok(None) };
+    let limit_n = stage.force_limit_n;
+    let thread = StageThread::open(url, stage)
+        .map_err(|error| Complaint::new(format!("--stage {url}: {error}")).help("is it on, and at this port?"))?;
+    remark!("a machine of {} firmware at {url}; Enter stops it at once", thread.firmware().name());
+    Ok(Some(Machine::new(thread, limit_n)))
 }
 
-/// Takes the outcome of a reading: a row for the journal, or another step that is waited for.
-fn take(progress: Progress, guide: &Guide, journal: &mut Journal) -> Result<(), Failure> {
-    match progress {
-        Progress::None => return Ok(()),
-        Progress::Waits(_) => {}
-        Progress::Taken(row) => {
-            let touches = row.touches();
-            journal.add(row)?;
-            if touches {
-                remark!("taken: press {}{}", journal.presses(), repeatability(&journal.rows));
-            }
-        }
+/// Has the machine do what is next; anything that was typed stops it.
+fn step(
+    machine: &mut Machine,
+    key: Option<&str>,
+    notes: &[Note],
+    calibration: &mut Calibration,
+) -> Result<(), MachineError> {
+    if key.is_some() {
+        return machine.stop_by_hand();
     }
-    ask(guide, journal);
+    machine.heed(notes)?;
+    match machine.step(calibration)? {
+        Some(MachineNote::Homing) => remark!("the machine looks for its end stops"),
+        Some(MachineNote::Unseen) => remark!("left out: a press that no reading showed"),
+        Some(MachineNote::NoRest) => remark!("left out: a press whose reading did not come to rest"),
+        None => {}
+    }
     Ok(())
 }
 
-/// Deviation of the last press from the mean of the others of its place and force, in words; empty where there are none.
-fn repeatability(rows: &[Row]) -> String {
-    let Some(last) = rows.last() else { return String::new() };
-    let others: Vec<&Row> = rows[..rows.len() - 1]
-        .iter()
-        .filter(|row| row.touches() && row.position == last.position && row.force_n == last.force_n)
-        .collect();
-    let untouched = rows.iter().rev().find(|row| !row.touches());
-    let Some(untouched) = untouched.filter(|_| !others.is_empty()) else { return String::new() };
-    let mean =
-        |channel: usize| others.iter().map(|row| row.reading[channel]).sum::<f64>() / others.len() as f64;
-    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
-    let channels = 0..last.reading.len();
-    let off = norm(&mut channels.clone().map(|channel| last.reading[channel] - mean(channel)));
-    let size = norm(&mut channels.map(|channel| mean(channel) - untouched.reading[channel]));
-    if size > 0.0 {
-        format!(", {:.2} % off the others of its place", 100.0 * off / size)
-    } else {
-        String::new()
+fn machine_ended(arguments: &Arguments, calibration: &Calibration, error: MachineError) -> Failure {
+    let words = format!("{error}; {}", goes_on(arguments, calibration));
+    match error {
+        MachineError::ByHand => Failure::Interrupted(words),
+        MachineError::Stage(_) | MachineError::Silent => Failure::DataLost(words),
+        _ => Failure::GoalMissed(words),
     }
 }
 
-fn ask(guide: &Guide, journal: &Journal) {
-    let extent = journal.rig.setup.surface().extent();
+fn cannot_go_on(arguments: &Arguments, calibration: &Calibration, error: CalibrationError) -> Failure {
+    match error {
+        CalibrationError::Journal(error) => about_journal(&arguments.rig, error),
+        CalibrationError::LoadCell { .. } => {
+            Failure::GoalMissed(format!("{error}; {}", goes_on(arguments, calibration)))
+        }
+    }
+}
+
+/// Says what happened; a person at `hand`, on this surface, is told what to do next.
+fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
+    for note in notes {
+        match note {
+            Note::Opened(name) => remark!("readings from {name}"),
+            Note::Lost(why) => remark!("the source went away: {why}; it is waited for"),
+            Note::Taken => {
+                let rows = calibration.journal().rows();
+                let off = calibration::last_deviation_percent(rows)
+                    .map_or(String::new(), |off| format!(", {off:.2} % off the others of its place"));
+                let force = rows.last().and_then(|row| row.force_n);
+                let force = force.map_or(String::new(), |force_n| format!(" of {force_n:.3} N"));
+                remark!("taken: press {}{force}{off}", calibration.journal().presses());
+            }
+            Note::Saturated(name) => remark!("channel {name} reads the end of its range"),
+            Note::Ended | Note::Waits(_) | Note::Untouched | Note::Overload(_) => {}
+        }
+        if let (Some(extent), Note::Taken | Note::Untouched | Note::Waits(_)) = (hand, note) {
+            ask(calibration, extent);
+        }
+    }
+}
+
+fn ask(calibration: &Calibration, extent: Extent) {
+    let guide = calibration.guide();
     match (guide.waiting(), guide.next_press()) {
         (Waiting::Untouched, _) => remark!("leave the surface alone"),
         (Waiting::Press, Some((number, press))) => {
@@ -321,33 +304,35 @@ fn keys() -> Receiver<String> {
     keys
 }
 
-fn press_key(key: &str, guide: &mut Guide, journal: &mut Journal) -> Result<(), Failure> {
+fn press_key(
+    key: &str,
+    arguments: &Arguments,
+    calibration: &mut Calibration,
+    extent: Extent,
+) -> Result<(), Failure> {
     match key.trim() {
         "r" => {
-            if guide.redo() {
-                journal.take_back()?;
-            } else {
+            if !calibration.redo().map_err(|error| about_journal(&arguments.rig, error))? {
                 remark!("nothing was pressed yet");
             }
         }
-        "s" => guide.skip(),
-        "q" => guide.stop(),
+        "s" => calibration.skip(),
+        "q" => calibration.stop(),
         _ => remark!("r and Enter takes the last press back, s leaves the next out, q ends here"),
     }
-    ask(guide, journal);
+    ask(calibration, extent);
     Ok(())
 }
 
-fn stopped(arguments: &Arguments, journal: &Journal) -> Failure {
-    Failure::Interrupted(format!(
-        "stopped; {} presses are in {}, and --resume goes on",
-        journal.presses(),
-        arguments.presses.display()
-    ))
+fn stopped(arguments: &Arguments, calibration: &Calibration) -> Failure {
+    Failure::Interrupted(format!("stopped; {}", goes_on(arguments, calibration)))
 }
 
-/// Folds of the cross-validation.
-const FOLDS: usize = 5;
+/// Words on what is kept.
+fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
+    let presses = calibration.journal().presses();
+    format!("{presses} presses are in {}, and --resume goes on", arguments.presses.display())
+}
 
 /// Fits the rig's estimator to the presses on disk, and says how good it is and what more presses would gain.
 fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure> {
@@ -361,37 +346,25 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure>
     let locator =
         observer.watch(|watch| rig.estimator.fit_task(task.watch(watch))).map_err(|error| failed(&error))?;
     out.write(locator.to_json().map_err(Complaint::new)?.as_bytes())?;
-    let presses = recording.touched().rows.len();
+    let assessment =
+        observer.watch(|watch| calibration::Assessment::new(rig, &recording, arguments.seed, watch));
+    let presses = assessment.presses;
     output::say(format!("{} fitted to {presses} presses: {}", locator.kind(), arguments.out.display()))?;
-    let touched = recording.touched();
-    if touched.distinct_positions().len() >= FOLDS {
-        let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
-        let held_out = observer.watch(|watch| cross_validate(&rig.estimator, task.watch(watch), FOLDS));
-        match held_out {
-            Ok(evaluation) => {
-                if let Some(summary) = evaluation.summary(None) {
-                    let (median, mean) =
-                        (format_length_mm(summary.median_m), format_length_mm(summary.average_m));
-                    output::say(format!(
-                        "error at positions held out ({FOLDS} folds): median {median}, mean {mean}"
-                    ))?;
-                }
-            }
-            Err(error) => remark!("no error at positions held out: {error}"),
-        }
+    if let Some(held_out) = assessment.held_out {
+        let (median, mean) = (format_length_mm(held_out.median_m), format_length_mm(held_out.mean_m));
+        let folds = held_out.folds;
+        output::say(format!("error at positions held out ({folds} folds): median {median}, mean {mean}"))?;
     }
-    let design = rig.training.as_ref().map_or_else(PositionDesign::default, PositionDesign::for_training);
-    match observer.watch(|watch| next_press(&rig.setup, &touched, &design, watch)) {
-        Ok(advice) if advice.is_enough() => {
-            output::say("more presses would lower the error by less than 5 %".to_owned())?;
+    assessment.remarks.iter().for_each(|remark| remark!("{remark}"));
+    match assessment.gain_percent {
+        _ if assessment.is_enough => {
+            output::say("more presses would lower the error by less than 5 %".to_owned())
         }
-        Ok(advice) => output::say(format!(
-            "endlessly many more presses would lower the expected error by {:.0} %: `palpate design positions {} --data {}` says where",
-            advice.remaining_gain_percent(),
+        Some(gain) => output::say(format!(
+            "endlessly many more presses would lower the expected error by {gain:.0} %: `palpate design positions {} --data {}` says where",
             arguments.rig.display(),
             arguments.presses.display()
-        ))?,
-        Err(error) => remark!("no advice on more presses: {error}"),
+        )),
+        None => Ok(()),
     }
-    Ok(())
 }

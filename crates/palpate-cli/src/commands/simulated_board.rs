@@ -4,8 +4,13 @@ use crate::failure::{Complaint, Failure};
 use crate::input;
 use crate::progress::interrupted;
 use crate::remark::remark;
-use palpate_live::simulated_board::{BoardConfig, FaultConfig, Finger, Link, LinkUrl, SimulatedBoard};
+use palpate_live::simulated_board::{
+    BoardConfig, FaultConfig, Finger, Link, LinkUrl, LoadCell, SimulatedBoard,
+};
+use palpate_live::stage::{Firmware, SimulatedMachine};
 use palpate_mechanics::units::{Dimension, Quantity, format_count};
+use palpate_rig::Rig;
+use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -49,9 +54,25 @@ pub struct Arguments {
     /// A script of the finger: CSV of time in s, x and y in mm, force in N [default: a random finger]
     #[arg(long, value_name = "FILE.csv")]
     finger: Option<PathBuf>,
+    /// Plug of a machine that moves the finger by G-code, as the rig's [stage] says: pty, pty:PATH or tcp://:PORT
+    #[arg(long, value_name = "LINK", conflicts_with = "finger")]
+    stage: Option<LinkUrl>,
+    /// Firmware of the machine
+    #[arg(long, value_name = "FIRMWARE", default_value = "marlin", requires = "stage")]
+    firmware: FirmwareName,
+    /// Send the load cell of the rig's [stage] too, with noise of this standard deviation, as in `--load-cell "5 mN"`
+    #[arg(long, value_name = "FORCE", value_parser = input::force)]
+    load_cell: Option<f64>,
     /// End after so long
     #[arg(long, value_name = "TIME", value_parser = time)]
     for_time: Option<f64>,
+}
+
+/// Name of a firmware.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum FirmwareName {
+    Marlin,
+    Grbl,
 }
 
 fn share(text: &str) -> Result<f64, String> {
@@ -81,7 +102,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         finger =
             finger.with_script(&input::read_text(path)?).map_err(|error| Complaint::about(path, error))?;
     }
-    let config = BoardConfig { rate_hz: arguments.rate, seed: arguments.seed };
+    let load_cell = load_cell(arguments, &rig)?;
+    let config = BoardConfig { rate_hz: arguments.rate, seed: arguments.seed, load_cell };
     let faults = FaultConfig {
         dropped: arguments.drop,
         torn: arguments.torn,
@@ -93,15 +115,76 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let board = SimulatedBoard::new(&rig.setup, &config, finger)
         .map_err(|error| Complaint::about(&arguments.rig, error))?;
     let board = board.with_faults(faults, arguments.seed);
+    let machine = machine(arguments, &rig)?;
     let link = Link::open(&arguments.to).map_err(Complaint::new)?;
     remark!("{}", link.name());
-    Plugged { board, link, away_until: None }.run(arguments)
+    Plugged { board, link, machine, away_until: None }.run(arguments)
+}
+
+fn load_cell(arguments: &Arguments, rig: &Rig) -> Result<Option<LoadCell>, Failure> {
+    let Some(noise_n) = arguments.load_cell else { return Ok(None) };
+    match rig.stage.as_ref().and_then(|stage| stage.load_cell.clone()) {
+        Some(name) => Ok(Some(LoadCell { name, noise_n })),
+        None => {
+            let complaint = "--load-cell needs the name of its values, `load_cell` of the rig's [stage]";
+            Err(Complaint::about(&arguments.rig, complaint).into())
+        }
+    }
+}
+
+/// The machine of the rig, at its own link.
+fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<PluggedMachine>, Failure> {
+    let Some(url) = &arguments.stage else { return Ok(None) };
+    if !matches!(url, LinkUrl::Pty(_) | LinkUrl::Tcp(_)) {
+        let complaint = Complaint::new(format!("--stage {url}: a machine answers what it is sent"));
+        return Err(complaint.help("give it a way back: pty, pty:PATH or tcp://:PORT").into());
+    }
+    let Some(stage) = &rig.stage else {
+        return Err(Complaint::about(&arguments.rig, "--stage needs the rig's section [stage]").into());
+    };
+    let force_n = rig.training.as_ref().and_then(|training| training.force_n).or(rig.setup.force_n());
+    let firmware = match arguments.firmware {
+        FirmwareName::Marlin => Firmware::Marlin,
+        FirmwareName::Grbl => Firmware::Grbl,
+    };
+    let extent = rig.setup.surface().extent();
+    let machine = SimulatedMachine::new(firmware, stage.clone(), extent, force_n.unwrap_or(1.0));
+    let link = Link::open(url).map_err(Complaint::new)?;
+    remark!("a machine of {} firmware at {}", firmware.name(), link.name());
+    Ok(Some(PluggedMachine { machine, link, was_there: false }))
+}
+
+/// A machine at its link.
+struct PluggedMachine {
+    machine: SimulatedMachine,
+    link: Link,
+    was_there: bool,
+}
+
+impl PluggedMachine {
+    /// Does what the other end asks for.
+    fn work(&mut self) -> std::io::Result<()> {
+        let Some(bytes) = self.link.bytes()? else {
+            self.was_there = false;
+            return Ok(());
+        };
+        if !std::mem::replace(&mut self.was_there, true) {
+            self.machine.reset();
+        }
+        self.machine.write_all(&bytes)?;
+        let mut answers = [0; 512];
+        while let Ok(count) = self.machine.read(&mut answers) {
+            self.link.send(&answers[..count])?;
+        }
+        Ok(())
+    }
 }
 
 /// A board at its link.
 struct Plugged<'a> {
     board: SimulatedBoard<'a>,
     link: Link,
+    machine: Option<PluggedMachine>,
     away_until: Option<Instant>,
 }
 
@@ -118,6 +201,10 @@ impl Plugged<'_> {
                 return self.finish(unsent);
             }
             self.obey()?;
+            if let Some(machine) = &mut self.machine {
+                machine.work().map_err(Complaint::new)?;
+                self.board.finger_mut().hold(machine.machine.contact());
+            }
             if next_disconnect.is_some_and(|at| now >= at) {
                 next_disconnect = every.map(|every| now + every);
                 self.disconnect()?;

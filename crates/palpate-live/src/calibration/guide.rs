@@ -13,6 +13,8 @@ pub struct Press {
     pub position: Position,
     /// Its force in newtons, where it is known.
     pub force_n: Option<f64>,
+    /// Its depth in metres, where a machine presses.
+    pub depth_m: Option<f64>,
 }
 
 /// Next step that a guide waits for.
@@ -127,6 +129,11 @@ impl Guide {
         if self.waiting == Waiting::Nothing {
             self.restart();
         }
+    }
+
+    /// Forgets the readings of the last stretch of time, as those before a machine moved; what is learnt stays.
+    pub fn forget_readings(&mut self) {
+        self.stretch.clear();
     }
 
     /// Waits for what the next press needs first.

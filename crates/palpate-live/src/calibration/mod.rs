@@ -1,8 +1,22 @@
 //! Guided calibration: presses at the right places, each taken when its reading is at rest.
 //!
-//! The [`Guide`] is told readings with their instants and says what it waits for; it touches no device, file or clock.
+//! The [`Guide`] is told readings with their instants and says what it waits for; it touches no device, file or clock. A [`Calibration`] feeds it with
+//! what a source brings, and keeps every press in the file of a [`Journal`] before the next one is asked for. A [`Machine`] presses where a
+//! person would; an [`Assessment`] says how good the outcome is.
 
+mod assessment;
 mod guide;
+mod journal;
+mod machine;
+mod plan;
+mod repeats;
+mod run;
 mod settling;
 
+pub use assessment::{Assessment, HeldOut};
 pub use guide::{Guide, Press, Progress, Waiting};
+pub use journal::{DepthKnowledge, Journal, JournalError};
+pub use machine::{Machine, MachineError, MachineNote};
+pub use plan::{PlanError, plan};
+pub use repeats::{Place, last_deviation_percent, places};
+pub use run::{Calibration, CalibrationError, Note};

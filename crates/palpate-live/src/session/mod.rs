@@ -6,6 +6,7 @@ mod taring;
 mod timeline;
 
 pub use health::ChannelHealth;
+pub(crate) use health::HealthWatch;
 
 use crate::event::{Event, EventRecord};
 use crate::frame::{BadFrame, Channel, ColumnsError, Decoder, Frame};
@@ -13,7 +14,6 @@ use crate::input::{Arrival, Arrived, Command};
 use crate::sample::Sample;
 use crate::stamp::Stamp;
 use contact::ContactWatch;
-use health::HealthWatch;
 use palpate_core::Status;
 use palpate_estimators::estimator::Locator;
 use palpate_mechanics::surface::Extent;

@@ -153,6 +153,11 @@ impl Finger {
         Ok(())
     }
 
+    /// Holds it where a stage has it, or lifted.
+    pub fn hold(&mut self, contact: Option<Contact>) {
+        self.held = Some(contact);
+    }
+
     fn contact(&self, x_mm: f64, y_mm: f64, force_n: f64) -> Result<Option<Contact>, &'static str> {
         let position = Position { x_m: x_mm * 1e-3, y_m: y_mm * 1e-3 };
         let width_m = self.extent.width_m().unwrap_or(0.0);

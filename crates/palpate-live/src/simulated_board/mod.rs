@@ -12,7 +12,9 @@ use crate::frame::Channel;
 use faults::{Ageing, Fate, Faults};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::{SimulateError, SimulatedBench};
-use std::fmt::Write;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
 use std::time::Duration;
 
 /// Configuration of a simulated board.
@@ -22,11 +24,22 @@ pub struct BoardConfig {
     pub rate_hz: f64,
     /// Seed of the sensors' faults and noise.
     pub seed: u64,
+    /// A load cell under the finger, the last value of every frame.
+    pub load_cell: Option<LoadCell>,
+}
+
+/// Load cell of a simulated machine.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadCell {
+    /// Name of its values.
+    pub name: String,
+    /// Standard deviation of its noise in newtons.
+    pub noise_n: f64,
 }
 
 impl Default for BoardConfig {
     fn default() -> Self {
-        Self { rate_hz: 100.0, seed: 0 }
+        Self { rate_hz: 100.0, seed: 0, load_cell: None }
     }
 }
 
@@ -38,6 +51,7 @@ pub struct SimulatedBoard<'a> {
     faults: Faults,
     ageing: Ageing,
     rate_hz: f64,
+    load_cell: Option<(LoadCell, Xoshiro256PlusPlus)>,
     /// Frames that were taken.
     count: u64,
     sent: Sent,
@@ -70,6 +84,11 @@ impl<'a> SimulatedBoard<'a> {
             finger,
             faults,
             rate_hz: config.rate_hz,
+            // A stream of its own, beside those of noise and finger.
+            load_cell: config
+                .load_cell
+                .clone()
+                .map(|cell| (cell, Xoshiro256PlusPlus::seed_from_u64(config.seed ^ 0x10AD))),
             count: 0,
             sent: Sent::default(),
         })
@@ -112,7 +131,8 @@ impl<'a> SimulatedBoard<'a> {
         let mut clean = self.bench.clean(contact.as_slice());
         self.ageing.act(&mut clean, &self.faults.config, 1.0 / self.rate_hz);
         let reading = self.bench.measure(&clean);
-        let mut frame = self.line(&reading).into_bytes();
+        let force_n = contact.map_or(0.0, |contact| contact.force_n);
+        let mut frame = self.line(&reading, force_n).into_bytes();
         self.count += 1;
         match self.faults.next(frame.len()) {
             Fate::Whole => self.sent.whole += 1,
@@ -128,17 +148,19 @@ impl<'a> SimulatedBoard<'a> {
         Some(frame)
     }
 
-    /// A reading as a line of numbers in the units of the channels, to seven digits.
-    fn line(&self, reading: &[f64]) -> String {
-        let mut line = String::new();
-        for (value, channel) in reading.iter().zip(&self.channels) {
-            if !line.is_empty() {
-                line.push(',');
-            }
-            // Writing into a string cannot fail.
-            let _ = write!(line, "{}", (value / channel.unit.factor()) as f32);
-        }
-        line.push('\n');
-        line
+    /// A reading as a line of numbers in the units of the channels, to seven digits; with names where there is a load cell, so that those who
+    /// want the channels only find them.
+    fn line(&mut self, reading: &[f64], force_n: f64) -> String {
+        let values = reading.iter().zip(&self.channels).map(|(value, channel)| value / channel.unit.factor());
+        let Some((cell, rng)) = &mut self.load_cell else {
+            let cells: Vec<String> = values.map(|value| (value as f32).to_string()).collect();
+            return cells.join(",") + "\n";
+        };
+        let noise: f64 = StandardNormal.sample(rng);
+        let force_n = force_n + cell.noise_n * noise;
+        let labels = self.channels.iter().map(|channel| channel.label.as_str());
+        let named = labels.zip(values).chain([(cell.name.as_str(), force_n)]);
+        let cells: Vec<String> = named.map(|(label, value)| format!("{label}:{}", value as f32)).collect();
+        cells.join(",") + "\n"
     }
 }

@@ -15,7 +15,7 @@ pub fn open(outlet: Outlet, path: &Path, rate_hz: f64, seed: u64) -> Result<(), 
     let text = std::fs::read_to_string(path).map_err(|error| complaint(error.to_string()))?;
     let rig = Rig::from_toml(&text).map_err(|error| complaint(error.to_string()))?;
     let name = format!("a simulated board ({})", path.display());
-    open_rig(outlet, rig, BoardConfig { rate_hz, seed }, name)
+    open_rig(outlet, rig, BoardConfig { rate_hz, seed, ..BoardConfig::default() }, name)
 }
 
 /// Opens a simulated board on the bench of a rig.

@@ -5,6 +5,7 @@
 
 use palpate_mechanics::contact::Position;
 use palpate_numerics::OutOfRange;
+use palpate_rig::Stage;
 use std::io::{self, Read, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -51,41 +52,10 @@ impl Firmware {
     }
 }
 
-/// Place of a surface in a machine, and the speeds of pressing it; lengths in metres, in the machine's coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StageSetup {
-    /// The finger's x and y over the surface's left support, or over its lower left corner.
-    pub origin_m: (f64, f64),
-    /// The finger's z as it touches the untouched surface.
-    pub touch_z_m: f64,
-    /// Height above that at which it travels; greater than 0.
-    pub clearance_m: f64,
-    /// Depth of a press below that; greater than 0.
-    pub depth_m: f64,
-    /// Speed of travel in m/s; greater than 0.
-    pub travel_m_per_s: f64,
-    /// Speed of pressing in m/s; greater than 0.
-    pub press_m_per_s: f64,
-}
+/// Link to a machine: a serial port, a connection.
+pub trait StageLink: Read + Write + Send {}
 
-impl StageSetup {
-    /// Checks that every number is in its range.
-    ///
-    /// # Errors
-    /// [`OutOfRange`], for the first that is not.
-    pub fn check(&self) -> Result<(), OutOfRange> {
-        let (x_m, y_m) = self.origin_m;
-        let places = [("x of the origin", x_m), ("y of the origin", y_m), ("z of the touch", self.touch_z_m)];
-        OutOfRange::check("finite", places, f64::is_finite)?;
-        let positive = [
-            ("the clearance", self.clearance_m),
-            ("the depth", self.depth_m),
-            ("the speed of travel", self.travel_m_per_s),
-            ("the speed of pressing", self.press_m_per_s),
-        ];
-        OutOfRange::check("greater than 0 and finite", positive, |value| value > 0.0 && value.is_finite())
-    }
-}
+impl<T: Read + Write + Send> StageLink for T {}
 
 /// A machine that does not do what it is asked for.
 #[derive(Debug, thiserror::Error)]
@@ -138,7 +108,7 @@ const LONGEST: usize = 1024;
 pub struct GcodeStage<L> {
     link: L,
     firmware: Firmware,
-    setup: StageSetup,
+    setup: Stage,
     stop: Arc<AtomicBool>,
     line: Vec<u8>,
 }
@@ -148,7 +118,7 @@ impl<L: Read + Write> GcodeStage<L> {
     ///
     /// # Errors
     /// [`StageError`] where its firmware is not known, or a number of the setup is not in its range.
-    pub fn connect(link: L, setup: StageSetup, stop: Arc<AtomicBool>) -> Result<Self, StageError> {
+    pub fn connect(link: L, setup: Stage, stop: Arc<AtomicBool>) -> Result<Self, StageError> {
         setup.check()?;
         let mut stage = Self { link, firmware: Firmware::Marlin, setup, stop, line: Vec::new() };
         stage.firmware = stage.identify()?;
@@ -178,9 +148,9 @@ impl<L: Read + Write> GcodeStage<L> {
         self.go(&to, self.setup.travel_m_per_s)
     }
 
-    /// Presses where it is.
-    pub fn press(&mut self) -> Result<(), StageError> {
-        let to = format!("Z{:.3}", (self.setup.touch_z_m - self.setup.depth_m) * 1e3);
+    /// Presses where it is, to a depth in metres.
+    pub fn press(&mut self, depth_m: f64) -> Result<(), StageError> {
+        let to = format!("Z{:.3}", (self.setup.touch_z_m - depth_m) * 1e3);
         self.go(&to, self.setup.press_m_per_s)
     }
 
@@ -275,7 +245,8 @@ impl<L: Read + Write> GcodeStage<L> {
         }
     }
 
-    fn check_stop(&mut self) -> Result<(), StageError> {
+    /// Sends the stop, where it was asked for.
+    pub(super) fn check_stop(&mut self) -> Result<(), StageError> {
         if !self.stop.load(Ordering::Relaxed) {
             return Ok(());
         }

@@ -2,6 +2,10 @@
 
 mod gcode;
 mod simulated;
+mod thread;
+mod url;
 
-pub use gcode::{Firmware, GcodeStage, StageError, StageSetup};
+pub use gcode::{Firmware, GcodeStage, StageError, StageLink};
 pub use simulated::SimulatedMachine;
+pub use thread::{Done, Order, StageThread};
+pub use url::{StageUrl, StageUrlError};

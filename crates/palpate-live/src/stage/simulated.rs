@@ -1,8 +1,9 @@
 //! A machine without hardware: lines of G-code in, answers and the contact of its finger out.
 
-use super::gcode::{Firmware, StageSetup};
+use super::gcode::Firmware;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
+use palpate_rig::Stage;
 use std::io::{self, Read, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -15,9 +16,9 @@ pub struct SimulatedMachine {
 #[derive(Debug)]
 struct State {
     firmware: Firmware,
-    setup: StageSetup,
+    setup: Stage,
     extent: Extent,
-    /// Force of a press to its full depth, in newtons.
+    /// Force of a press to its greatest depth, in newtons.
     force_n: f64,
     received: Vec<u8>,
     answers: Vec<u8>,
@@ -27,19 +28,15 @@ struct State {
 }
 
 impl SimulatedMachine {
-    /// A machine whose finger presses with `force_n` at the full depth of `setup`.
-    pub fn new(firmware: Firmware, setup: StageSetup, extent: Extent, force_n: f64) -> Self {
-        let greeting: &[u8] = match firmware {
-            Firmware::Marlin => b"start\necho:Marlin 2.1.2\n",
-            Firmware::Grbl => b"\r\nGrbl 1.1h ['$' for help]\r\n",
-        };
+    /// A machine whose finger presses with `force_n` at the greatest depth of `setup`.
+    pub fn new(firmware: Firmware, setup: Stage, extent: Extent, force_n: f64) -> Self {
         let state = State {
             firmware,
             setup,
             extent,
             force_n,
             received: Vec::new(),
-            answers: greeting.to_vec(),
+            answers: greeting(firmware).to_vec(),
             at_m: None,
             stopped: false,
         };
@@ -56,12 +53,27 @@ impl SimulatedMachine {
         let on_surface = (0.0..=state.extent.length_m()).contains(&position.x_m)
             && state.extent.width_m().is_none_or(|width_m| (0.0..=width_m).contains(&position.y_m));
         (depth_m > 0.0 && on_surface)
-            .then(|| Contact { position, force_n: state.force_n * depth_m / state.setup.depth_m })
+            .then(|| Contact { position, force_n: state.force_n * depth_m / state.setup.deepest_m() })
+    }
+
+    /// Starts anew, as a board does whose port is opened: it greets, and is not homed.
+    pub fn reset(&self) {
+        let mut state = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
+        state.received.clear();
+        state.answers = greeting(state.firmware).to_vec();
+        (state.at_m, state.stopped) = (None, false);
     }
 
     /// True once it was stopped.
     pub fn is_stopped(&self) -> bool {
         self.shared.lock().unwrap_or_else(PoisonError::into_inner).stopped
+    }
+}
+
+fn greeting(firmware: Firmware) -> &'static [u8] {
+    match firmware {
+        Firmware::Marlin => b"start\necho:Marlin 2.1.2\n",
+        Firmware::Grbl => b"\r\nGrbl 1.1h ['$' for help]\r\n",
     }
 }
 

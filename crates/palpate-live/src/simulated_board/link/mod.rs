@@ -148,13 +148,7 @@ impl Link {
                 return Ok(());
             }
             Way::Tcp { listener, client } => {
-                if client.is_none()
-                    && let Ok((stream, _)) = listener.accept()
-                {
-                    stream.set_nonblocking(true)?;
-                    let _ = stream.set_nodelay(true);
-                    *client = Some(stream);
-                }
+                accept(listener, client)?;
                 if client.is_none() {
                     self.unread += 1;
                     return Ok(());
@@ -212,8 +206,28 @@ impl Link {
         Ok(())
     }
 
+    /// The bytes that came from the other end; `None` where nobody is there.
+    ///
+    /// # Errors
+    /// A client that cannot be taken.
+    pub fn bytes(&mut self) -> std::io::Result<Option<Vec<u8>>> {
+        if let Way::Tcp { listener, client } = &mut self.way {
+            accept(listener, client)?;
+        }
+        self.receive();
+        let is_there = !matches!(&self.way, Way::Tcp { client: None, .. });
+        Ok(is_there.then(|| std::mem::take(&mut self.received)))
+    }
+
     /// The whole lines that came from the other end.
     pub fn lines(&mut self) -> Vec<String> {
+        self.receive();
+        let Some(end) = self.received.iter().rposition(|byte| *byte == b'\n') else { return Vec::new() };
+        let lines: Vec<u8> = self.received.drain(..=end).collect();
+        String::from_utf8_lossy(&lines).lines().map(str::to_owned).collect()
+    }
+
+    fn receive(&mut self) {
         let mut buffer = [0; 512];
         loop {
             let read = match &mut self.way {
@@ -236,10 +250,19 @@ impl Link {
                 Err(_) => break,
             }
         }
-        let Some(end) = self.received.iter().rposition(|byte| *byte == b'\n') else { return Vec::new() };
-        let lines: Vec<u8> = self.received.drain(..=end).collect();
-        String::from_utf8_lossy(&lines).lines().map(str::to_owned).collect()
     }
+}
+
+/// Takes the next client, where there is none.
+fn accept(listener: &TcpListener, client: &mut Option<TcpStream>) -> std::io::Result<()> {
+    if client.is_none()
+        && let Ok((stream, _)) = listener.accept()
+    {
+        stream.set_nonblocking(true)?;
+        let _ = stream.set_nodelay(true);
+        *client = Some(stream);
+    }
+    Ok(())
 }
 
 fn open(url: &LinkUrl) -> std::io::Result<(Way, String)> {

@@ -1,0 +1,193 @@
+//! The file of the presses of a calibration.
+
+use palpate_estimators::recording::{self, Column, Columns, CsvError, Recording, Row};
+use palpate_estimators::setup::Setup;
+use palpate_mechanics::units::Dimension;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Presses so far, and the file that has them.
+#[derive(Debug)]
+pub struct Journal {
+    setup: Setup,
+    columns: Columns,
+    comment: String,
+    path: PathBuf,
+    rows: Vec<Row>,
+    /// Seconds by which the times of new rows come after those of the file.
+    later_s: f64,
+}
+
+/// Presses that cannot be kept.
+#[derive(Debug, thiserror::Error)]
+pub enum JournalError {
+    /// The rig's recordings have a column that nothing tells the value of.
+    #[error("presses are recorded without the nuisance coordinate {column}")]
+    Nuisance {
+        /// The column.
+        column: Column,
+    },
+    /// The rig's recordings have columns without names.
+    #[error("presses are recorded in columns with names")]
+    Numbered,
+    /// The file cannot be written.
+    #[error("cannot write {}: {error}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
+    /// The file cannot be read again.
+    #[error("cannot read {}: {error}", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
+    /// The file is not a recording of the bench.
+    #[error(transparent)]
+    Read(#[from] CsvError),
+}
+
+impl JournalError {
+    /// The remedy.
+    pub fn help(&self) -> Option<&'static str> {
+        match self {
+            Self::Nuisance { .. } => {
+                Some("leave `nuisance` out of [recording], or record with a program of your own")
+            }
+            Self::Numbered => Some("name the channels of [recording] instead of counting them"),
+            Self::Write { .. } => Some("make room, or name another file"),
+            Self::Open { .. } | Self::Read(_) => None,
+        }
+    }
+}
+
+/// Seconds between the presses of a file and those that go on with it. The time between two runs is not known; what drifted in it is told by the
+/// untouched rows of both.
+const BETWEEN_RUNS_S: f64 = 60.0;
+
+impl Journal {
+    /// A journal that goes on with these rows of before; the file is written with the next press. Where a machine `knows_depths`, a nuisance
+    /// coordinate that is a length is the depth.
+    ///
+    /// # Errors
+    /// [`JournalError`] where the columns of the rig's recordings cannot be told.
+    pub fn new(
+        setup: &Setup,
+        path: &Path,
+        comment: String,
+        before: Vec<Row>,
+        knows_depths: DepthKnowledge,
+    ) -> Result<Self, JournalError> {
+        let columns = columns(setup, knows_depths)?;
+        let last_s = before.iter().filter_map(|row| row.time_s).fold(0.0, f64::max);
+        let later_s = if before.is_empty() { 0.0 } else { last_s + BETWEEN_RUNS_S };
+        Ok(Self { setup: setup.clone(), columns, comment, path: path.to_owned(), rows: before, later_s })
+    }
+
+    /// The rows so far, of presses and of the untouched surface.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// Presses that were recorded.
+    pub fn presses(&self) -> usize {
+        self.rows.iter().filter(|row| row.touches()).count()
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Adds a row, which is on disk afterwards; `depth_m` is that of a machine.
+    ///
+    /// # Errors
+    /// [`JournalError::Write`].
+    pub fn add(&mut self, row: Row, depth_m: Option<f64>) -> Result<(), JournalError> {
+        let time_s = row.time_s.map(|time_s| time_s + self.later_s);
+        let nuisances = match self.columns.nuisance {
+            Some(_) => vec![depth_m.unwrap_or(0.0)],
+            None => Vec::new(),
+        };
+        self.rows.push(Row { time_s, nuisances, ..row });
+        self.save()
+    }
+
+    /// Takes the last press out, with the untouched rows after it.
+    ///
+    /// # Errors
+    /// [`JournalError::Write`].
+    pub fn take_back(&mut self) -> Result<(), JournalError> {
+        if let Some(last) = self.rows.iter().rposition(Row::touches) {
+            self.rows.truncate(last);
+            self.save()?;
+        }
+        Ok(())
+    }
+
+    /// The recording as its file has it.
+    ///
+    /// # Errors
+    /// [`JournalError`] for a file that is gone, or was changed meanwhile.
+    pub fn recording(&self) -> Result<Recording, JournalError> {
+        let bytes = std::fs::read(&self.path)
+            .map_err(|error| JournalError::Open { path: self.path.clone(), error })?;
+        Ok(self.setup.read_recording(&self.path.display().to_string(), bytes.as_slice())?)
+    }
+
+    fn save(&self) -> Result<(), JournalError> {
+        let mut rows = self.rows.clone();
+        // An untouched row is told from a press by its force, where presses have one.
+        if self.columns.force.is_none() || rows.iter().any(|row| row.force_n.is_none()) {
+            rows.retain(Row::touches);
+        }
+        let recording = Recording::new(self.setup.layout(), "calibration", rows);
+        let mut csv = Vec::new();
+        recording::write_as(&recording, &self.columns, &self.comment, &mut csv)
+            .and_then(|()| replace(&self.path, &csv))
+            .map_err(|error| JournalError::Write { path: self.path.clone(), error })
+    }
+}
+
+/// Knowledge of the depth of presses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthKnowledge {
+    /// A machine presses to a depth.
+    Known,
+    /// A hand presses.
+    Unknown,
+}
+
+/// Writes a file under a temporary name and renames it, so that a process that is killed leaves the presses of before or those of now. Both are on
+/// the disk before the next press is asked for.
+pub(crate) fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".part");
+    let part = path.with_file_name(name);
+    let mut file = std::fs::File::create(&part)?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    drop(file);
+    std::fs::rename(&part, path)
+}
+
+/// The columns of the file of presses: those that the rig reads.
+fn columns(setup: &Setup, depth: DepthKnowledge) -> Result<Columns, JournalError> {
+    let columns = setup.recording_columns();
+    let is_depth = |nuisance: &recording::ValueColumn| nuisance.unit.dimension() == Dimension::Length;
+    let mut nuisances = columns.nuisances();
+    match (nuisances.next(), nuisances.next(), depth) {
+        (None, ..) => {}
+        (Some(nuisance), None, DepthKnowledge::Known) if is_depth(nuisance) => {}
+        (Some(nuisance), ..) => return Err(JournalError::Nuisance { column: nuisance.column.clone() }),
+    }
+    drop(nuisances);
+    if columns.channels.iter().any(|channel| matches!(channel.column, Column::Number(_))) {
+        return Err(JournalError::Numbered);
+    }
+    Ok(columns)
+}

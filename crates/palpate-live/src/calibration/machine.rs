@@ -1,0 +1,203 @@
+//! A machine that presses where the guide of a calibration asks for it.
+
+use super::guide::Waiting;
+use super::run::{Calibration, Note};
+use crate::stage::{Done, Order, StageError, StageThread};
+use std::time::{Duration, Instant};
+
+/// Readings that stay away for so long stop the machine: nobody sees what it does.
+const SILENT: Duration = Duration::from_secs(2);
+/// Time in which a press must be seen in the readings, and in which its reading must come to rest.
+const SEEN_WITHIN: Duration = Duration::from_secs(3);
+const AT_REST_WITHIN: Duration = Duration::from_secs(60);
+/// Time in which the surface must be at rest when it has been let go.
+const RELEASED_WITHIN: Duration = Duration::from_secs(300);
+/// Presses in a row that no reading shows, after which no more are tried.
+const MOST_UNSEEN: u32 = 3;
+
+/// A machine that ended its work.
+#[derive(Debug, thiserror::Error)]
+pub enum MachineError {
+    /// It does not do what it is asked for.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// A channel reads the end of its range.
+    #[error("channel `{name}` reads the end of its range: the machine was stopped")]
+    Saturated {
+        /// The channel.
+        name: String,
+    },
+    /// The load cell reads more than its limit.
+    #[error("the load cell reads {force_n:.3} N, more than the limit of {limit_n} N: the machine was stopped")]
+    Overload {
+        /// The force.
+        force_n: f64,
+        /// The limit.
+        limit_n: f64,
+    },
+    /// Nothing was read.
+    #[error("no reading came for {} s: the machine was stopped", SILENT.as_secs())]
+    Silent,
+    /// Somebody stopped it.
+    #[error("the machine was stopped by hand")]
+    ByHand,
+    /// Presses that nobody sees.
+    #[error("the readings have not shown the last {MOST_UNSEEN} presses: `touch` or `depths` of [stage] are wrong")]
+    Unseen,
+    /// A surface that never rests.
+    #[error("the untouched readings have not come to rest within {} s", RELEASED_WITHIN.as_secs())]
+    NoRest,
+}
+
+/// What a machine does, in words for people.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MachineNote {
+    /// It looks for its end stops.
+    Homing,
+    /// A press that no reading showed is left out.
+    Unseen,
+    /// A press whose reading did not come to rest is left out.
+    NoRest,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// It waits for the first reading: nothing moves unseen.
+    Blind,
+    /// It moves; what follows then.
+    Moving,
+    Up,
+    Down,
+}
+
+/// A machine that presses where the guide of a calibration asks for it.
+#[derive(Debug)]
+pub struct Machine {
+    thread: StageThread,
+    force_limit_n: f64,
+    state: State,
+    since: Instant,
+    readings: u64,
+    read_at: Instant,
+    unseen: u32,
+}
+
+impl Machine {
+    /// A machine whose stage is connected, and not homed yet.
+    pub fn new(thread: StageThread, force_limit_n: Option<f64>) -> Self {
+        let now = Instant::now();
+        Self {
+            thread,
+            force_limit_n: force_limit_n.unwrap_or(f64::INFINITY),
+            state: State::Blind,
+            since: now,
+            readings: 0,
+            read_at: now,
+            unseen: 0,
+        }
+    }
+
+    /// Stops it at once, where what the calibration noted asks for that.
+    ///
+    /// # Errors
+    /// [`MachineError`] with the reason.
+    pub fn heed(&mut self, notes: &[Note]) -> Result<(), MachineError> {
+        let error = notes.iter().find_map(|note| match note {
+            Note::Saturated(name) => Some(MachineError::Saturated { name: name.clone() }),
+            Note::Overload(force_n) => {
+                Some(MachineError::Overload { force_n: *force_n, limit_n: self.force_limit_n })
+            }
+            _ => None,
+        });
+        error.map_or(Ok(()), |error| self.fail(error))
+    }
+
+    /// Stops it at once.
+    ///
+    /// # Errors
+    /// [`MachineError::ByHand`], always.
+    pub fn stop_by_hand(&mut self) -> Result<(), MachineError> {
+        self.fail(MachineError::ByHand)
+    }
+
+    /// Has it do what the guide waits for; to be called often.
+    ///
+    /// # Errors
+    /// [`MachineError`] once it has ended its work.
+    pub fn step(&mut self, calibration: &mut Calibration) -> Result<Option<MachineNote>, MachineError> {
+        if calibration.readings() > self.readings {
+            (self.readings, self.read_at) = (calibration.readings(), Instant::now());
+        }
+        if self.state != State::Blind && self.read_at.elapsed() > SILENT {
+            return self.fail(MachineError::Silent);
+        }
+        match self.thread.done() {
+            Some(Ok(Done::Up)) => self.enter(State::Up, calibration),
+            Some(Ok(Done::Down)) => self.enter(State::Down, calibration),
+            Some(Err(error)) => return Err(error.into()),
+            None => {}
+        }
+        match (self.state, calibration.guide().waiting()) {
+            (State::Blind, _) if self.readings > 0 => {
+                self.order(Order::Home, calibration);
+                return Ok(Some(MachineNote::Homing));
+            }
+            (State::Up, Waiting::Press) => {
+                if let Some((_, press)) = calibration.guide().next_press() {
+                    let depth_m = press.depth_m.unwrap_or_default();
+                    self.order(Order::Press { position: press.position, depth_m }, calibration);
+                }
+            }
+            (State::Up, Waiting::Untouched | Waiting::Release) if self.since.elapsed() > RELEASED_WITHIN => {
+                return Err(MachineError::NoRest);
+            }
+            (State::Down, Waiting::Release | Waiting::Nothing) => {
+                self.unseen = 0;
+                self.order(Order::Lift, calibration);
+            }
+            (State::Down, Waiting::Press) if self.since.elapsed() > SEEN_WITHIN => {
+                self.leave_out(calibration);
+                self.unseen += 1;
+                if self.unseen == MOST_UNSEEN {
+                    return Err(MachineError::Unseen);
+                }
+                return Ok(Some(MachineNote::Unseen));
+            }
+            (State::Down, Waiting::Rest) if self.since.elapsed() > AT_REST_WITHIN => {
+                self.leave_out(calibration);
+                return Ok(Some(MachineNote::NoRest));
+            }
+            _ => {}
+        }
+        Ok(None)
+    }
+
+    /// Lifts the finger, and waits for that.
+    ///
+    /// # Errors
+    /// [`MachineError`] where it does not.
+    pub fn finish(self) -> Result<(), MachineError> {
+        Ok(self.thread.finish()?)
+    }
+
+    fn leave_out(&mut self, calibration: &mut Calibration) {
+        self.order(Order::Lift, calibration);
+        calibration.skip();
+    }
+
+    fn enter(&mut self, state: State, calibration: &mut Calibration) {
+        (self.state, self.since) = (state, Instant::now());
+        calibration.set_guided(true);
+    }
+
+    fn order(&mut self, order: Order, calibration: &mut Calibration) {
+        calibration.set_guided(false);
+        (self.state, self.since) = (State::Moving, Instant::now());
+        self.thread.order(order);
+    }
+
+    fn fail<T>(&mut self, error: MachineError) -> Result<T, MachineError> {
+        self.thread.stop();
+        Err(error)
+    }
+}

@@ -1,0 +1,90 @@
+//! Repeatability: how far presses of one place are apart.
+
+use super::guide::Press;
+use palpate_estimators::recording::Row;
+use palpate_mechanics::contact::Position;
+
+/// A place of a plan, and how its presses agree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Its position.
+    pub position: Position,
+    /// Presses that were taken there.
+    pub taken: usize,
+    /// Presses to come.
+    pub left: usize,
+    /// Standard deviation of its readings in % of their size; `None` of fewer than two, or of different forces.
+    pub spread_percent: Option<f64>,
+}
+
+/// Places of the presses that were taken and of those to come, in their order along the surface.
+pub fn places(rows: &[Row], to_come: &[Press]) -> Vec<Place> {
+    let mut positions: Vec<Position> = rows
+        .iter()
+        .filter(|row| row.touches())
+        .map(|row| row.position)
+        .chain(to_come.iter().map(|press| press.position))
+        .collect();
+    positions.sort_by(|a, b| a.x_m.total_cmp(&b.x_m).then(a.y_m.total_cmp(&b.y_m)));
+    positions.dedup();
+    let place = |position: Position| {
+        let here: Vec<(usize, &Row)> =
+            rows.iter().enumerate().filter(|(_, row)| row.touches() && row.position == position).collect();
+        Place {
+            position,
+            taken: here.len(),
+            left: to_come.iter().filter(|press| press.position == position).count(),
+            spread_percent: spread_percent(rows, &here),
+        }
+    };
+    positions.into_iter().map(place).collect()
+}
+
+/// Deviation of the last press from the mean of the others of its place and force, in % of its size; `None` where there are none.
+pub fn last_deviation_percent(rows: &[Row]) -> Option<f64> {
+    let last = rows.last().filter(|row| row.touches())?;
+    let others: Vec<&Row> = rows[..rows.len() - 1].iter().filter(|row| is_repeat(row, last)).collect();
+    let untouched = untouched_before(rows, rows.len() - 1)?;
+    if others.is_empty() {
+        return None;
+    }
+    let mean = mean(&others, last.reading.len());
+    let size = distance(&mean, &untouched.reading);
+    (size > 0.0).then(|| 100.0 * distance(&last.reading, &mean) / size)
+}
+
+fn spread_percent(rows: &[Row], here: &[(usize, &Row)]) -> Option<f64> {
+    let [(first_at, first), _, ..] = here else { return None };
+    if here.iter().any(|(_, row)| !is_repeat(row, first)) {
+        return None;
+    }
+    let untouched = untouched_before(rows, *first_at)?;
+    let presses: Vec<&Row> = here.iter().map(|(_, row)| *row).collect();
+    let mean = mean(&presses, first.reading.len());
+    let squares: f64 = presses.iter().map(|row| distance(&row.reading, &mean).powi(2)).sum();
+    let size = distance(&mean, &untouched.reading);
+    (size > 0.0).then(|| 100.0 * (squares / (presses.len() - 1) as f64).sqrt() / size)
+}
+
+/// True for presses of one place with one force.
+fn is_repeat(row: &Row, other: &Row) -> bool {
+    row.touches()
+        && row.position == other.position
+        && row.force_n == other.force_n
+        && row.nuisances == other.nuisances
+}
+
+fn untouched_before(rows: &[Row], at: usize) -> Option<&Row> {
+    rows[..at].iter().rev().find(|row| !row.touches())
+}
+
+fn mean(rows: &[&Row], channels: usize) -> Vec<f64> {
+    (0..channels)
+        .map(|channel| rows.iter().map(|row| row.reading[channel]).sum::<f64>() / rows.len() as f64)
+        .collect()
+}
+
+/// Euclidean distance of two readings.
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}

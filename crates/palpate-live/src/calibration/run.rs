@@ -1,0 +1,255 @@
+//! A calibration that runs: what a source brings goes in, rows on disk and notes come out.
+
+use super::guide::{Guide, Press, Progress, Waiting};
+use super::journal::{Journal, JournalError};
+use crate::event::{ChannelState, Event};
+use crate::frame::{BadFrame, Channel, ColumnsError, Decoder, Frame};
+use crate::input::{Arrival, Arrived};
+use crate::session::HealthWatch;
+use palpate_estimators::recording::Row;
+use palpate_estimators::setup::Setup;
+use palpate_mechanics::units::Unit;
+use palpate_rig::Stage;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// A calibration that cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrationError {
+    /// A press cannot be kept.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// A press pulls at the load cell.
+    #[error("the load cell `{name}` reads {force_n} N in a press; it must read more than 0 N")]
+    LoadCell {
+        /// Its name.
+        name: String,
+        /// The force that it reads.
+        force_n: f64,
+    },
+}
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Note {
+    /// The source is there; its name.
+    Opened(String),
+    /// The source went away, and is looked for again; why.
+    Lost(String),
+    /// The source has no more.
+    Ended,
+    /// Something else is waited for.
+    Waits(Waiting),
+    /// A press was taken, and is on disk.
+    Taken,
+    /// The untouched surface was taken, and is on disk where presses have a force.
+    Untouched,
+    /// A channel reads the end of its range; its name.
+    Saturated(String),
+    /// The load cell reads more than its limit, in newtons.
+    Overload(f64),
+}
+
+/// The load cell of a machine: the last channel of the frames.
+#[derive(Clone, Debug)]
+struct LoadCell {
+    name: String,
+    limit_n: Option<f64>,
+    /// Its reading when nothing touched last.
+    untouched_n: Option<f64>,
+}
+
+/// A calibration that runs.
+pub struct Calibration {
+    guide: Guide,
+    journal: Journal,
+    decoder: Decoder,
+    health: HealthWatch,
+    load_cell: Option<LoadCell>,
+    /// Frames that were no reading, by cause.
+    bad: BTreeMap<BadFrame, u64>,
+    readings: u64,
+    last: Vec<f64>,
+    /// Whether readings are shown to the guide: not while a machine moves.
+    is_guided: bool,
+}
+
+impl Calibration {
+    /// A calibration through a plan; frames without names have these `columns`. A stage may have a load cell, which is the last channel then.
+    ///
+    /// # Errors
+    /// [`ColumnsError`] unless every channel is named once.
+    pub fn new(
+        setup: &Setup,
+        stage: Option<&Stage>,
+        columns: &[String],
+        plan: Vec<Press>,
+        journal: Journal,
+    ) -> Result<Self, ColumnsError> {
+        let mut channels = Channel::all_of(setup);
+        let load_cell = stage.and_then(|stage| {
+            let name = stage.load_cell.clone()?;
+            Some(LoadCell { name, limit_n: stage.force_limit_n, untouched_n: None })
+        });
+        if let Some(LoadCell { name, .. }) = &load_cell {
+            channels.push(Channel { name: name.clone(), label: name.clone(), unit: Unit::from_symbol("N").unwrap_or(Unit::NONE) });
+        }
+        let mut decoder = Decoder::new(&channels);
+        decoder.set_columns(columns)?;
+        Ok(Self {
+            guide: Guide::new(plan),
+            journal,
+            decoder,
+            health: HealthWatch::new(setup.layout()),
+            load_cell,
+            bad: BTreeMap::new(),
+            readings: 0,
+            last: Vec::new(),
+            is_guided: true,
+        })
+    }
+
+    /// The guide.
+    pub fn guide(&self) -> &Guide {
+        &self.guide
+    }
+
+    /// The presses so far.
+    pub fn journal(&self) -> &Journal {
+        &self.journal
+    }
+
+    /// Frames that were no reading, by cause.
+    pub fn bad_frames(&self) -> &BTreeMap<BadFrame, u64> {
+        &self.bad
+    }
+
+    /// Readings that arrived.
+    pub fn readings(&self) -> u64 {
+        self.readings
+    }
+
+    /// The last reading, in SI units or raw, without the load cell; empty before there was one.
+    pub fn last_reading(&self) -> &[f64] {
+        &self.last
+    }
+
+    /// Takes what a source brought; what follows is added to `notes`.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] where a press cannot be kept.
+    pub fn receive(&mut self, arrived: &Arrived, notes: &mut Vec<Note>) -> Result<(), CalibrationError> {
+        let mut frames = Vec::new();
+        let hand_on = |frame| frames.push(frame);
+        match &arrived.arrival {
+            Arrival::Bytes(bytes) => self.decoder.receive(bytes, hand_on),
+            Arrival::Message(bytes) => self.decoder.receive_message(bytes, hand_on),
+            Arrival::Opened(name) => {
+                self.decoder.open();
+                notes.push(Note::Opened(name.clone()));
+            }
+            Arrival::Joined(name) => {
+                self.decoder.join();
+                notes.push(Note::Opened(name.clone()));
+            }
+            Arrival::Lost(why) => {
+                self.decoder.open();
+                notes.push(Note::Lost(why.clone()));
+            }
+            Arrival::Ended => self.decoder.end(hand_on),
+        }
+        for frame in frames {
+            match frame {
+                Ok(Frame { reading, .. }) => self.add(arrived.at.elapsed, reading, notes)?,
+                Err(cause) => *self.bad.entry(cause).or_default() += 1,
+            }
+        }
+        if arrived.arrival == Arrival::Ended {
+            notes.push(Note::Ended);
+        }
+        Ok(())
+    }
+
+    fn add(
+        &mut self,
+        at: Duration,
+        reading: Vec<f64>,
+        notes: &mut Vec<Note>,
+    ) -> Result<(), CalibrationError> {
+        self.readings += 1;
+        let channels = reading.len() - usize::from(self.load_cell.is_some());
+        self.last = reading[..channels].to_vec();
+        self.health.add(&reading[..channels], |event| {
+            if let Event::Channel { name, state: ChannelState::Saturated } = event {
+                notes.push(Note::Saturated(name));
+            }
+        });
+        if let Some(LoadCell { limit_n: Some(limit_n), untouched_n, .. }) = &self.load_cell {
+            let force_n = reading[channels] - untouched_n.unwrap_or(0.0);
+            if force_n.abs() > *limit_n {
+                notes.push(Note::Overload(force_n));
+            }
+        }
+        if !self.is_guided {
+            return Ok(());
+        }
+        let press = self.guide.next_press().map(|(_, press)| press);
+        match self.guide.add(at, &reading) {
+            Progress::None => {}
+            Progress::Waits(waiting) => notes.push(Note::Waits(waiting)),
+            Progress::Taken(row) => {
+                let depth_m = press.and_then(|press| press.depth_m).filter(|_| row.touches());
+                notes.push(if row.touches() { Note::Taken } else { Note::Untouched });
+                let row = self.weighed(row)?;
+                self.journal.add(row, depth_m)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A row whose force is that of the load cell, where there is one.
+    fn weighed(&mut self, mut row: Row) -> Result<Row, CalibrationError> {
+        let Some(cell) = &mut self.load_cell else { return Ok(row) };
+        let Some(read_n) = row.reading.pop() else { return Ok(row) };
+        if row.touches() {
+            let force_n = read_n - cell.untouched_n.unwrap_or(0.0);
+            if force_n <= 0.0 {
+                return Err(CalibrationError::LoadCell { name: cell.name.clone(), force_n });
+            }
+            row.force_n = Some(force_n);
+        } else {
+            cell.untouched_n = Some(read_n);
+        }
+        Ok(row)
+    }
+
+    /// Shows readings to the guide from now on, or not: those that are taken while a machine moves mean nothing.
+    pub(super) fn set_guided(&mut self, is_guided: bool) {
+        if is_guided != self.is_guided {
+            self.guide.forget_readings();
+        }
+        self.is_guided = is_guided;
+    }
+
+    /// Takes back the last press, which is asked for again; false where there is none.
+    ///
+    /// # Errors
+    /// [`JournalError`] where the file cannot be written.
+    pub fn redo(&mut self) -> Result<bool, JournalError> {
+        if !self.guide.redo() {
+            return Ok(false);
+        }
+        self.journal.take_back()?;
+        Ok(true)
+    }
+
+    /// Leaves out the press that is next.
+    pub fn skip(&mut self) {
+        self.guide.skip();
+    }
+
+    /// Ends the calibration early.
+    pub fn stop(&mut self) {
+        self.guide.stop();
+    }
+}

@@ -1,0 +1,124 @@
+//! `gcode:serial:///dev/ttyUSB0?baud=115200` and `gcode:tcp://host:port`: where a machine is.
+
+use super::gcode::StageLink;
+use crate::source::{Address, SourceUrl};
+use std::fmt;
+use std::io;
+use std::net::{TcpStream, ToSocketAddrs};
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+/// Longest time that a machine's link waits for a byte, and so until a stop is sent.
+const LOOK: Duration = Duration::from_millis(10);
+/// Longest time for a command to be written, and for a host to take a connection.
+const WRITE: Duration = Duration::from_millis(200);
+const CONNECT: Duration = Duration::from_secs(2);
+
+/// Place of a machine of Marlin or GRBL firmware.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum StageUrl {
+    /// At a serial port.
+    Serial {
+        /// The port.
+        port: PathBuf,
+        /// Bits a second.
+        baud: u32,
+    },
+    /// Behind a TCP server, as of a bridge to a serial port.
+    Tcp(Address),
+}
+
+/// Text that is no place of a machine.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{text}` is no machine{problem}; machines are `gcode:serial:///dev/ttyUSB0?baud=115200` and `gcode:tcp://host:port`"
+)]
+pub struct StageUrlError {
+    /// The text.
+    pub text: String,
+    /// What is wrong with it, from `: ` on, where more is known.
+    pub problem: String,
+}
+
+impl FromStr for StageUrl {
+    type Err = StageUrlError;
+
+    fn from_str(text: &str) -> Result<Self, StageUrlError> {
+        let error = |problem: String| StageUrlError { text: text.to_owned(), problem };
+        let link = text.strip_prefix("gcode:").ok_or_else(|| error(String::new()))?;
+        match link.parse::<SourceUrl>() {
+            Ok(SourceUrl::Serial { port, baud, columns }) if columns.is_empty() => {
+                Ok(Self::Serial { port, baud })
+            }
+            Ok(SourceUrl::Tcp { server, columns }) if columns.is_empty() => Ok(Self::Tcp(server)),
+            Ok(_) => Err(error(String::new())),
+            Err(problem) => Err(error(format!(": {problem}"))),
+        }
+    }
+}
+
+impl fmt::Display for StageUrl {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Serial { port, baud } => write!(f, "gcode:serial://{}?baud={baud}", port.display()),
+            Self::Tcp(server) => write!(f, "gcode:tcp://{server}"),
+        }
+    }
+}
+
+impl StageUrl {
+    /// Opens the link.
+    pub(super) fn open(&self) -> io::Result<Box<dyn StageLink>> {
+        match self {
+            Self::Serial { port, baud } => {
+                let port = serialport::new(port.to_string_lossy(), *baud).timeout(LOOK).open()?;
+                Ok(Box::new(port))
+            }
+            Self::Tcp(server) => {
+                let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
+                for address in (server.host.as_str(), server.port).to_socket_addrs()? {
+                    match TcpStream::connect_timeout(&address, CONNECT) {
+                        Ok(stream) => {
+                            stream.set_nodelay(true)?;
+                            stream.set_read_timeout(Some(LOOK))?;
+                            stream.set_write_timeout(Some(WRITE))?;
+                            return Ok(Box::new(stream));
+                        }
+                        Err(error) => last = error,
+                    }
+                }
+                Err(last)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_machine_is_at_a_port_or_behind_tcp() {
+        for text in ["gcode:serial:///dev/ttyUSB0?baud=250000", "gcode:tcp://printer.local:23"] {
+            assert_eq!(text.parse::<StageUrl>().unwrap().to_string(), text);
+        }
+        assert_eq!(
+            "gcode:serial:///dev/ttyUSB0".parse::<StageUrl>().unwrap().to_string(),
+            "gcode:serial:///dev/ttyUSB0?baud=115200"
+        );
+    }
+
+    #[test]
+    fn others_are_refused_with_the_reason() {
+        for (text, words) in [
+            ("serial:///dev/ttyUSB0", "machines are `gcode:serial:///dev/ttyUSB0?baud=115200`"),
+            ("gcode:udp://:5000", "is no machine"),
+            ("gcode:tcp://host", "`host` has no port"),
+            ("gcode:serial:///dev/x?columns=a", "is no machine"),
+        ] {
+            let error = text.parse::<StageUrl>().unwrap_err().to_string();
+            assert!(error.contains(words), "{text}: {error}");
+        }
+    }
+}
