@@ -65,7 +65,9 @@ fn plan(rig: &Rig) -> Vec<Press> {
     let positions = training.positions(rig.setup.surface().extent()).unwrap();
     positions
         .iter()
-        .flat_map(|position| std::iter::repeat_n(Press { position: *position, force_n: Some(FORCE_N), depth_m: None }, 3))
+        .flat_map(|position| {
+            std::iter::repeat_n(Press { position: *position, force_n: Some(FORCE_N), depth_m: None }, 3)
+        })
         .collect()
 }
 

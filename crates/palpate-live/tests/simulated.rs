@@ -21,9 +21,12 @@ fn locator(rig: &Rig) -> Locator {
 fn a_finger_is_followed_from_touch_down_to_lift_off() {
     let rig = Rig::from_toml(RIG).unwrap();
     let locator = locator(&rig);
-    let mut board =
-        SimulatedBoard::new(&rig.setup, &BoardConfig { rate_hz: 200.0, seed: 3, load_cell: None }, Finger::random(&rig, 3))
-            .unwrap();
+    let mut board = SimulatedBoard::new(
+        &rig.setup,
+        &BoardConfig { rate_hz: 200.0, seed: 3, load_cell: None },
+        Finger::random(&rig, 3),
+    )
+    .unwrap();
     let mut finger = Finger::random(&rig, 3);
     let mut session = Session::new(&locator, &SessionConfig::default());
     let mut out = Vec::new();

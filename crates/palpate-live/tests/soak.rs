@@ -35,10 +35,13 @@ fn every_line_is_accounted_for_and_memory_stays_flat() {
         creep: 0.02,
         creep_s: 5.0,
     };
-    let mut board =
-        SimulatedBoard::new(&rig.setup, &BoardConfig { rate_hz: RATE_HZ, seed: 1, load_cell: None }, Finger::random(&rig, 1))
-            .unwrap()
-            .with_faults(faults, 1);
+    let mut board = SimulatedBoard::new(
+        &rig.setup,
+        &BoardConfig { rate_hz: RATE_HZ, seed: 1, load_cell: None },
+        Finger::random(&rig, 1),
+    )
+    .unwrap()
+    .with_faults(faults, 1);
     let mut session = Session::new(&locator, &SessionConfig::default());
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("soak");
     let _ = std::fs::remove_dir_all(&folder);

@@ -84,7 +84,10 @@ fn a_machine_calibrates_by_itself_to_the_limit() {
     let force_n = rig.setup.force_n().unwrap();
     let positions = training.positions(rig.setup.surface().extent()).unwrap();
     let plan = positions.iter().flat_map(|position| {
-        std::iter::repeat_n(Press { position: *position, force_n: Some(force_n), depth_m: None }, training.repeats)
+        std::iter::repeat_n(
+            Press { position: *position, force_n: Some(force_n), depth_m: None },
+            training.repeats,
+        )
     });
     let machine =
         SimulatedMachine::new(Firmware::Marlin, stage_setup(), rig.setup.surface().extent(), force_n);

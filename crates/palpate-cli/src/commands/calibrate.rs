@@ -200,8 +200,9 @@ fn press_all(
 fn machine(arguments: &Arguments, stage: Option<Stage>) -> Result<Option<Machine>, Failure> {
     let (Some(url), Some(stage)) = (&arguments.stage, stage) else { return Ok(None) };
     let limit_n = stage.force_limit_n;
-    let thread = StageThread::open(url, stage)
-        .map_err(|error| Complaint::new(format!("--stage {url}: {error}")).help("is it on, and at this port?"))?;
+    let thread = StageThread::open(url, stage).map_err(|error| {
+        Complaint::new(format!("--stage {url}: {error}")).help("is it on, and at this port?")
+    })?;
     remark!("a machine of {} firmware at {url}; Enter stops it at once", thread.firmware().name());
     Ok(Some(Machine::new(thread, limit_n)))
 }

@@ -1,12 +1,15 @@
 //! `palpate serve`: a session that browsers follow.
 
+use super::calibrate::{about_journal, about_plan, pressed_for};
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RigOrLocator};
 use crate::progress::{self, Observer};
 use crate::remark::remark;
+use crate::target::{Inputs, Target};
 use palpate_estimators::estimator::{Estimator, Locator};
 use palpate_estimators::fit::{Fit, FitTask};
-use palpate_live::server::{Access, AccessError, Live, LiveError, Server, ServerError};
+use palpate_live::calibration::{DepthKnowledge, Journal, plan};
+use palpate_live::server::{Access, AccessError, CalibrationPlan, Live, LiveError, Server, ServerError};
 use palpate_live::simulated_board::BoardConfig;
 use palpate_live::source::SourceUrl;
 use palpate_rig::Rig;
@@ -24,7 +27,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Serve a dashboard: contacts, readings and events of a board, live in a browser.
 ///
-/// A rig is fitted first, to its simulation or to --data. Without arguments a simulated board on the bench of the founding paper is shown.
+/// A rig is fitted first, to its simulation or to --data, or calibrated in the browser with --calibrate. Without arguments a simulated board on the
+/// bench of the founding paper is shown.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The locator, or a rig to fit
@@ -37,6 +41,18 @@ pub struct Arguments {
     /// A recording to fit the rig to
     #[arg(long, value_name = "FILE.csv", requires = "locator")]
     data: Option<PathBuf>,
+    /// Calibrate the rig in the browser first, press by press
+    #[arg(long, requires_all = ["locator", "from", "presses", "out"], conflicts_with = "data")]
+    calibrate: bool,
+    /// The recording of the calibration's presses; one that is there already is gone on with
+    #[arg(long, value_name = "FILE.csv", requires = "calibrate")]
+    presses: Option<PathBuf>,
+    /// The locator that the calibration writes
+    #[arg(short, long, value_name = "LOCATOR", requires = "calibrate")]
+    out: Option<PathBuf>,
+    /// Force of every press of the calibration [default: the rig's, or unknown]
+    #[arg(long, value_name = "FORCE", value_parser = input::force, requires = "calibrate")]
+    force: Option<f64>,
     /// A folder in which browsers may record the session
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
@@ -61,7 +77,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let access =
         Access::new(arguments.listen, token.clone(), arguments.host_name.clone()).map_err(refused)?;
-    let live = Arc::new(live(arguments)?);
+    let live = Arc::new(match calibration(arguments)? {
+        Some(plan) => recorded(Live::calibrating(plan, PathBuf::new()), arguments),
+        None => live(arguments)?,
+    });
     let server =
         Server::start(arguments.listen, access, Arc::clone(&live)).map_err(|error| match &error {
             ServerError::Listen { .. } => {
@@ -69,7 +88,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             }
             ServerError::Run(_) => Complaint::new(&error),
         })?;
-    begin(&live, arguments)?;
+    if !arguments.calibrate {
+        begin(&live, arguments)?;
+    }
     let query = token.map_or_else(String::new, |token| format!("?token={token}"));
     remark!("palpate: open http://{}/{query} in a browser; Ctrl-C ends it", server.address());
     while !progress::interrupted() {
@@ -108,11 +129,53 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
         remark!("warning: no tare, so offsets that have moved stay in the readings: {error}");
     }
     // URLs name paths as the command line does: from the folder it was started in.
-    let live = Live::new(locator, &name, simulated, PathBuf::new());
-    Ok(match &arguments.record {
+    Ok(recorded(Live::new(locator, &name, simulated, PathBuf::new()), arguments))
+}
+
+fn recorded(live: Live, arguments: &Arguments) -> Live {
+    match &arguments.record {
         Some(folder) => live.with_recordings(folder.clone()),
         None => live,
-    })
+    }
+}
+
+/// The calibration of the arguments, where browsers calibrate.
+fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure> {
+    let Arguments {
+        calibrate: true,
+        locator: Some(path),
+        from: Some(from),
+        presses: Some(presses),
+        out: Some(out),
+        ..
+    } = arguments
+    else {
+        return Ok(None);
+    };
+    if !input::is_toml(path) {
+        let complaint = Complaint::about(path, "--calibrate is for rigs, and this is a locator");
+        return Err(complaint.help("name the rig that is to be calibrated").into());
+    }
+    let inputs = Inputs::new([path.as_path()]);
+    Target::new(out, &inputs)?;
+    Target::new(presses, &inputs)?;
+    let rig = input::read_rig(path)?;
+    let before = if presses.exists() { input::read_recording(&rig.setup, presses)?.rows } else { Vec::new() };
+    // What cannot be calibrated is refused here, where the place in the file can be shown.
+    plan(&rig, arguments.force, &[], &before).map_err(|error| about_plan(path, error))?;
+    let comment = pressed_for(path);
+    Journal::new(&rig.setup, presses, comment.clone(), Vec::new(), DepthKnowledge::Unknown)
+        .map_err(|error| about_journal(path, error))?;
+    Ok(Some(CalibrationPlan {
+        rig,
+        from: from.clone(),
+        presses: presses.clone(),
+        out: out.clone(),
+        comment,
+        force_n: arguments.force,
+        before,
+        seed: arguments.seed,
+    }))
 }
 
 fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Failure> {

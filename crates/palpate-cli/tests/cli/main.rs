@@ -4,6 +4,7 @@
 mod bad_input;
 mod broken_streams;
 mod browser;
+mod calibrate;
 mod compare;
 mod design;
 mod digit;

@@ -28,7 +28,9 @@ pub enum MachineError {
         name: String,
     },
     /// The load cell reads more than its limit.
-    #[error("the load cell reads {force_n:.3} N, more than the limit of {limit_n} N: the machine was stopped")]
+    #[error(
+        "the load cell reads {force_n:.3} N, more than the limit of {limit_n} N: the machine was stopped"
+    )]
     Overload {
         /// The force.
         force_n: f64,
@@ -42,7 +44,9 @@ pub enum MachineError {
     #[error("the machine was stopped by hand")]
     ByHand,
     /// Presses that nobody sees.
-    #[error("the readings have not shown the last {MOST_UNSEEN} presses: `touch` or `depths` of [stage] are wrong")]
+    #[error(
+        "the readings have not shown the last {MOST_UNSEEN} presses: `touch` or `depths` of [stage] are wrong"
+    )]
     Unseen,
     /// A surface that never rests.
     #[error("the untouched readings have not come to rest within {} s", RELEASED_WITHIN.as_secs())]

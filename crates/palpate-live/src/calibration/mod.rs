@@ -15,6 +15,7 @@ mod settling;
 
 pub use assessment::{Assessment, HeldOut};
 pub use guide::{Guide, Press, Progress, Waiting};
+pub(crate) use journal::replace;
 pub use journal::{DepthKnowledge, Journal, JournalError};
 pub use machine::{Machine, MachineError, MachineNote};
 pub use plan::{PlanError, plan};

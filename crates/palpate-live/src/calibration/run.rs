@@ -92,7 +92,11 @@ impl Calibration {
             Some(LoadCell { name, limit_n: stage.force_limit_n, untouched_n: None })
         });
         if let Some(LoadCell { name, .. }) = &load_cell {
-            channels.push(Channel { name: name.clone(), label: name.clone(), unit: Unit::from_symbol("N").unwrap_or(Unit::NONE) });
+            channels.push(Channel {
+                name: name.clone(),
+                label: name.clone(),
+                unit: Unit::from_symbol("N").unwrap_or(Unit::NONE),
+            });
         }
         let mut decoder = Decoder::new(&channels);
         decoder.set_columns(columns)?;

@@ -1,5 +1,6 @@
 //! A locator in live use: the session that runs, and the beginning of another.
 
+use super::calibration::{CalibrationPlan, CalibrationRecord, Calibrator, CalibratorError};
 use super::session_info::SessionInfo;
 use super::web_sink::{Hub, WebSink};
 use crate::frame::{Channel, ColumnsError};
@@ -19,8 +20,9 @@ use std::thread::JoinHandle;
 
 /// A locator in live use.
 pub struct Live {
-    locator: Arc<Locator>,
-    info: SessionInfo,
+    /// Replaced once, where a calibration ends with a locator.
+    subject: Mutex<Arc<Subject>>,
+    calibrator: Option<Calibrator>,
     simulated: Option<(Rig, BoardConfig)>,
     /// Folder that paths in URLs of sources are relative to.
     folder: PathBuf,
@@ -29,6 +31,14 @@ pub struct Live {
     clock: HostClock,
     hub: Hub,
     running: Mutex<Option<Running>>,
+}
+
+/// The locator of sessions, and what is told of it.
+struct Subject {
+    /// `None` before a calibration has ended.
+    locator: Option<Arc<Locator>>,
+    channels: Vec<Channel>,
+    info: SessionInfo,
 }
 
 /// A session that runs.
@@ -44,6 +54,15 @@ struct Running {
 /// A wish that cannot be done.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
+    /// There is no locator yet.
+    #[error("there is no locator yet: the calibration has not ended")]
+    NoLocator,
+    /// No calibration goes on.
+    #[error("this server does not calibrate")]
+    NotCalibrating,
+    /// A step of a calibration cannot be done.
+    #[error(transparent)]
+    Calibrator(#[from] CalibratorError),
     /// No session runs.
     #[error("no session runs: there is no source, or it has ended")]
     NoSession,
@@ -74,10 +93,29 @@ impl Live {
     /// A locator of this name, without a session. Where `simulated` has a rig, browsers may begin a session with a simulated board on its
     /// bench.
     pub fn new(locator: Locator, name: &str, simulated: Option<(Rig, BoardConfig)>, folder: PathBuf) -> Self {
-        let info = SessionInfo::new(&locator, name, simulated.is_some());
+        let subject = Subject::of_locator(locator, name, simulated.is_some());
+        Self::of_subject(subject, None, simulated, folder)
+    }
+
+    /// A rig without a locator, which browsers calibrate first.
+    pub fn calibrating(plan: CalibrationPlan, folder: PathBuf) -> Self {
+        let subject = Subject {
+            locator: None,
+            channels: Channel::all_of(&plan.rig.setup),
+            info: SessionInfo::of_setup(&plan.rig.setup),
+        };
+        Self::of_subject(subject, Some(Calibrator::new(plan)), None, folder)
+    }
+
+    fn of_subject(
+        subject: Subject,
+        calibrator: Option<Calibrator>,
+        simulated: Option<(Rig, BoardConfig)>,
+        folder: PathBuf,
+    ) -> Self {
         Self {
-            locator: Arc::new(locator),
-            info,
+            subject: Mutex::new(Arc::new(subject)),
+            calibrator,
             simulated,
             folder,
             recordings: None,
@@ -119,14 +157,15 @@ impl Live {
         open: impl FnOnce(HostClock, SyncSender<Input>) -> Result<Source, SourceError>,
     ) -> Result<(), LiveError> {
         let (inputs, received) = sync_channel(pipeline::WAITING);
-        Session::new(&self.locator, &SessionConfig::default()).set_columns(columns)?;
-        let switch = RecordingSwitch::new(&self.locator, &url, inputs.clone())?;
+        let locator = self.subject().locator.clone().ok_or(LiveError::NoLocator)?;
+        Session::new(&locator, &SessionConfig::default()).set_columns(columns)?;
+        let switch = RecordingSwitch::new(&locator, &url, inputs.clone())?;
         let source = open(self.clock, inputs.clone())?;
         let mut running = self.lock();
         if let Some(running) = running.take() {
             running.end();
         }
-        let (locator, clock, hub) = (Arc::clone(&self.locator), self.clock, self.hub.clone());
+        let (clock, hub) = (self.clock, self.hub.clone());
         let (columns, records) = (columns.to_vec(), switch.clone());
         let run = move || {
             let mut session = Session::new(&locator, &SessionConfig::default());
@@ -210,8 +249,52 @@ impl Live {
         self.lock().as_ref().map(|running| running.switch.clone())
     }
 
-    /// Ends the session, where one runs.
+    /// The calibration, where there is one.
+    ///
+    /// # Errors
+    /// [`LiveError::NotCalibrating`].
+    pub(super) fn calibration(&self) -> Result<CalibrationRecord, LiveError> {
+        Ok(self.calibrator()?.record())
+    }
+
+    pub(super) fn calibrator(&self) -> Result<&Calibrator, LiveError> {
+        self.calibrator.as_ref().ok_or(LiveError::NotCalibrating)
+    }
+
+    /// Begins the calibration, or goes on with one that was ended early.
+    ///
+    /// # Errors
+    /// [`LiveError`] where the source cannot be opened, or the presses cannot be kept.
+    pub(super) fn begin_calibration(&self) -> Result<(), LiveError> {
+        Ok(self.calibrator()?.begin(&self.folder, self.clock)?)
+    }
+
+    /// Fits the presses in a thread of its own; a session with the locator begins as soon as there is one.
+    ///
+    /// # Errors
+    /// [`LiveError`] where no press was taken, or a fit goes on already.
+    pub(super) fn finish_calibration(self: &Arc<Self>) -> Result<(), LiveError> {
+        let calibrator = self.calibrator()?;
+        let fit = calibrator.begin_fit()?;
+        let live = Arc::clone(self);
+        std::thread::Builder::new().name("fit".to_owned()).spawn(move || {
+            let Ok(calibrator) = live.calibrator() else { return };
+            let url = calibrator.plan().from.clone();
+            let name = calibrator.plan().out_name();
+            calibrator.fit(&fit, |locator| {
+                let subject = Subject::of_locator(locator, &name, false);
+                *live.subject.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(subject);
+                live.begin(&url).map_err(|error| error.to_string())
+            });
+        })?;
+        Ok(())
+    }
+
+    /// Ends the session and the calibration, where they run.
     pub fn end(&self) {
+        if let Some(calibrator) = &self.calibrator {
+            calibrator.end();
+        }
         if let Some(running) = self.lock().take() {
             running.end();
         }
@@ -225,7 +308,7 @@ impl Live {
 
     /// Channels of a reading.
     pub fn channels(&self) -> Vec<Channel> {
-        Channel::all_of(&self.locator.setup)
+        self.subject().channels.clone()
     }
 
     pub(super) fn info(&self) -> SessionInfo {
@@ -233,7 +316,11 @@ impl Live {
             let status = self.switch().and_then(|switch| switch.status());
             (folder.display().to_string(), status)
         });
-        self.info.clone().with_source(self.source()).with_recording(recording)
+        self.subject().info.clone().with_source(self.source()).with_recording(recording)
+    }
+
+    fn subject(&self) -> Arc<Subject> {
+        Arc::clone(&self.subject.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     pub(super) fn hub(&self) -> &Hub {
@@ -242,6 +329,16 @@ impl Live {
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Option<Running>> {
         self.running.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Subject {
+    fn of_locator(locator: Locator, name: &str, has_simulated: bool) -> Self {
+        Self {
+            channels: Channel::all_of(&locator.setup),
+            info: SessionInfo::new(&locator, name, has_simulated),
+            locator: Some(Arc::new(locator)),
+        }
     }
 }
 

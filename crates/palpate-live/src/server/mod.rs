@@ -4,6 +4,7 @@
 //! which are counted, and the session never waits for it.
 
 mod body;
+mod calibration;
 mod guard;
 mod live;
 mod page;
@@ -12,6 +13,7 @@ mod session_info;
 mod stream;
 mod web_sink;
 
+pub use calibration::{CalibrationPlan, CalibratorError};
 pub use guard::{Access, AccessError};
 pub use live::{Live, LiveError};
 pub use web_sink::{Hub, WebSink};

@@ -1,6 +1,7 @@
 //! Routes of the server.
 
 use super::body::{JsonAnswer, JsonBody, Refusal};
+use super::calibration::CalibrationRecord;
 use super::guard::{Access, Guard, guarded};
 use super::live::{Live, LiveError};
 use super::session_info::SessionInfo;
@@ -35,6 +36,7 @@ pub fn router(access: Access, live: Arc<Live>) -> Router {
         .route("/api/mark", post(mark))
         .route("/api/source", post(source))
         .route("/api/record", post(record))
+        .route("/api/calibration", get(calibration).post(calibrate))
         .route("/api/recordings", get(recordings))
         .route("/api/recordings/{name}", get(recording))
         .route("/api/recordings/{name}/file", get(recording_file))
@@ -89,12 +91,58 @@ async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBod
     blocking(move || live.begin_simulated()).await.map(|()| JsonAnswer(json!({})))
 }
 
+async fn calibration(State(live): State<Arc<Live>>) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
+    live.calibration().map(JsonAnswer).map_err(|error| refusal(&error))
+}
+
+/// A step of a calibration.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Step {
+    Begin,
+    Redo,
+    Skip,
+    Stop,
+    Finish,
+}
+
+#[derive(Deserialize)]
+struct Calibrate {
+    step: Step,
+}
+
+/// Does a step; the answer is the state after it.
+async fn calibrate(
+    State(live): State<Arc<Live>>,
+    JsonBody(Calibrate { step }): JsonBody<Calibrate>,
+) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
+    // A source that ends is waited for, and presses are written to the disk.
+    blocking(move || {
+        match step {
+            Step::Begin => live.begin_calibration()?,
+            Step::Redo => live.calibrator()?.redo()?,
+            Step::Skip => live.calibrator()?.skip()?,
+            Step::Stop => live.calibrator()?.stop()?,
+            Step::Finish => live.finish_calibration()?,
+        }
+        live.calibration()
+    })
+    .await
+    .map(JsonAnswer)
+}
+
 fn done(result: Result<(), LiveError>) -> Answer {
     result.map(|()| JsonAnswer(json!({}))).map_err(|error| refusal(&error))
 }
 
 fn refusal(error: &LiveError) -> Refusal {
     let (status, help) = match error {
+        LiveError::NoLocator => (StatusCode::CONFLICT, "calibrate first: POST /api/calibration"),
+        LiveError::NotCalibrating => (
+            StatusCode::NOT_FOUND,
+            "start `palpate serve RIG --calibrate --from URL --presses FILE --out LOCATOR`",
+        ),
+        LiveError::Calibrator(_) => (StatusCode::CONFLICT, "GET /api/calibration says how far it is"),
         LiveError::NoSession => (StatusCode::CONFLICT, "choose a source first"),
         LiveError::Behind => (StatusCode::SERVICE_UNAVAILABLE, "try it again"),
         LiveError::NotSimulated => (StatusCode::CONFLICT, "start `palpate serve` with a rig"),

@@ -20,7 +20,7 @@ const FORCE_N: f64 = 1.0;
 #[derive(Clone, Debug, Serialize)]
 pub struct SessionInfo {
     version: &'static str,
-    locator: Value,
+    locator: Option<Value>,
     surface: Value,
     channels: Vec<Value>,
     force: Value,
@@ -40,7 +40,7 @@ impl SessionInfo {
         let description = description::locator(locator);
         Self {
             version: env!("CARGO_PKG_VERSION"),
-            locator: json!({ "name": name, "kind": locator.kind(), "description": description }),
+            locator: Some(json!({ "name": name, "kind": locator.kind(), "description": description })),
             surface: surface(setup.surface()),
             channels: channels(setup),
             force: json!({ "known_n": known_n, "unknown": known_n.is_none() }),
@@ -52,6 +52,24 @@ impl SessionInfo {
             source: None,
             recording: None,
             has_simulated,
+        }
+    }
+
+    /// The description of a bench that has no locator yet.
+    pub fn of_setup(setup: &Setup) -> Self {
+        let known_n = setup.force_n();
+        let why = "there is no locator yet: the calibration has not ended";
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            locator: None,
+            surface: surface(setup.surface()),
+            channels: channels(setup),
+            force: json!({ "known_n": known_n, "unknown": known_n.is_none() }),
+            tare: json!({ "available": false, "follows": false, "why": why }),
+            limit: None,
+            source: None,
+            recording: None,
+            has_simulated: false,
         }
     }
 

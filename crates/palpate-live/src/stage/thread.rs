@@ -128,7 +128,9 @@ fn run(
             Ok(Order::Press { position, depth_m }) => {
                 machine.travel(position).and_then(|()| machine.press(depth_m)).map(|()| Done::Down)
             }
-            Err(RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => machine.check_stop().map(|()| Done::Up),
+            Err(RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => {
+                machine.check_stop().map(|()| Done::Up)
+            }
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => {
                 // The stop may be what ends it.

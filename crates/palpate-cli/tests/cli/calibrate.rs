@@ -1,0 +1,124 @@
+//! `palpate calibrate` by a machine, on a simulated board whose finger a simulated machine moves.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, Stdio};
+
+use palpate_estimators::estimator::Locator;
+use palpate_estimators::evaluation::{Evaluation, limit_ratio};
+use palpate_rig::Rig;
+
+use crate::support::command::{complained, palpate, said};
+
+const RIG: &str = include_str!("../../../../examples/fsi-like.toml");
+
+/// A board and its machine, both behind TCP, until it is dropped.
+struct Bench {
+    child: Child,
+    from: String,
+    stage: String,
+}
+
+impl Bench {
+    fn start(folder: &Path, firmware: &str) -> Self {
+        let to_stderr = ["--to", "tcp://:0", "--stage", "tcp://:0", "--load-cell", "2 mN"];
+        let mut child = palpate(folder)
+            .args(["simulated-board", "rig.toml", "--rate", "200 Hz", "--firmware", firmware])
+            .args(to_stderr)
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the board starts");
+        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+        let stage = lines.next().expect("the place of the machine");
+        let from = lines.next().expect("the place of the board");
+        let stage = format!("gcode:{}", stage.rsplit(' ').next().unwrap());
+        Self { child, from, stage }
+    }
+
+    fn calibrate(&self, folder: &Path, more: &[&str]) -> std::process::Command {
+        let mut command = palpate(folder);
+        command.args(["calibrate", "rig.toml", "--from", &self.from, "--stage", &self.stage]);
+        command.args(["--presses", "presses.csv", "--out", "locator.json"]).args(more);
+        command
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Rows of the file of presses in which something touched.
+fn presses(folder: &Path) -> usize {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let bytes = std::fs::read(folder.join("presses.csv")).unwrap();
+    rig.setup.read_recording("presses.csv", bytes.as_slice()).unwrap().touched().rows.len()
+}
+
+/// From zero to a locator with no hand on it, and what it is worth at contacts that it has not seen.
+#[test]
+fn a_machine_calibrates_to_the_limit_unattended() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
+    let bench = Bench::start(folder.path(), "marlin");
+    let words = said(&bench.calibrate(folder.path(), &[]).output().unwrap());
+    assert!(words.contains("fitted to 54 presses") && words.contains("held out (5 folds)"), "{words}");
+    assert_eq!(presses(folder.path()), 54);
+    let json = std::fs::read_to_string(folder.path().join("locator.json")).unwrap();
+    let locator = Locator::from_json(&json).unwrap();
+    let rig = Rig::from_toml(RIG).unwrap();
+    let trial = rig.trials(1, 77).unwrap().remove(0);
+    let evaluation = Evaluation::new(&locator, &trial.judged).unwrap();
+    let ratio = limit_ratio(&rig.setup, &evaluation).unwrap();
+    assert!((0.8..1.2).contains(&ratio), "{ratio} × the limit");
+}
+
+#[test]
+fn too_much_force_and_enter_stop_the_machine_and_the_presses_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    // The second depth presses with 1 N, the first with half of it.
+    std::fs::write(folder.path().join("rig.toml"), RIG.replace("\"3 N\"", "\"0.8 N\"")).unwrap();
+    let bench = Bench::start(folder.path(), "grbl");
+    let words = complained(&bench.calibrate(folder.path(), &[]).output().unwrap(), 1);
+    assert!(words.contains("more than the limit of 0.8 N"), "{words}");
+    assert!(words.contains("--resume goes on"), "{words}");
+    assert_eq!(presses(folder.path()), 3, "those of the first depth");
+    std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
+    let mut child = bench
+        .calibrate(folder.path(), &["--resume"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    lines.find(|line| line.starts_with("taken: press 5")).expect("it goes on after the third");
+    child.stdin.take().unwrap().write_all(b"\n").unwrap();
+    let words: Vec<String> = lines.collect();
+    assert!(words.iter().any(|line| line.contains("stopped by hand")), "{words:?}");
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(presses(folder.path()) >= 5);
+    assert!(!folder.path().join("locator.json").exists());
+}
+
+#[test]
+fn a_machine_that_is_not_there_and_a_rig_without_a_stage_are_told_with_a_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = RIG.split("[stage]").next().unwrap();
+    std::fs::write(folder.path().join("rig.toml"), rig).unwrap();
+    let calibrate = |stage: &str| {
+        let arguments = ["calibrate", "rig.toml", "--from", "udp://127.0.0.1:9", "--stage", stage];
+        let mut command = palpate(folder.path());
+        command.args(arguments).args(["--presses", "presses.csv", "--out", "locator.json"]);
+        complained(&command.output().unwrap(), 2)
+    };
+    let words = calibrate("gcode:tcp://127.0.0.1:1");
+    assert!(words.contains("needs the rig's section [stage]"), "{words}");
+    std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
+    let words = calibrate("gcode:tcp://127.0.0.1:1");
+    assert!(words.contains("--stage gcode:tcp://127.0.0.1:1: the line to the machine is broken"), "{words}");
+    let words = calibrate("tcp://127.0.0.1:1");
+    assert!(words.contains("gcode:serial:///dev/ttyUSB0"), "{words}");
+}
