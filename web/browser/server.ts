@@ -7,7 +7,7 @@ import { fileURLToPath } from "node:url";
 /** The folder that holds the workspace. */
 export const ROOT = fileURLToPath(new URL("../..", import.meta.url));
 
-const BINARY = process.env.PALPATE_BINARY ?? `${ROOT}/target/debug/palpate`;
+export const BINARY = process.env.PALPATE_BINARY ?? `${ROOT}/target/debug/palpate`;
 /** Longest time to the first answer: a rig is fitted to its simulation first. */
 const START_MS = 40_000;
 
@@ -40,6 +40,13 @@ export class Server {
     return Number(new URL(this.url).port);
   }
 
+  /** Kills the server, as a power cut would. */
+  async kill(): Promise<void> {
+    const gone = new Promise((resolve) => this.child.once("exit", resolve));
+    this.child.kill("SIGKILL");
+    await gone;
+  }
+
   /** Ends the server, and waits until it has gone. */
   async stop(): Promise<void> {
     if (this.child.exitCode !== null || this.child.signalCode !== null) return;
@@ -49,7 +56,7 @@ export class Server {
   }
 }
 
-async function freePort(): Promise<number> {
+export async function freePort(): Promise<number> {
   const probe = createServer();
   await new Promise<void>((resolve) => probe.listen(0, "127.0.0.1", resolve));
   const address = probe.address();

@@ -1,6 +1,6 @@
 // Requests to `palpate serve`, at the address that the page came from.
 
-import type { RecordingContent, RecordingInfo, SessionInfo } from "./protocol";
+import type { CalibrationRecord, CalibrationStep, RecordingContent, RecordingInfo, SessionInfo } from "./protocol";
 
 /** An answer of the server that is no success: its words, and what can be done. */
 export class ApiError extends Error {
@@ -33,8 +33,8 @@ async function get<T>(path: string): Promise<T> {
   return (await (await request(path, {})).json()) as T;
 }
 
-async function post(path: string, body: object): Promise<void> {
-  await request(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
+async function post(path: string, body: object): Promise<Response> {
+  return request(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
 }
 
 export const api = {
@@ -42,10 +42,12 @@ export const api = {
   recordings: () => get<RecordingInfo[]>("recordings"),
   recording: (name: string, points: number) =>
     get<RecordingContent>(`recordings/${encodeURIComponent(name)}?points=${points}`),
-  tare: () => post("tare", {}),
-  mark: (text: string) => post("mark", { text }),
-  record: (on: boolean) => post("record", { on }),
-  simulate: () => post("source", { url: "simulated" }),
+  tare: async () => void (await post("tare", {})),
+  mark: async (text: string) => void (await post("mark", { text })),
+  record: async (on: boolean) => void (await post("record", { on })),
+  calibration: () => get<CalibrationRecord>("calibration"),
+  calibrate: async (step: CalibrationStep) => (await (await post("calibration", { step })).json()) as CalibrationRecord,
+  simulate: async () => void (await post("source", { url: "simulated" })),
   recordingFile: (name: string) => withToken(`api/recordings/${encodeURIComponent(name)}/file`),
   stream: () => {
     const url = new URL(withToken("api/stream"), location.href);

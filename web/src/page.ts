@@ -6,6 +6,7 @@ import { startKeys } from "./keys";
 import { Live } from "./model/live";
 import { Pace } from "./model/pace";
 import type { Player } from "./model/player";
+import { CalibrationPanel } from "./panel/calibration";
 import { announce, Events } from "./panel/events";
 import { Health } from "./panel/health";
 import { writeNumbers } from "./panel/numbers";
@@ -47,6 +48,10 @@ export class Page {
   private live = new Live(0);
   private views: Views | null = null;
   private replay = new Replay(() => this.replayClosed());
+  private calibration = new CalibrationPanel(
+    () => this.calibrationChanged(),
+    (error) => this.failed(error),
+  );
   private connection: Connection = "connecting";
   private paused = false;
   private shown: Shown | null = null;
@@ -68,7 +73,11 @@ export class Page {
     startKeys({
       t: () => this.tare(),
       m: () => this.openMark(),
-      r: () => this.record(),
+      r: () => (this.calibration.guides ? this.calibration.key("redo") : this.record()),
+      b: () => this.calibration.key("begin"),
+      s: () => this.calibration.key("skip"),
+      q: () => this.calibration.key("stop"),
+      f: () => this.calibration.key("finish"),
       space: () => (this.replay.player === null ? this.pause() : this.replay.toggle()),
       "?": () => need<HTMLDialogElement>("help-dialog").showModal(),
       Escape: () => this.replay.close(),
@@ -134,7 +143,8 @@ export class Page {
     const locator = session.locator;
     setText(need("locator"), locator === null ? "no locator" : `${locator.name} · ${locator.kind}`);
     need("locator").title = locator?.description.join("\n") ?? "";
-    need("welcome").hidden = session.source !== null;
+    if (session.calibrates) this.calibration.follow();
+    need("welcome").hidden = session.source !== null || (session.calibrates && session.locator === null);
     setText(need("welcome-title"), this.live.sample === null ? "No source of readings yet" : "The source has ended");
     need("simulate").hidden = need("welcome-simulated").hidden = !session.has_simulated;
     const tare = need<HTMLButtonElement>("tare");
@@ -178,6 +188,14 @@ export class Page {
     if (!expected || this.silent_s() < SILENT_S) return "";
     if (this.live.state?.source == null) return "The source is away and looked for again: what is shown is not live.";
     return "The source sends no readings: what is shown is not live.";
+  }
+
+  /** A calibration that guides has no estimates: what shows them is left out, and the next place is drawn. */
+  private calibrationChanged(): void {
+    document.body.classList.toggle("calibrating", this.calibration.guides);
+    this.dirty = true;
+    // The session begins as soon as there is a locator.
+    if (!this.calibration.guides && this.session?.locator === null) void this.ask();
   }
 
   // What a person does.
@@ -304,6 +322,7 @@ export class Page {
       session,
       sample,
       trail: this.reduced.matches ? [] : trail.aged(),
+      calibration: this.calibration.guides ? this.calibration.state : null,
       deflections: sample === null || sample.status === "no_contact" ? null : baseline.deflections(sample.reading),
     };
   }
@@ -320,6 +339,10 @@ export class Page {
     const surface = shown.session.surface;
     const across = plane ? ` × ${surface?.width_mm} mm` : "";
     setText(need("surface-note"), surface === null ? "" : `${surface.kind}, ${surface.length_mm} mm${across}, to scale`);
+    if (shown.calibration !== null) {
+      setText(need("surface-legend"), "■ sensors · ○ places to press · ● places that were pressed · the arrow or the cross shows the next one");
+      return;
+    }
     const parts = ["■ sensors", plane ? "● contact, with the ellipse that holds 95 %" : "● contact, with its 95 % interval", "◌ other places that the reading fits"];
     const times = views.line.exaggeration;
     if (!plane && times !== null) parts.push(`deflection as measured, ${formatTimes(times)} × exaggerated, a spline between the sensors`);

@@ -97,6 +97,7 @@ export interface SessionInfo {
   source: string | null;
   recording: RecordingState | null;
   has_simulated: boolean;
+  calibrates: boolean;
 }
 
 /** Where recordings go; a name while one is being made. */
@@ -121,4 +122,48 @@ export interface RecordingContent {
   seconds: number;
   samples: SampleRecord[];
   events: EventRecord[];
+}
+
+export type CalibrationPhase = "ready" | "pressing" | "pressed" | "fitting" | "assessing" | "done";
+export type Waiting = "untouched" | "press" | "rest" | "release" | "nothing";
+export type CalibrationStep = "begin" | "redo" | "skip" | "stop" | "finish";
+
+/** A place to press. */
+export interface PlaceRecord {
+  x_mm: number;
+  y_mm?: number;
+  force_n?: number;
+  taken: number;
+  left: number;
+  spread_percent: number | null;
+}
+
+/** State of a calibration. */
+export interface CalibrationRecord {
+  phase: CalibrationPhase;
+  waiting: Waiting;
+  next: PlaceRecord | null;
+  taken: number;
+  left: number;
+  places: PlaceRecord[];
+  last_percent: number | null;
+  source: string | null;
+  readings: number;
+  reading: number[];
+  bad_frames: number;
+  presses: string;
+  problem: string | null;
+  outcome: CalibrationOutcome | null;
+}
+
+/** What a calibration ended with. */
+export interface CalibrationOutcome {
+  locator: string;
+  presses: number;
+  folds: number | null;
+  median_mm: number | null;
+  mean_mm: number | null;
+  gain_percent: number | null;
+  is_enough: boolean;
+  remarks: string[];
 }

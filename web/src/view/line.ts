@@ -1,6 +1,6 @@
 // A surface of one direction from the side: supports, sensors, deflected shape, contact.
 
-import type { ContactRecord, SurfaceInfo } from "../protocol";
+import type { CalibrationRecord, ContactRecord, SurfaceInfo } from "../protocol";
 import { linear, roundUp, ticks } from "../model/scale";
 import { naturalSpline } from "../model/spline";
 import { isPlaced, number } from "../words";
@@ -34,6 +34,7 @@ export class LineView {
     drawSupports(ctx, surface, x, level);
     drawBeam(ctx, x(0), x(surface.length_mm), level, shape);
     drawSensors(ctx, shown, x, level, shape);
+    if (shown.calibration !== null) drawTargets(ctx, shown.calibration, x, level);
     drawContact(frame, shown, x, level, shape);
   }
 
@@ -151,6 +152,24 @@ function drawSensors(ctx: CanvasRenderingContext2D, shown: Shown, x: (mm: number
     const fits = ctx.measureText(channel.name).width < apart - 4;
     if (fits) ctx.fillText(channel.name, px, y + 15);
   }
+}
+
+/** Places of a calibration: hollow while presses are left, full when all were taken, and an arrow at the next one. */
+function drawTargets(ctx: CanvasRenderingContext2D, calibration: CalibrationRecord, x: (mm: number) => number, level: number): void {
+  const { accent, ink, card } = palette();
+  for (const place of calibration.places) {
+    ctx.strokeStyle = accent;
+    ctx.fillStyle = place.left === 0 ? accent : card;
+    ctx.lineWidth = 1.5;
+    disc(ctx, x(place.x_mm), level - 10, 4);
+    ctx.fill();
+    ctx.stroke();
+  }
+  const next = calibration.next;
+  if (next === null) return;
+  const px = x(next.x_mm);
+  drawArrow(ctx, px, level - 16, 36);
+  label(ctx, `${next.x_mm.toFixed(1)} mm`, px, level - 56, ink);
 }
 
 function drawContact({ ctx, height }: Frame, shown: Shown, x: (mm: number) => number, level: number, shape: (px: number) => number): void {

@@ -1,6 +1,6 @@
 // A surface of two directions from above: sensors, and contacts with their 95 % regions.
 
-import type { ContactRecord } from "../protocol";
+import type { CalibrationRecord, ContactRecord } from "../protocol";
 import { fit, linear, ticks } from "../model/scale";
 import { isPlaced, number } from "../words";
 import { disc, segment, type Frame } from "./canvas";
@@ -37,6 +37,7 @@ export function drawPlane({ ctx, width, height }: Frame, shown: Shown): void {
   ctx.font = palette().font;
   drawFrame(ctx, place, length, across, perUnit);
   drawSensors(ctx, shown, place);
+  if (shown.calibration !== null) drawTargets(ctx, shown.calibration, place);
   drawTrail(ctx, shown, place);
   const sample = shown.sample;
   if (sample === null || !isPlaced(sample.status)) return;
@@ -87,6 +88,32 @@ function drawSensors(ctx: CanvasRenderingContext2D, shown: Shown, { x, y }: Plac
     ctx.fillStyle = quiet;
     ctx.fillText(channel.name, px + 6, py - 2);
   }
+}
+
+/** Places of a calibration: hollow while presses are left, full when all were taken, and a cross in a ring at the next one. */
+function drawTargets(ctx: CanvasRenderingContext2D, calibration: CalibrationRecord, { x, y }: Place): void {
+  const { accent, card, contact, ink } = palette();
+  ctx.lineWidth = 1.5;
+  for (const place of calibration.places) {
+    ctx.strokeStyle = accent;
+    ctx.fillStyle = place.left === 0 ? accent : card;
+    disc(ctx, x(place.x_mm), y(place.y_mm ?? 0), 4);
+    ctx.fill();
+    ctx.stroke();
+  }
+  const next = calibration.next;
+  if (next === null) return;
+  const [px, py] = [x(next.x_mm), y(next.y_mm ?? 0)];
+  ctx.strokeStyle = contact;
+  ctx.lineWidth = 2.5;
+  disc(ctx, px, py, 12);
+  ctx.stroke();
+  segment(ctx, px - 18, py, px + 18, py);
+  segment(ctx, px, py - 18, px, py + 18);
+  ctx.fillStyle = ink;
+  ctx.textAlign = px > ctx.canvas.clientWidth / 2 ? "right" : "left";
+  ctx.textBaseline = "bottom";
+  ctx.fillText(`${next.x_mm.toFixed(1)}, ${(next.y_mm ?? 0).toFixed(1)} mm`, px + (ctx.textAlign === "right" ? -16 : 16), py - 12);
 }
 
 function drawTrail(ctx: CanvasRenderingContext2D, shown: Shown, { x, y }: Place): void {

@@ -1,5 +1,6 @@
 //! Description of a session: what it locates with, on which surface, and how well that can be done.
 
+use super::calibration::Calibrator;
 use crate::frame::Channel;
 use crate::recording::RecordingStatus;
 use palpate_estimators::description;
@@ -29,6 +30,8 @@ pub struct SessionInfo {
     source: Option<String>,
     recording: Option<Value>,
     has_simulated: bool,
+    /// Whether the server has a calibration, which `/api/calibration` tells.
+    calibrates: bool,
 }
 
 impl SessionInfo {
@@ -52,6 +55,7 @@ impl SessionInfo {
             source: None,
             recording: None,
             has_simulated,
+            calibrates: false,
         }
     }
 
@@ -70,12 +74,18 @@ impl SessionInfo {
             source: None,
             recording: None,
             has_simulated: false,
+            calibrates: false,
         }
     }
 
     /// The same, while a session of this source runs.
     pub fn with_source(self, source: Option<String>) -> Self {
         Self { source, ..self }
+    }
+
+    /// The same, where there is a calibration.
+    pub fn with_calibration(self, calibrator: Option<&Calibrator>) -> Self {
+        Self { calibrates: calibrator.is_some(), ..self }
     }
 
     /// The same, where sessions are recorded in a folder: its name, and the state of the recording that goes on.

@@ -1,0 +1,151 @@
+// A calibration in the browser, from a rig without a locator to a live dot, on the real server; a machine plays the person's hand.
+
+import { existsSync, readFileSync } from "node:fs";
+import type { Browser, Page } from "playwright-core";
+import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { Bench } from "./bench";
+import { hasChromium, launch, open, picture } from "./chromium";
+import { Server } from "./server";
+
+const SIX_TWICE: [string, string][] = [
+  ["count = 10\nrepeats = 10", "count = 6\nrepeats = 2"],
+];
+
+/** What the page asks for. */
+async function step(page: Page): Promise<string> {
+  return (await page.locator("#calibration-step").textContent()) ?? "";
+}
+
+async function says(page: Page, id: string, text: RegExp): Promise<string> {
+  await page.waitForFunction(
+    ({ id, source }) => new RegExp(source).test(document.getElementById(id)?.textContent ?? ""),
+    { id, source: text.source },
+    { timeout: 30_000 },
+  );
+  return (await page.locator(`#${id}`).textContent()) ?? "";
+}
+
+/** Does what the page asks for until `until` holds. */
+async function obey(page: Page, bench: Bench, until: (step: string, taken: number) => boolean): Promise<void> {
+  const end = Date.now() + 90_000;
+  let pressed = "";
+  for (;;) {
+    const asked = await step(page);
+    const taken = await page.locator("#calibration-bar").evaluate((bar) => (bar as HTMLProgressElement).value);
+    if (until(asked, taken)) return;
+    const place = /^Press at ([\d.]+) mm/.exec(asked)?.[1];
+    if (place !== undefined && place !== pressed) bench.press(Number((pressed = place)));
+    if (/^(Let go|Leave)/.test(asked)) {
+      bench.lift();
+      pressed = "";
+    }
+    if (Date.now() > end) throw new Error(`the calibration does not go on from ${asked}`);
+    await page.waitForTimeout(50);
+  }
+}
+
+function presses(bench: Bench): number {
+  const lines = readFileSync(bench.path("presses.csv"), "utf8").split("\n");
+  return lines.filter((line) => /^[\d.]+,/.test(line) && Number(line.split(",")[2]) > 0).length;
+}
+
+/** Waits for a dot where the finger presses. */
+async function dotAt(page: Page, bench: Bench, x_mm: number): Promise<void> {
+  bench.press(x_mm);
+  await page.waitForFunction(
+    (x_mm) => {
+      const located = document.getElementById("status")?.textContent === "Located";
+      return located && Math.abs(Number(document.getElementById("position")?.textContent) - x_mm) < 2;
+    },
+    x_mm,
+    { timeout: 20_000 },
+  );
+  bench.lift();
+}
+
+function started(bench: Bench): Promise<Server> {
+  const [rig, csv, out] = ["rig.toml", "presses.csv", "locator.json"].map((name) => bench.path(name));
+  return Server.start([rig!, "--from", bench.from, "--calibrate", "--presses", csv!, "--out", out!]);
+}
+
+describe.skipIf(!hasChromium())("calibration", () => {
+  let browser: Browser;
+  beforeAll(async () => {
+    browser = await launch();
+  });
+  afterAll(() => browser?.close());
+
+  test("goes from nothing to a live dot by clicks", async () => {
+    const bench = await Bench.start("noisy-beam.toml", SIX_TWICE);
+    const server = await started(bench);
+    const { page, faults } = await open(browser, server.url);
+    await says(page, "calibration-step", /^Ready to calibrate$/);
+    expect(await page.locator("#welcome").isVisible()).toBe(false);
+    await picture(page, "calibration-ready");
+    await page.locator("#calibration-begin").click();
+    await obey(page, bench, (_, taken) => taken === 3);
+    await says(page, "calibration-step", /^(Let go|Press at)/);
+    // The third press is asked for again.
+    await page.locator("#calibration-redo").click();
+    await says(page, "calibration-progress", /^2 of 12/);
+    await obey(page, bench, (asked, taken) => taken === 3 && asked.startsWith("Press at"));
+    await page.locator("summary").click();
+    await says(page, "calibration-places", /2 of 2[\d.]+ %taken/);
+    await picture(page, "calibration-light");
+    await obey(page, bench, (asked) => asked === "No more presses are asked for");
+    expect(presses(bench)).toBe(12);
+    await page.locator("#calibration-finish").click();
+    expect(await says(page, "calibration-step", /^Fitted to 12 presses: error at positions held out [\d.]+ mm/)).toContain("median");
+    expect(existsSync(bench.path("locator.json"))).toBe(true);
+    await dotAt(page, bench, 123);
+    await picture(page, "calibration-done");
+    await page.locator("#calibration-close").click();
+    expect(await page.locator("#calibration").isVisible()).toBe(false);
+    expect(faults).toEqual([]);
+    await page.context().close();
+    await server.stop();
+    bench.stop();
+  });
+
+  test("is gone on with after the server was killed, by keys, and is not cut off on a phone in the dark", async () => {
+    const bench = await Bench.start("noisy-beam.toml", SIX_TWICE);
+    const server = await started(bench);
+    const first = await open(browser, server.url);
+    await says(first.page, "calibration-step", /^Ready to calibrate$/);
+    await first.page.keyboard.press("b");
+    await obey(first.page, bench, (_, taken) => taken === 2);
+    await server.kill();
+    await first.page.context().close();
+    bench.lift();
+    expect(presses(bench)).toBe(2);
+    const again = await started(bench);
+    const { page, faults } = await open(browser, again.url, {
+      viewport: { width: 390, height: 844 },
+      colorScheme: "dark",
+      reducedMotion: "reduce",
+    });
+    await says(page, "calibration-step", /^Ready to go on$/);
+    await page.keyboard.press("b");
+    await obey(page, bench, (asked) => asked.startsWith("Press at"));
+    await page.keyboard.press("s");
+    await says(page, "calibration-progress", /of 11 presses/);
+    await picture(page, "calibration-phone");
+    expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBe(390);
+    await obey(page, bench, (_, taken) => taken === 10);
+    await page.keyboard.press("r");
+    await says(page, "calibration-progress", /^9 of/);
+    await obey(page, bench, (_, taken) => taken === 10);
+    await page.keyboard.press("q");
+    await says(page, "calibration-step", /^No more presses/);
+    expect(presses(bench)).toBe(10);
+    bench.lift();
+    await page.keyboard.press("f");
+    await says(page, "calibration-step", /^Fitted to 10 presses/);
+    await dotAt(page, bench, 250);
+    await picture(page, "calibration-phone-done");
+    expect(faults).toEqual([]);
+    await page.context().close();
+    await again.stop();
+    bench.stop();
+  });
+});

@@ -1,0 +1,207 @@
+// A guided calibration: where to press next, how presses of a place agree, and the steps that a person can take.
+
+import { api } from "../api";
+import { element, need, setText } from "../dom";
+import type { CalibrationOutcome, CalibrationRecord, CalibrationStep, PlaceRecord } from "../protocol";
+import { size } from "../words";
+
+/** Milliseconds between two looks at a calibration that goes on, and at one that waits for a person. */
+const LOOK_MS = 150;
+const IDLE_MS = 1_000;
+
+const BUTTONS: { id: string; step: CalibrationStep }[] = [
+  { id: "calibration-begin", step: "begin" },
+  { id: "calibration-redo", step: "redo" },
+  { id: "calibration-skip", step: "skip" },
+  { id: "calibration-stop", step: "stop" },
+  { id: "calibration-finish", step: "finish" },
+];
+
+/** The panel of a calibration; hidden where the server has none. */
+export class CalibrationPanel {
+  /** Its state, while it is shown. */
+  state: CalibrationRecord | null = null;
+  private looks = false;
+  private closed = false;
+
+  constructor(
+    private changed: () => void,
+    private failed: (error: unknown) => void,
+  ) {
+    for (const { id, step } of BUTTONS) need(id).addEventListener("click", () => this.act(step));
+    need("calibration-close").addEventListener("click", () => this.close());
+  }
+
+  /** Begins to follow the server's calibration. */
+  follow(): void {
+    if (this.looks || this.closed) return;
+    this.looks = true;
+    void this.look();
+  }
+
+  /** True while a person is guided, and there is no estimate to show. */
+  get guides(): boolean {
+    return this.state !== null && !["assessing", "done"].includes(this.state.phase);
+  }
+
+  /** Takes a step by a key, where its button is there. */
+  key(step: CalibrationStep): void {
+    const button = BUTTONS.find((button) => button.step === step);
+    if (button !== undefined && !need<HTMLButtonElement>(button.id).hidden) this.act(step);
+  }
+
+  private act(step: CalibrationStep): void {
+    void api.calibrate(step).then(
+      (state) => this.take(state),
+      (error: unknown) => this.failed(error),
+    );
+  }
+
+  private async look(): Promise<void> {
+    try {
+      this.take(await api.calibration());
+    } catch {
+      // The page says that the server is away; it is asked again.
+    }
+    const phase = this.state?.phase;
+    if (this.closed || phase === "done") {
+      this.looks = false;
+      return;
+    }
+    setTimeout(() => void this.look(), phase === "ready" || phase === undefined ? IDLE_MS : LOOK_MS);
+  }
+
+  private close(): void {
+    this.closed = true;
+    this.state = null;
+    need("calibration").hidden = true;
+    this.changed();
+  }
+
+  private take(state: CalibrationRecord): void {
+    if (this.closed) return;
+    this.state = state;
+    this.write(state);
+    this.changed();
+  }
+
+  private write(state: CalibrationRecord): void {
+    need("calibration").hidden = false;
+    setText(need("calibration-step"), stepWords(state));
+    setText(need("calibration-why"), whyWords(state));
+    const problem = need("calibration-problem");
+    setText(problem, state.problem ?? "");
+    problem.hidden = state.problem === null;
+    const planned = state.taken + state.left;
+    setText(need("calibration-progress"), `${state.taken} of ${planned} presses, in ${state.presses}`);
+    const bar = need<HTMLProgressElement>("calibration-bar");
+    bar.max = Math.max(1, planned);
+    bar.value = state.taken;
+    const pressing = state.phase === "pressing";
+    const waits = state.phase === "ready" || state.phase === "pressed";
+    const shown: Record<CalibrationStep, boolean> = {
+      begin: (state.phase === "ready" && state.left > 0) || state.phase === "pressed",
+      redo: (pressing || state.phase === "pressed") && state.taken > 0,
+      skip: pressing,
+      stop: pressing,
+      finish: waits && state.taken > 0,
+    };
+    for (const { id, step } of BUTTONS) need(id).hidden = !shown[step];
+    need("calibration-begin").firstChild!.textContent = state.taken === 0 ? "Begin " : "Go on ";
+    need("calibration-close").hidden = state.phase !== "done";
+    this.writePlaces(state);
+  }
+
+  private writePlaces(state: CalibrationRecord): void {
+    const rows = state.places.map((place) => {
+      const name = element("th", "", placeWords(place));
+      name.scope = "row";
+      const isNext = state.next !== null && state.next.x_mm === place.x_mm && state.next.y_mm === place.y_mm;
+      const spread = place.spread_percent === null ? "—" : `${size(place.spread_percent)} %`;
+      const cells = [`${place.taken} of ${place.taken + place.left}`, spread, isNext ? "next" : place.left === 0 ? "taken" : ""];
+      return element("tr", isNext ? "next" : "", name, ...cells.map((text) => element("td", "", text)));
+    });
+    const body = need("calibration-places");
+    const html = rows.map((row) => row.outerHTML).join("");
+    if (body.innerHTML !== html) body.replaceChildren(...rows);
+  }
+}
+
+/** What a person does now. */
+export function stepWords(state: CalibrationRecord): string {
+  switch (state.phase) {
+    case "ready":
+      if (state.left === 0) return "All presses are taken";
+      return state.taken === 0 ? "Ready to calibrate" : "Ready to go on";
+    case "pressing":
+      if (state.source === null) return "Waiting for readings";
+      return waitingWords(state);
+    case "pressed":
+      return "No more presses are asked for";
+    case "fitting":
+      return "Fitting the locator…";
+    case "assessing":
+      return "The locator is in use; its error is estimated…";
+    case "done":
+      return state.outcome === null ? "Calibrated" : errorWords(state.outcome);
+  }
+}
+
+function waitingWords(state: CalibrationRecord): string {
+  switch (state.waiting) {
+    case "untouched":
+      return "Leave the surface alone";
+    case "press":
+      return state.next === null ? "Press" : `Press at ${placeWords(state.next)}${forceWords(state.next)}`;
+    case "rest":
+      return "Hold still";
+    case "release":
+      return "Let go";
+    case "nothing":
+      return "All presses are taken";
+  }
+}
+
+function whyWords(state: CalibrationRecord): string {
+  switch (state.phase) {
+    case "ready":
+      return state.taken === 0
+        ? `The places to press are shown on the surface, one after the other: ${state.left} presses. Each is taken by itself once its reading is at rest.`
+        : `${state.taken} presses are on disk; ${state.left} are left. Go on, or fit those that there are.`;
+    case "pressing":
+      if (state.waiting === "rest") return "The reading comes to rest; then it is taken by itself.";
+      if (state.waiting === "untouched") return "The noise and the untouched reading are learnt.";
+      if (state.last_percent === null) return state.waiting === "release" ? "The press is on disk." : "";
+      return `The last press is ${size(state.last_percent)} % off the others of its place.`;
+    case "pressed":
+      return "Take the last press back, go on with those that were left out, or fit the locator.";
+    case "done":
+      return state.outcome === null ? "" : gainWords(state.outcome);
+    default:
+      return "";
+  }
+}
+
+function errorWords(outcome: CalibrationOutcome): string {
+  const fitted = `Fitted to ${outcome.presses} presses`;
+  if (outcome.median_mm === null || outcome.mean_mm === null) return `${fitted}.`;
+  return `${fitted}: error at positions held out ${size(outcome.median_mm)} mm (median), ${size(outcome.mean_mm)} mm (mean)`;
+}
+
+function gainWords(outcome: CalibrationOutcome): string {
+  const gain = outcome.is_enough
+    ? "More presses would lower the error by less than 5 %."
+    : outcome.gain_percent === null
+      ? ""
+      : `Endlessly many more presses would lower the expected error by ${outcome.gain_percent.toFixed(0)} %.`;
+  return [`The locator is in ${outcome.locator}.`, gain, ...outcome.remarks].filter((words) => words !== "").join(" ");
+}
+
+function placeWords(place: PlaceRecord): string {
+  const mm = (value: number) => value.toFixed(1);
+  return place.y_mm === undefined ? `${mm(place.x_mm)} mm` : `${mm(place.x_mm)}, ${mm(place.y_mm)} mm`;
+}
+
+function forceWords(place: PlaceRecord): string {
+  return place.force_n === undefined ? "" : ` with ${Number(place.force_n.toPrecision(3))} N`;
+}
