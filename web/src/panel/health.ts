@@ -48,7 +48,7 @@ export class Health {
     setText(state, channel.range === null ? "no reading yet" : channelWords(channel.state));
     setText(now, value === undefined ? "—" : `${number(value, channel.noise_sd)} ${symbol}`);
     setText(noise, channel.range === null ? "—" : `${size(channel.noise_sd)} ${symbol}`);
-    setText(range, channel.range === null ? "—" : channel.range.map((end) => number(end, channel.noise_sd)).join(" to "));
+    setText(range, channel.range === null ? "—" : channel.range.map((end) => number(end, channel.noise_sd)).join("\nto "));
   }
 
   private sourceWords(live: Live): string {

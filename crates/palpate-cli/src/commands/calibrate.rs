@@ -113,7 +113,7 @@ fn journal(arguments: &Arguments, rig: &Rig, stage: Option<&Stage>) -> Result<Jo
     };
     let depth = if stage.is_some() { DepthKnowledge::Known } else { DepthKnowledge::Unknown };
     Journal::new(&rig.setup, path, pressed_for(&arguments.rig), before, depth)
-        .map_err(|error| about_journal(&arguments.rig, error))
+        .map_err(|error| about_journal(&arguments.rig, &error))
 }
 
 /// Comment of a file of presses.
@@ -127,10 +127,10 @@ pub fn about_plan(rig: &Path, error: PlanError) -> Failure {
 }
 
 /// A complaint about presses that cannot be kept.
-pub fn about_journal(rig: &Path, error: JournalError) -> Failure {
-    let complaint = match &error {
-        JournalError::Nuisance { .. } | JournalError::Numbered => Complaint::about(rig, &error),
-        _ => Complaint::new(&error),
+pub fn about_journal(rig: &Path, error: &JournalError) -> Failure {
+    let complaint = match error {
+        JournalError::Nuisance { .. } | JournalError::Numbered => Complaint::about(rig, error),
+        _ => Complaint::new(error),
     };
     match error.help() {
         Some(help) => complaint.help(help).into(),
@@ -177,7 +177,7 @@ fn press_all(
             (None, Some(key)) => press_key(&key, arguments, &mut calibration, extent)?,
             (None, None) => {}
             (Some(machine), key) => step(machine, key.as_deref(), &notes, &mut calibration)
-                .map_err(|error| machine_ended(arguments, &calibration, error))?,
+                .map_err(|error| machine_ended(arguments, &calibration, &error))?,
         }
     }
     for (cause, count) in calibration.bad_frames() {
@@ -191,7 +191,7 @@ fn press_all(
         )));
     }
     match machine {
-        Some(machine) => machine.finish().map_err(|error| machine_ended(arguments, &calibration, error)),
+        Some(machine) => machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error)),
         None => Ok(()),
     }
 }
@@ -227,7 +227,7 @@ fn step(
     Ok(())
 }
 
-fn machine_ended(arguments: &Arguments, calibration: &Calibration, error: MachineError) -> Failure {
+fn machine_ended(arguments: &Arguments, calibration: &Calibration, error: &MachineError) -> Failure {
     let words = format!("{error}; {}", goes_on(arguments, calibration));
     match error {
         MachineError::ByHand => Failure::Interrupted(words),
@@ -238,7 +238,7 @@ fn machine_ended(arguments: &Arguments, calibration: &Calibration, error: Machin
 
 fn cannot_go_on(arguments: &Arguments, calibration: &Calibration, error: CalibrationError) -> Failure {
     match error {
-        CalibrationError::Journal(error) => about_journal(&arguments.rig, error),
+        CalibrationError::Journal(error) => about_journal(&arguments.rig, &error),
         CalibrationError::LoadCell { .. } => {
             Failure::GoalMissed(format!("{error}; {}", goes_on(arguments, calibration)))
         }
@@ -313,7 +313,7 @@ fn press_key(
 ) -> Result<(), Failure> {
     match key.trim() {
         "r" => {
-            if !calibration.redo().map_err(|error| about_journal(&arguments.rig, error))? {
+            if !calibration.redo().map_err(|error| about_journal(&arguments.rig, &error))? {
                 remark!("nothing was pressed yet");
             }
         }

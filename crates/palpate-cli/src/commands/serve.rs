@@ -165,7 +165,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     plan(&rig, arguments.force, &[], &before).map_err(|error| about_plan(path, error))?;
     let comment = pressed_for(path);
     Journal::new(&rig.setup, presses, comment.clone(), Vec::new(), DepthKnowledge::Unknown)
-        .map_err(|error| about_journal(path, error))?;
+        .map_err(|error| about_journal(path, &error))?;
     Ok(Some(CalibrationPlan {
         rig,
         from: from.clone(),

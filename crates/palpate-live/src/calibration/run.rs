@@ -164,7 +164,7 @@ impl Calibration {
         }
         for frame in frames {
             match frame {
-                Ok(Frame { reading, .. }) => self.add(arrived.at.elapsed, reading, notes)?,
+                Ok(Frame { reading, .. }) => self.add(arrived.at.elapsed, &reading, notes)?,
                 Err(cause) => *self.bad.entry(cause).or_default() += 1,
             }
         }
@@ -174,12 +174,7 @@ impl Calibration {
         Ok(())
     }
 
-    fn add(
-        &mut self,
-        at: Duration,
-        reading: Vec<f64>,
-        notes: &mut Vec<Note>,
-    ) -> Result<(), CalibrationError> {
+    fn add(&mut self, at: Duration, reading: &[f64], notes: &mut Vec<Note>) -> Result<(), CalibrationError> {
         self.readings += 1;
         let channels = reading.len() - usize::from(self.load_cell.is_some());
         self.last = reading[..channels].to_vec();
@@ -198,7 +193,7 @@ impl Calibration {
             return Ok(());
         }
         let press = self.guide.next_press().map(|(_, press)| press);
-        match self.guide.add(at, &reading) {
+        match self.guide.add(at, reading) {
             Progress::None => {}
             Progress::Waits(waiting) => notes.push(Note::Waits(waiting)),
             Progress::Taken(row) => {

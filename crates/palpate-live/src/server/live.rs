@@ -316,7 +316,12 @@ impl Live {
             let status = self.switch().and_then(|switch| switch.status());
             (folder.display().to_string(), status)
         });
-        self.subject().info.clone().with_source(self.source()).with_recording(recording).with_calibration(self.calibrator.as_ref())
+        self.subject()
+            .info
+            .clone()
+            .with_source(self.source())
+            .with_recording(recording)
+            .with_calibration(self.calibrator.as_ref())
     }
 
     fn subject(&self) -> Arc<Subject> {

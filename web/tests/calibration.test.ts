@@ -1,0 +1,48 @@
+import { describe, expect, test, vi } from "vitest";
+import type { CalibrationRecord } from "../src/protocol";
+
+// The panel's module looks at the page's address as it is loaded.
+vi.stubGlobal("location", { search: "", href: "http://127.0.0.1/" });
+const { stepWords } = await import("../src/panel/calibration");
+
+const PRESSING: CalibrationRecord = {
+  phase: "pressing",
+  waiting: "press",
+  next: { x_mm: 40, force_n: 3, taken: 0, left: 2, spread_percent: null },
+  taken: 0,
+  left: 12,
+  places: [],
+  last_percent: null,
+  source: "a board",
+  readings: 100,
+  reading: [],
+  bad_frames: 0,
+  presses: "presses.csv",
+  problem: null,
+  outcome: null,
+};
+
+describe("words of a calibration", () => {
+  test("say where to press, on a line and on a plane, with the force that is known", () => {
+    expect(stepWords(PRESSING)).toBe("Press at 40.0 mm with 3 N");
+    const next = { x_mm: 40, y_mm: 12.25, taken: 0, left: 1, spread_percent: null };
+    expect(stepWords({ ...PRESSING, next })).toBe("Press at 40.0, 12.3 mm");
+  });
+
+  test("do not ask for a press while there are no readings", () => {
+    expect(stepWords({ ...PRESSING, source: null })).toBe("Waiting for readings");
+  });
+
+  test("tell a calibration that is gone on with from one that begins", () => {
+    expect(stepWords({ ...PRESSING, phase: "ready" })).toBe("Ready to calibrate");
+    expect(stepWords({ ...PRESSING, phase: "ready", taken: 3 })).toBe("Ready to go on");
+    expect(stepWords({ ...PRESSING, phase: "ready", taken: 12, left: 0 })).toBe("All presses are taken");
+  });
+
+  test("end with the error at positions held out", () => {
+    const outcome = { locator: "a.json", presses: 12, folds: 5, median_mm: 0.0412, mean_mm: 0.06, gain_percent: 4, is_enough: true, remarks: [] };
+    const words = stepWords({ ...PRESSING, phase: "done", outcome });
+    expect(words).toBe("Fitted to 12 presses: error at positions held out 0.041 mm (median), 0.060 mm (mean)");
+    expect(stepWords({ ...PRESSING, phase: "done", outcome: { ...outcome, median_mm: null } })).toBe("Fitted to 12 presses.");
+  });
+});
