@@ -50,7 +50,7 @@ fn run(case: &Case, length: Duration) -> Result<(), Box<dyn Error>> {
     let rig = Rig::from_toml(RIG)?;
     let recording = rig.simulate(0)?;
     let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording))?;
-    let config = BoardConfig { rate_hz: case.rate_hz, seed: 1, load_cell: None };
+    let config = BoardConfig { rate_hz: case.rate_hz, seed: 1, ..BoardConfig::default() };
     let live = Arc::new(Live::new(locator, "load", Some((rig, config)), PathBuf::new()));
     let address: SocketAddr = "127.0.0.1:0".parse()?;
     let server = Server::start(address, Access::new(address, None, Vec::new())?, Arc::clone(&live))?;

@@ -41,7 +41,7 @@ fn switch(locator: &Locator) -> (RecordingSwitch, Receiver<Input>) {
 
 /// Takes so many readings of a simulated board through a session and into a sink, and returns the samples.
 fn session(rig: &Rig, locator: &Locator, frames: u64, sink: &mut impl Sink) -> Vec<Sample> {
-    let config = BoardConfig { rate_hz: 200.0, seed: 3, load_cell: None };
+    let config = BoardConfig { rate_hz: 200.0, seed: 3, ..BoardConfig::default() };
     let mut board = SimulatedBoard::new(&rig.setup, &config, Finger::random(rig, 3)).unwrap();
     let mut session = Session::new(locator, &SessionConfig::default());
     let mut samples = Vec::new();

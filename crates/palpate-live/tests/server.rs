@@ -21,7 +21,7 @@ fn served(token: Option<&str>) -> (Arc<Live>, Server) {
     let rig = Rig::from_toml(RIG).unwrap();
     let recording = rig.simulate(0).unwrap();
     let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
-    let config = BoardConfig { rate_hz: 1000.0, seed: 1, load_cell: None };
+    let config = BoardConfig { rate_hz: 1000.0, seed: 1, ..BoardConfig::default() };
     let live = Arc::new(Live::new(locator, "noisy-beam.toml", Some((rig, config)), PathBuf::new()));
     let address: SocketAddr = "127.0.0.1:0".parse().unwrap();
     let access = Access::new(address, token.map(str::to_owned), Vec::new()).unwrap();

@@ -5,7 +5,7 @@ use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::event::Event;
 use palpate_live::input::{Arrival, Arrived};
 use palpate_live::session::{Output, Session, SessionConfig};
-use palpate_live::simulated_board::{BoardConfig, Finger, SimulatedBoard};
+use palpate_live::simulated_board::{BoardConfig, Finger, FrameForm, SimulatedBoard};
 use palpate_live::stamp::Stamp;
 use palpate_rig::Rig;
 use std::time::Duration;
@@ -23,7 +23,7 @@ fn a_finger_is_followed_from_touch_down_to_lift_off() {
     let locator = locator(&rig);
     let mut board = SimulatedBoard::new(
         &rig.setup,
-        &BoardConfig { rate_hz: 200.0, seed: 3, load_cell: None },
+        &BoardConfig { rate_hz: 200.0, seed: 3, ..BoardConfig::default() },
         Finger::random(&rig, 3),
     )
     .unwrap();
@@ -66,4 +66,33 @@ fn a_finger_is_followed_from_touch_down_to_lift_off() {
     }
     assert!((session.rate_hz() - 200.0).abs() < 2.0, "{}", session.rate_hz());
     assert_eq!(board.next_at(), Duration::from_secs(40));
+}
+
+/// A board whose clock is fast, and frames that arrive up to 5 ms late: times are the host's.
+#[test]
+fn binary_frames_keep_the_hosts_time_whatever_the_boards_clock_does() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let locator = locator(&rig);
+    let frames = FrameForm::Binary { clock_ppm: 300.0 };
+    let config = BoardConfig { rate_hz: 100.0, seed: 3, frames, ..BoardConfig::default() };
+    let mut board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, 3)).unwrap();
+    let mut session = Session::new(&locator, &SessionConfig::default());
+    let mut out = Vec::new();
+    let start_ns = 1_800_000_000_000_000_000;
+    for frame in 0..6000_u64 {
+        let taken = board.next_at();
+        let bytes = board.send_until(taken);
+        let elapsed = taken + Duration::from_micros(frame * 7919 % 5000);
+        let at = Stamp { elapsed, unix_ns: start_ns + elapsed.as_nanos() as u64 };
+        session.receive(&Arrived { at, arrival: Arrival::Bytes(bytes) }, &mut out);
+        for output in out.drain(..) {
+            let Output::Sample(sample) = output else { continue };
+            let off_s = (sample.unix_ns as f64 - (start_ns + taken.as_nanos() as u64) as f64) * 1e-9;
+            // Without the drift it would be off by 18 ms after a minute. The first seconds learn it.
+            assert!(frame < 1000 || off_s.abs() < 1e-3, "frame {frame}: {off_s} s");
+        }
+    }
+    // A stream is known to be binary once a frame has ended.
+    assert!(session.counters().readings >= 5998, "{:?}", session.counters());
+    assert_eq!(session.counters().lost_frames, 0);
 }

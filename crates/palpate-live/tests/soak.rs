@@ -37,7 +37,7 @@ fn every_line_is_accounted_for_and_memory_stays_flat() {
     };
     let mut board = SimulatedBoard::new(
         &rig.setup,
-        &BoardConfig { rate_hz: RATE_HZ, seed: 1, load_cell: None },
+        &BoardConfig { rate_hz: RATE_HZ, seed: 1, ..BoardConfig::default() },
         Finger::random(&rig, 1),
     )
     .unwrap()

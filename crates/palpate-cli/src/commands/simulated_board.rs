@@ -5,7 +5,7 @@ use crate::input;
 use crate::progress::interrupted;
 use crate::remark::remark;
 use palpate_live::simulated_board::{
-    BoardConfig, FaultConfig, Finger, Link, LinkUrl, LoadCell, SimulatedBoard,
+    BoardConfig, FaultConfig, Finger, FrameForm, Link, LinkUrl, LoadCell, SimulatedBoard,
 };
 use palpate_live::stage::{Firmware, SimulatedMachine};
 use palpate_mechanics::units::{Dimension, Quantity, format_count};
@@ -63,9 +63,22 @@ pub struct Arguments {
     /// Send the load cell of the rig's [stage] too, with noise of this standard deviation, as in `--load-cell "5 mN"`
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     load_cell: Option<f64>,
+    /// Form of the frames: lines of text, or binary with number, board's time and checksum
+    #[arg(long, value_name = "FORM", default_value = "text")]
+    frames: FrameName,
+    /// Millionths of the time by which the board's clock is fast, or slow where negative; text frames tell no time
+    #[arg(long, value_name = "NUMBER", default_value_t = 0.0, allow_negative_numbers = true, value_parser = ppm)]
+    clock_ppm: f64,
     /// End after so long
     #[arg(long, value_name = "TIME", value_parser = time)]
     for_time: Option<f64>,
+}
+
+/// Name of a form of frames.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum FrameName {
+    Text,
+    Binary,
 }
 
 /// Name of a firmware.
@@ -79,6 +92,13 @@ fn share(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
         _ => Err(format!("`{text}` must be a number from 0 to 1")),
+    }
+}
+
+fn ppm(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(ppm) if (-1e5..=1e5).contains(&ppm) => Ok(ppm),
+        _ => Err(format!("`{text}` must be a number from -100000 to 100000")),
     }
 }
 
@@ -103,7 +123,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             finger.with_script(&input::read_text(path)?).map_err(|error| Complaint::about(path, error))?;
     }
     let load_cell = load_cell(arguments, &rig)?;
-    let config = BoardConfig { rate_hz: arguments.rate, seed: arguments.seed, load_cell };
+    let frames = match arguments.frames {
+        FrameName::Binary => FrameForm::Binary { clock_ppm: arguments.clock_ppm },
+        FrameName::Text if arguments.clock_ppm == 0.0 => FrameForm::Text,
+        FrameName::Text => {
+            let complaint = Complaint::new("--clock-ppm does not go with frames of text, which tell no time");
+            return Err(complaint.help("add --frames binary").into());
+        }
+    };
+    let config = BoardConfig { rate_hz: arguments.rate, seed: arguments.seed, load_cell, frames };
     let faults = FaultConfig {
         dropped: arguments.drop,
         torn: arguments.torn,

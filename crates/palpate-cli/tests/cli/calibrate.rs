@@ -103,6 +103,30 @@ fn too_much_force_and_enter_stop_the_machine_and_the_presses_are_kept() {
     assert!(!folder.path().join("locator.json").exists());
 }
 
+/// A channel at the end of its range would be read wrong, and may be about to break.
+#[test]
+fn a_saturated_channel_stops_the_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    let range = "noise = \"2 mN\"\nrange = [\"-1 N\", \"0.3 N\"]";
+    std::fs::write(folder.path().join("rig.toml"), RIG.replace("noise = \"2 mN\"", range)).unwrap();
+    let bench = Bench::start(folder.path(), "marlin");
+    let words = complained(&bench.calibrate(folder.path(), &[]).output().unwrap(), 1);
+    assert!(words.contains("channel `reaction_1` reads the end of its range"), "{words}");
+    assert!(words.contains("0 presses are in presses.csv"), "{words}");
+}
+
+/// A touch height that is wrong: the finger never reaches the surface.
+#[test]
+fn presses_that_no_reading_shows_end_the_calibration() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
+    let bench = Bench::start(folder.path(), "marlin");
+    std::fs::write(folder.path().join("rig.toml"), RIG.replace("\"22 mm\"", "\"32 mm\"")).unwrap();
+    let words = complained(&bench.calibrate(folder.path(), &[]).output().unwrap(), 1);
+    assert!(words.contains("left out: a press that no reading showed"), "{words}");
+    assert!(words.contains("`touch` or `depths` of [stage] are wrong"), "{words}");
+}
+
 #[test]
 fn a_machine_that_is_not_there_and_a_rig_without_a_stage_are_told_with_a_remedy() {
     let folder = tempfile::tempdir().unwrap();

@@ -50,3 +50,53 @@ fn is_at(row: &Row, position: palpate_mechanics::contact::Position) -> bool {
     const ROUNDING_M: f64 = 1e-9;
     row.position.distance_m(position) < ROUNDING_M
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_mechanics::contact::Position;
+
+    fn rig() -> Rig {
+        Rig::from_toml(include_str!("../../../../examples/fsi-like.toml")).unwrap()
+    }
+
+    fn pressed(press: &Press) -> Row {
+        Row {
+            position: press.position,
+            force_n: Some(1.0),
+            nuisances: Vec::new(),
+            time_s: None,
+            reading: vec![0.5, 0.5],
+        }
+    }
+
+    #[test]
+    fn every_position_is_pressed_to_every_depth_as_often_as_the_rig_says() {
+        let presses = plan(&rig(), None, &[1e-3, 2e-3], &[]).unwrap();
+        assert_eq!(presses.len(), 9 * 2 * 3);
+        let depths: Vec<Option<f64>> = presses[..6].iter().map(|press| press.depth_m).collect();
+        assert_eq!(depths, [[Some(1e-3); 3], [Some(2e-3); 3]].concat());
+        assert!(presses[..6].iter().all(|press| press.position == presses[0].position));
+        assert!(presses.iter().all(|press| press.force_n.is_none()), "forces of several depths differ");
+    }
+
+    #[test]
+    fn by_hand_or_to_one_depth_the_force_is_that_of_the_rig() {
+        for depths_m in [&[][..], &[2e-3]] {
+            let presses = plan(&rig(), None, depths_m, &[]).unwrap();
+            assert!(presses.iter().all(|press| press.force_n == Some(1.0)));
+            assert_eq!(presses[0].depth_m, depths_m.first().copied());
+        }
+        assert_eq!(plan(&rig(), Some(2.0), &[], &[]).unwrap()[0].force_n, Some(2.0));
+    }
+
+    #[test]
+    fn presses_of_before_are_not_asked_for_again() {
+        let all = plan(&rig(), None, &[1e-3, 2e-3], &[]).unwrap();
+        let mut before: Vec<Row> = all[..7].iter().map(pressed).collect();
+        // The file has rounded a position, and untouched rows are no presses.
+        before[2].position.x_m += 1e-13;
+        before.push(Row { force_n: Some(0.0), position: Position::default(), ..before[0].clone() });
+        assert_eq!(plan(&rig(), None, &[1e-3, 2e-3], &before).unwrap(), all[7..]);
+    }
+}

@@ -88,3 +88,39 @@ fn mean(rows: &[&Row], channels: usize) -> Vec<f64> {
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(x_m: f64, force_n: f64, reading: [f64; 2]) -> Row {
+        Row {
+            position: Position::along(x_m),
+            force_n: Some(force_n),
+            nuisances: Vec::new(),
+            time_s: None,
+            reading: reading.to_vec(),
+        }
+    }
+
+    #[test]
+    fn repeats_are_measured_against_the_size_of_their_press() {
+        let press = Press { position: Position::along(0.3), force_n: None, depth_m: None };
+        // Untouched at (1, 1); a press of (3, 4) less that is of size 5.
+        let rows = [row(0.0, 0.0, [1.0, 1.0]), row(0.1, 2.0, [4.0, 5.0]), row(0.1, 2.0, [4.0, 5.1])];
+        assert!((last_deviation_percent(&rows).unwrap() - 2.0).abs() < 1e-9);
+        let places = places(&rows, &[press]);
+        assert_eq!((places[0].taken, places[0].left, places[1].taken, places[1].left), (2, 0, 0, 1));
+        // Two readings 0.1 apart have a standard deviation of 0.1 / √2.
+        let spread = places[0].spread_percent.unwrap();
+        assert!((spread - 100.0 * 0.1 / 2f64.sqrt() / 5.04).abs() < 0.01, "{spread}");
+        assert_eq!(places[1].spread_percent, None);
+    }
+
+    #[test]
+    fn presses_of_different_forces_are_no_repeats() {
+        let rows = [row(0.0, 0.0, [0.0, 0.0]), row(0.1, 1.0, [1.0, 1.0]), row(0.1, 2.0, [2.0, 2.0])];
+        assert_eq!(last_deviation_percent(&rows), None);
+        assert_eq!(places(&rows, &[])[0].spread_percent, None);
+    }
+}

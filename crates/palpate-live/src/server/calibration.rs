@@ -193,11 +193,16 @@ impl Calibrator {
         &self.plan
     }
 
-    /// Begins, or goes on after it was ended early.
+    /// Begins, or goes on after it was ended early. `free_source` ends the session that has the source.
     ///
     /// # Errors
     /// [`CalibratorError`] where it goes on already, the source cannot be opened, or the presses cannot be kept.
-    pub fn begin(&self, folder: &Path, clock: HostClock) -> Result<(), CalibratorError> {
+    pub fn begin(
+        &self,
+        folder: &Path,
+        clock: HostClock,
+        free_source: impl FnOnce(),
+    ) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         match state.phase() {
             Phase::Ready | Phase::Pressed | Phase::Done => {}
@@ -212,6 +217,8 @@ impl Calibrator {
         let shared = Shared { calibration, source: None, last_percent: None, problem: None };
         let shared = Arc::new(Mutex::new(shared));
         let (inputs, received) = sync_channel(WAITING);
+        // Many sources have room for one.
+        free_source();
         let source = Source::open(from, folder, clock, inputs.clone())?;
         let heard = Arc::clone(&shared);
         let thread = std::thread::Builder::new()

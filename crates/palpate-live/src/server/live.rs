@@ -266,7 +266,7 @@ impl Live {
     /// # Errors
     /// [`LiveError`] where the source cannot be opened, or the presses cannot be kept.
     pub(super) fn begin_calibration(&self) -> Result<(), LiveError> {
-        Ok(self.calibrator()?.begin(&self.folder, self.clock)?)
+        Ok(self.calibrator()?.begin(&self.folder, self.clock, || self.end_session())?)
     }
 
     /// Fits the presses in a thread of its own; a session with the locator begins as soon as there is one.
@@ -295,6 +295,10 @@ impl Live {
         if let Some(calibrator) = &self.calibrator {
             calibrator.end();
         }
+        self.end_session();
+    }
+
+    fn end_session(&self) {
         if let Some(running) = self.lock().take() {
             running.end();
         }

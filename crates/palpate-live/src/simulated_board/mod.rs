@@ -8,7 +8,7 @@ pub use faults::FaultConfig;
 pub use finger::{Finger, ScriptError};
 pub use link::{Link, LinkError, LinkUrl, LinkUrlError};
 
-use crate::frame::Channel;
+use crate::frame::{self, Channel};
 use faults::{Ageing, Fate, Faults};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::{SimulateError, SimulatedBench};
@@ -26,6 +26,21 @@ pub struct BoardConfig {
     pub seed: u64,
     /// A load cell under the finger, the last value of every frame.
     pub load_cell: Option<LoadCell>,
+    /// Form of its frames.
+    pub frames: FrameForm,
+}
+
+/// Form of a simulated board's frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum FrameForm {
+    /// Lines of text.
+    #[default]
+    Text,
+    /// Binary frames, with the number of the frame and the time by the board's clock.
+    Binary {
+        /// Millionths of the time by which its clock is fast.
+        clock_ppm: f64,
+    },
 }
 
 /// Load cell of a simulated machine.
@@ -39,7 +54,7 @@ pub struct LoadCell {
 
 impl Default for BoardConfig {
     fn default() -> Self {
-        Self { rate_hz: 100.0, seed: 0, load_cell: None }
+        Self { rate_hz: 100.0, seed: 0, load_cell: None, frames: FrameForm::Text }
     }
 }
 
@@ -52,6 +67,7 @@ pub struct SimulatedBoard<'a> {
     ageing: Ageing,
     rate_hz: f64,
     load_cell: Option<(LoadCell, Xoshiro256PlusPlus)>,
+    frames: FrameForm,
     /// Frames that were taken.
     count: u64,
     sent: Sent,
@@ -84,6 +100,7 @@ impl<'a> SimulatedBoard<'a> {
             finger,
             faults,
             rate_hz: config.rate_hz,
+            frames: config.frames,
             // A stream of its own, beside those of noise and finger.
             load_cell: config
                 .load_cell
@@ -132,7 +149,7 @@ impl<'a> SimulatedBoard<'a> {
         self.ageing.act(&mut clean, &self.faults.config, 1.0 / self.rate_hz);
         let reading = self.bench.measure(&clean);
         let force_n = contact.map_or(0.0, |contact| contact.force_n);
-        let mut frame = self.line(&reading, force_n).into_bytes();
+        let mut frame = self.frame(&reading, force_n, time_s);
         self.count += 1;
         match self.faults.next(frame.len()) {
             Fate::Whole => self.sent.whole += 1,
@@ -148,19 +165,34 @@ impl<'a> SimulatedBoard<'a> {
         Some(frame)
     }
 
-    /// A reading as a line of numbers in the units of the channels, to seven digits; with names where there is a load cell, so that those who
-    /// want the channels only find them.
-    fn line(&mut self, reading: &[f64], force_n: f64) -> String {
-        let values = reading.iter().zip(&self.channels).map(|(value, channel)| value / channel.unit.factor());
-        let Some((cell, rng)) = &mut self.load_cell else {
-            let cells: Vec<String> = values.map(|value| (value as f32).to_string()).collect();
-            return cells.join(",") + "\n";
-        };
-        let noise: f64 = StandardNormal.sample(rng);
-        let force_n = force_n + cell.noise_n * noise;
+    /// The bytes of a reading in the units of the channels, to seven digits; the load cell is the last value, where there is one. Text has names
+    /// then, so that those who want the channels only find them.
+    fn frame(&mut self, reading: &[f64], force_n: f64, time_s: f64) -> Vec<u8> {
+        let mut values: Vec<f32> = reading
+            .iter()
+            .zip(&self.channels)
+            .map(|(value, channel)| (value / channel.unit.factor()) as f32)
+            .collect();
+        if let Some((cell, rng)) = &mut self.load_cell {
+            let noise: f64 = StandardNormal.sample(rng);
+            values.push((force_n + cell.noise_n * noise) as f32);
+        }
+        if let FrameForm::Binary { clock_ppm } = self.frames {
+            let mut bytes = Vec::new();
+            // Both wrap around, as those of a microcontroller do.
+            let time_us = (time_s * (1e6 + clock_ppm)) as u64 as u32;
+            frame::encode_into(&mut bytes, self.count as u32, time_us, &values);
+            return bytes;
+        }
         let labels = self.channels.iter().map(|channel| channel.label.as_str());
-        let named = labels.zip(values).chain([(cell.name.as_str(), force_n)]);
-        let cells: Vec<String> = named.map(|(label, value)| format!("{label}:{}", value as f32)).collect();
-        cells.join(",") + "\n"
+        let cells: Vec<String> = match &self.load_cell {
+            None => values.iter().map(f32::to_string).collect(),
+            Some((cell, _)) => labels
+                .chain([cell.name.as_str()])
+                .zip(&values)
+                .map(|(label, value)| format!("{label}:{value}"))
+                .collect(),
+        };
+        (cells.join(",") + "\n").into_bytes()
     }
 }

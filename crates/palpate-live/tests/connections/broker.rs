@@ -178,7 +178,7 @@ fn estimates_events_status_and_rules_reach_a_broker_that_begins_anew() {
     let url = format!("mqtt://127.0.0.1:{port}/bench/left").parse().unwrap();
     let rules = Some(Rules::from_toml(rules).unwrap());
     let sink = MqttSink::new(&url, session.channels(), session.extent(), rules, reports).unwrap();
-    let config = BoardConfig { rate_hz: 200.0, seed: 3 };
+    let config = BoardConfig { rate_hz: 200.0, seed: 3, ..BoardConfig::default() };
     let board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, 3)).unwrap();
     let mut bridge = Bridge { board, session, clock: HostClock::new(), sink };
 
