@@ -4,6 +4,7 @@ use crate::failure::{Complaint, Failure};
 use crate::remark::remark;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
+use palpate_estimators::description;
 use palpate_estimators::recording::{Decimal, Separator};
 use palpate_rig::{FirstRig, FirstRigError, Hints, Rig};
 use std::path::PathBuf;
@@ -67,6 +68,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = recording.map_err(|error| input::csv_complaint(&error))?;
     input::say_dialects(&recording);
     first.warnings().iter().for_each(|warning| remark!("warning: {name}: {warning}"));
+    if recording.hardly_tells_noise() {
+        let presses = recording.rows.iter().filter(|row| row.touches()).count();
+        remark!("warning: {name}: {}", description::noise_is_hardly_told(presses));
+    }
     let Some(out) = out else {
         return output::print(&mut std::io::stdout().lock(), text.as_bytes());
     };

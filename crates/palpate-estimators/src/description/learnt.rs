@@ -79,6 +79,15 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
             place(noisy)
         ));
     }
+    if linear.noise_is_hardly_told() {
+        lines.push(noise_is_hardly_told(linear.presses()));
+    }
+    if !linear.tells_untouched() {
+        lines.push(
+            "the offsets are open by what touches read: no reading is `no_contact`, before some rows are recorded untouched (force 0)"
+                .to_owned(),
+        );
+    }
     if !linear.set_aside().is_empty() {
         lines.push(format!(
             "set aside, as no function of the position explains them: {}",
@@ -86,6 +95,14 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
         ));
     }
     lines
+}
+
+/// The warning of a recording of so many presses that are hardly repeated.
+pub fn noise_is_hardly_told(presses: usize) -> String {
+    let presses = format_count(presses as u64);
+    format!(
+        "{presses} presses, hardly any repeated: the noise is hardly told, and taken to be about a hundredth of what presses change; press one place three times, or leave rows untouched (force 0)"
+    )
 }
 
 /// Rows of a recording, counted from 1.

@@ -3,7 +3,7 @@
 mod learnt;
 mod locator;
 
-pub use learnt::{learnt, learnt_summary};
+pub use learnt::{learnt, learnt_summary, noise_is_hardly_told};
 pub use locator::locator;
 
 use crate::arrangement::{Arrangement, Training};

@@ -30,6 +30,7 @@ pub use warnings::Warning;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::influence::force_linear;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_numerics::{mean, random_order};
@@ -158,6 +159,12 @@ impl Recording {
         positions.sort_by(Position::cmp_by_x_then_y);
         positions.dedup_by(|a, b| a.cmp_by_x_then_y(b).is_eq());
         positions
+    }
+
+    /// Whether forces were recorded, but so few rows repeat a place or are untouched that they hardly tell the noise of influence functions.
+    pub fn hardly_tells_noise(&self) -> bool {
+        let spare = self.rows.len().saturating_sub(self.distinct_positions().len() + 1);
+        self.rows.iter().all(|row| row.force_n.is_some()) && spare as f64 <= force_linear::LEAST_FREEDOM
     }
 
     /// Checks that there are at least `needed` distinct positions.

@@ -12,7 +12,7 @@ use super::presses::{Presses, Repeated};
 use super::prior::Prior;
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
-use palpate_numerics::{Cholesky, NotPositiveDefinite};
+use palpate_numerics::{Cholesky, NotPositiveDefinite, mean_and_variance};
 
 /// Powers of ten of ρ.
 type Decades = std::ops::RangeInclusive<i32>;
@@ -97,7 +97,7 @@ pub(super) struct ChannelFit {
     pub ratio: f64,
     /// s².
     pub signal: f64,
-    /// ln of the probability density of the channel's presses, less a constant.
+    /// ln of the probability density of the channel's presses and its noise, less a constant.
     pub evidence: f64,
     pub sources: Vec<SourceFit>,
 }
@@ -120,6 +120,42 @@ pub(super) struct Evidence<'a> {
     /// Readings of the presses by a source of unit amplitude at each place.
     sources: Array2<f64>,
     repeats: RepeatedNoise,
+    expected: Vec<ExpectedNoise>,
+}
+
+/// What is expected of a channel's noise before anything is known of its scatter.
+///
+/// As many presses as coefficients are explained without any noise: what they leave open is filled with what boards are like. Their
+/// noise is about a hundredth of what presses change, give or take a factor of three, with heavy tails (Student's t of one degree of
+/// freedom), as there are boards far better and far worse; and it is no less than rounding.
+struct ExpectedNoise {
+    /// Mean square of the changes.
+    changes: f64,
+    rounding: f64,
+    /// Of [`Presses::fewness`].
+    weight: f64,
+}
+
+impl ExpectedNoise {
+    fn of_channels(presses: &Presses) -> Vec<Self> {
+        let channel = |c: usize| {
+            let (_, changes) = mean_and_variance(presses.means.column(c).iter().copied());
+            Self { changes, rounding: presses.rounding[c], weight: presses.fewness() }
+        };
+        (0..presses.centre.len()).map(channel).collect()
+    }
+
+    /// ln of the probability density of ln σ², less a constant.
+    fn log_density(&self, variance: f64) -> f64 {
+        /// Variance over that of the changes, and the scale of its power of ten.
+        const SHARE: f64 = 1e-4;
+        const DECADES: f64 = 1.0;
+        if self.weight == 0.0 || self.changes <= 0.0 || variance <= 0.0 {
+            return 0.0;
+        }
+        let off = (variance / (SHARE * self.changes)).log10() / DECADES;
+        -self.weight * ((off * off).ln_1p() + 0.5 * self.rounding / variance)
+    }
 }
 
 /// Covariance of noise and drift of the presses over that of an untouched row.
@@ -191,6 +227,7 @@ impl<'a> Evidence<'a> {
             effects: prior.effects(presses),
             sources: prior.sources(presses, sensors_m),
             repeats: RepeatedNoise::new(presses, prior),
+            expected: ExpectedNoise::of_channels(presses),
         }
     }
 
@@ -249,7 +286,12 @@ impl<'a> Evidence<'a> {
         let sources = WhiteSources::new(restricted.residuals(self.sources.clone()).0);
         let products = sources.products(&white.view());
         let fits = (0..self.presses.centre.len())
-            .map(|c| self.channel(&restricted, ratio, c, &white.column(c), (&sources, &products.column(c))))
+            .map(|c| {
+                let fit =
+                    self.channel(&restricted, ratio, c, &white.column(c), (&sources, &products.column(c)));
+                let expected = self.expected[c].log_density(fit.noise_variance());
+                ChannelFit { evidence: fit.evidence + expected, ..fit }
+            })
             .collect::<Vec<_>>();
         fits.iter().all(|fit| fit.evidence.is_finite()).then_some(fits)
     }

@@ -168,7 +168,8 @@ impl Learnt {
         let mut functions =
             all_functions(&self.prior, &self.presses, &self.fits, &self.sensors_m, places_m, watch)?;
         let per_newton = 1.0 / self.prior.force_scale_n;
-        let widening = self.widening * dependence(&self.prior, &self.presses);
+        let widening = self.widening.max(few_positions(&self.prior, &self.presses))
+            * dependence(&self.prior, &self.presses);
         if let Some(drift) = &self.drift {
             for (functions, variance) in functions.iter_mut().zip(drift.variances_at_the_end()?) {
                 functions.offset_variance += variance;
@@ -222,6 +223,18 @@ impl Learnt {
         let few: Vec<Vec<f64>> = self.sensors_m.iter().step_by(ONE_OF).cloned().collect();
         PlaceNoiseSearch { presses: &searched, prior: &self.prior, sensors_m: &few, watch }.found()
     }
+}
+
+/// Factor of the variance of a process whose size few positions told: that of Student's t over the normal density's.
+fn few_positions(prior: &Prior, presses: &Presses) -> f64 {
+    /// Fewer degrees of freedom have no variance at all.
+    const LEAST: usize = 3;
+    /// Of the length scale, which the same positions told.
+    const LENGTH: usize = 1;
+    let of_presses = presses.len().saturating_sub(1 + prior.polynomials() + LENGTH);
+    let of_positions = presses.positions_m().len().saturating_sub(prior.polynomials() + LENGTH);
+    let freedom = of_presses.min(of_positions).max(LEAST) as f64;
+    1.0 + presses.fewness() * (freedom / (freedom - 2.0) - 1.0)
 }
 
 /// Factor by which the channels' errors are less independent than their number.
@@ -483,7 +496,7 @@ impl Search<'_> {
     }
 
     /// The most probable prior of point sensors: which kind of source, then what share is smooth and over what length; `None` where the
-    /// presses are too few for its polynomials.
+    /// presses are less than twice its coefficients, polynomials and offset.
     fn sources(&mut self, smooth: &Prior) -> Result<Option<Found>, Cancelled> {
         /// η² and ℓ, in lengths of the surface; on a plane a smooth part is always needed.
         const SHARES: [f64; 4] = [0.0, 1e-4, 1e-2, 1.0];
@@ -491,6 +504,11 @@ impl Search<'_> {
         /// The drift is told as well by one of so many places of sensors.
         const ONE_OF: usize = 5;
         let sensors_m = everywhere(self.extent);
+        // Each press, or nearly, would be a coefficient, and what is left tells no variance.
+        let effects = 1 + Prior { source: Some(Source::Strain), ..smooth.clone() }.polynomials();
+        if self.presses.len() < 2 * effects {
+            return Ok(None);
+        }
         let (dimensions, length_m) = (self.extent.dimensions(), self.extent.length_m());
         let plane = dimensions == 2;
         let of_length = |source: Source, share: f64, length: f64| Prior {

@@ -8,10 +8,12 @@
 //!
 //! where the noise differs by place its multiplier m(a) in the place of the 1, S taken at the force of the least misfit. Where the response
 //! to the force is not linear, F stands for φ(F), and the estimate is turned back. The determinant belongs there: between presses, where v
-//! is large, everything would explain a reading otherwise.
+//! is large, everything would explain a reading otherwise. From few presses ln p is divided by a number of channels whose errors count as
+//! those of one.
 
 use super::drift::DriftCourse;
 use super::posterior::Functions;
+use super::presses::LEAST_FREEDOM;
 use super::prior::{Prior, Source};
 use super::scan::Scan;
 use crate::fit::{Locate, LocatorFault, NoCheck};
@@ -115,6 +117,17 @@ pub(super) struct Stored {
     /// Share of untouched readings that may be taken for a contact.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
+    /// Channels whose errors count as those of one: the logarithm of the likelihood is divided by it.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub channels_as_one: f64,
+}
+
+const fn one() -> f64 {
+    1.0
+}
+
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
 }
 
 /// Offsets and influence functions of a surface without a model, ready to be inverted.
@@ -136,6 +149,8 @@ pub struct ForceLinearLocator {
     noise_bound: f64,
     /// The most that a contact takes off the square of noise alone.
     detection_bound: f64,
+    /// Whether open offsets do not hide contacts.
+    tells_untouched: bool,
 }
 
 /// Scatter of presses that grows in proportion to the response to their force, beside the noise.
@@ -171,6 +186,7 @@ impl Stored {
             lengths: Vec::new(),
             noise_bound: 0.0,
             detection_bound: 0.0,
+            tells_untouched: true,
             stored: self,
         };
         locator.find_lengths();
@@ -215,6 +231,7 @@ impl Stored {
             numbers(what, list, |v| v >= 0.0, "finite and at least 0")?;
         }
         self.prior.check()?;
+        numbers("channels as one", &[self.channels_as_one], |count| count >= 1.0, "at least 1")?;
         let force = [self.hardest_n, self.force_sd_n, self.known_force_n.unwrap_or(1.0)];
         numbers("force", &force, |force| force > 0.0, "greater than 0")?;
         numbers(
@@ -344,6 +361,11 @@ impl ForceLinearLocator {
         self.stored.presses
     }
 
+    /// Whether so few rows repeat a place or are untouched that the noise is hardly more than what is expected of boards.
+    pub fn noise_is_hardly_told(&self) -> bool {
+        self.stored.noise_freedom <= LEAST_FREEDOM
+    }
+
     /// Number of each channel in use, from 0, with its offset and noise, in its unit.
     pub fn channels(&self) -> impl Iterator<Item = (usize, f64, f64)> {
         let Tables { offsets, noise_sd, .. } = &self.stored.functions;
@@ -445,7 +467,9 @@ impl ForceLinearLocator {
             let hardest_n = self.known_response_n().unwrap_or(self.stored.hardest_n);
             let hardest = noise + (open + hardest_n * (2.0 * beta + hardest_n * v)).max(0.0);
             let told = if v > 0.0 { beta * beta / v } else { 0.0 };
-            (values[c], [noise + (open - told).max(0.0), hardest.max(noise + open)])
+            let as_one = self.stored.channels_as_one;
+            let least = (noise + (open - told).max(0.0)).powf(as_one.recip());
+            (values[c], [least, as_one * hardest.max(noise + open)])
         })
     }
 
@@ -468,7 +492,7 @@ impl ForceLinearLocator {
     fn is_no_contact(&self, relative: &[f64]) -> bool {
         let open = &self.stored.functions.offset_variances;
         let square: f64 = relative.iter().zip(open).map(|(d, open)| d * d / (1.0 + open)).sum();
-        if square > self.noise_bound {
+        if square > self.noise_bound || !self.tells_untouched {
             return false;
         }
         let taken = |place: usize| {
@@ -482,6 +506,29 @@ impl ForceLinearLocator {
         (0..self.places()).all(|place| taken(place) <= self.detection_bound)
     }
 
+    /// Whether an untouched board is told from contacts half as hard as the presses. Without rows of force 0 few presses may leave the
+    /// offsets so open that the readings of such contacts are within the bounds of noise: then no reading is `no_contact`.
+    pub fn tells_untouched(&self) -> bool {
+        self.tells_untouched
+    }
+
+    /// Whether open offsets are not what hides such contacts: at three of four places they are told from noise, or would not be with
+    /// offsets that are known either.
+    fn offsets_are_told(&self) -> bool {
+        const SHARE: f64 = 0.5;
+        const HIDDEN: usize = 4;
+        let force_n = SHARE * self.known_response_n().unwrap_or(self.stored.mean_force_n);
+        let is_told = |open: &dyn Fn(usize) -> f64| {
+            let square = |place: usize| -> f64 {
+                let values = self.place(place).values.iter().enumerate();
+                force_n * force_n * values.map(|(c, f)| f * f / (1.0 + open(c))).sum::<f64>()
+            };
+            let hidden = (0..self.places()).filter(|place| square(*place) <= self.detection_bound).count();
+            HIDDEN * hidden <= self.places()
+        };
+        is_told(&|c| self.stored.functions.offset_variances[c]) || !is_told(&|_| 0.0)
+    }
+
     /// Bounds of noise: of a reading's square, and of what the best contact takes off it.
     fn bound_noise(&mut self) {
         let freedom = self.stored.noise_freedom;
@@ -492,6 +539,7 @@ impl ForceLinearLocator {
         let bounds = NoiseBounds::new(live, self.directions(), self.stored.false_alarm_rate);
         self.noise_bound = learnt(bounds.square, freedom * live as f64);
         self.detection_bound = learnt(bounds.taken, freedom);
+        self.tells_untouched = self.offsets_are_told();
     }
 
     /// Extent of the directions that readings of contacts have.
@@ -591,6 +639,12 @@ impl ForceLinearLocator {
         Inversion::new(self.seen(relative)).estimate(self.told_force(), limits)
     }
 
+    /// Whether noise alone explains a reading.
+    #[cfg(test)]
+    pub fn is_noise(&self, reading: &[f64]) -> bool {
+        self.is_no_contact(&self.relative(reading))
+    }
+
     /// The contact of a reading, summed over the whole grid.
     #[cfg(test)]
     pub fn summed_everywhere(&self, reading: &[f64], per_node: usize) -> palpate_core::ContactEstimate {
@@ -673,7 +727,13 @@ impl Seen<'_> {
             simd::run_loops(WeighChannels { reading: &self.reading, functions, open, noise, force_n });
         // Its determinant is relative to the noise of the place.
         let of_place = self.locator.stored.live.len() as f64 * self.noise.ln();
-        Weighed { log_determinant: weighed.log_determinant + of_place, ..weighed }
+        let share = self.locator.stored.channels_as_one.recip();
+        Weighed {
+            dd: share * weighed.dd,
+            fd: share * weighed.fd,
+            ff: share * weighed.ff,
+            log_determinant: share * (weighed.log_determinant + of_place),
+        }
     }
 }
 
@@ -703,6 +763,7 @@ impl Explain for Seen<'_> {
         let ForceLinearLocator { layers, open, .. } = self.locator;
         layers.interpolate([x, y], VARIANCES..LAYERS, &mut self.between);
         let noise = self.locator.noise() * self.locator.noise_at([x, y]);
+        let as_one = self.locator.stored.channels_as_one;
         let groups = self.reading.len();
         let (variances, covariances) = self.between.split_at(groups);
         self.weights.clear();
@@ -710,7 +771,7 @@ impl Explain for Seen<'_> {
             std::array::from_fn(|l| {
                 let v = variances[g][l].max(0.0);
                 let spread = open[g][l] + response_n * (2.0 * covariances[g][l] + response_n * v);
-                1.0 / (noise + spread.max(0.0))
+                1.0 / (as_one * (noise + spread.max(0.0)))
             })
         }));
     }

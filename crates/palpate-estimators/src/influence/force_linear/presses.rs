@@ -7,6 +7,9 @@ use ndarray::{Array2, Axis as Dimension};
 use palpate_numerics::mean;
 use std::cmp::Ordering;
 
+/// Degrees of freedom of a channel's noise that are taken for those of what is expected of it before: no more tell hardly anything.
+pub(crate) const LEAST_FREEDOM: f64 = 4.0;
+
 /// Rows that count as repeats of one press.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Repeats {
@@ -32,6 +35,8 @@ pub(super) struct Presses {
     pub centre: Vec<f64>,
     /// Mean reading less the centre, a row a press.
     pub means: Array2<f64>,
+    /// Variance of what rounding does to a reading of each channel, as of converters that count; 0 where it is none that is seen.
+    pub rounding: Vec<f64>,
     pub repeated: Repeated,
 }
 
@@ -105,6 +110,8 @@ impl Presses {
                 *mean -= centre[c];
             }
         }
+        let rounding =
+            (0..channels).map(|c| rounding_variance(rows.iter().map(|row| row.reading[c]))).collect();
         Self {
             positions_m: groups.iter().map(|group| group[0].position_m.clone()).collect(),
             force_n: groups.iter().map(|group| group[0].force_n).collect(),
@@ -119,12 +126,20 @@ impl Presses {
             },
             centre,
             means,
+            rounding,
         }
     }
 
     /// Number of presses.
     pub fn len(&self) -> usize {
         self.force_n.len()
+    }
+
+    /// Weight of what is known beforehand of noise and errors: 1 of few presses, 0 from so many on that they tell these by themselves.
+    pub fn fewness(&self) -> f64 {
+        const MANY: f64 = 25.0;
+        const FEWER: f64 = 5.0;
+        ((MANY - self.len() as f64) / FEWER).clamp(0.0, 1.0)
     }
 
     /// Distinct forces, that of no contact among them.
@@ -144,11 +159,11 @@ impl Presses {
         positions
     }
 
-    /// Degrees of freedom that tell the noise of a channel: rows less a value for every position and the offset; at least a few.
+    /// Degrees of freedom that tell the noise of a channel: rows less a value for every position and the offset; at least
+    /// [`LEAST_FREEDOM`].
     pub fn noise_freedom(&self) -> f64 {
-        const FEW: f64 = 8.0;
         let rows = self.count.iter().sum::<f64>();
-        (rows - self.positions_m().len() as f64 - 1.0).max(FEW)
+        (rows - self.positions_m().len() as f64 - 1.0).max(LEAST_FREEDOM)
     }
 
     /// The greatest force, in newtons.
@@ -171,6 +186,7 @@ impl Presses {
         Self {
             centre: of(&self.centre),
             means: self.means.select(Dimension(1), channels),
+            rounding: of(&self.rounding),
             repeated: Repeated {
                 squares: self.repeated.squares.select(Dimension(1), channels),
                 ..self.repeated.clone()
@@ -250,6 +266,21 @@ impl Presses {
         }
         parts
     }
+}
+
+/// Variance of the error of rounding to a power of ten of which all values are multiples: a twelfth of its square; 0 where there is none.
+fn rounding_variance(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    /// The coarsest and the finest power of ten that are looked at.
+    const POWERS: std::ops::RangeInclusive<i32> = -9..=6;
+    /// A multiple is one to within so much of the step, or of what a number in binary can hold.
+    const WITHIN: f64 = 1e-6;
+    let is_step = |step: &f64| {
+        values.clone().all(|value| {
+            let steps = value / step;
+            (steps - steps.round()).abs() <= WITHIN && steps.abs() < WITHIN / f64::EPSILON
+        })
+    };
+    POWERS.rev().map(|power| 10f64.powi(power)).find(is_step).map_or(0.0, |step| step * step / 12.0)
 }
 
 /// The time of each row as a share of the recording's; by the rows' order where it has no times.
