@@ -84,7 +84,7 @@ impl Estimator {
     ///     A progress bar where somebody sees it (the default), `False` for none, `True` for one anywhere, or a function of
     ///     (stage, done, total).
     /// auto_seconds : float
-    ///     Seconds that the choice of `Auto` may take; an estimator that is not done by then is left out.
+    ///     Seconds that the choice of `Auto` may take; an estimator that is not done by then is stopped and left out.
     /// memory_limit : str or float, optional
     ///     The most memory that the fit may need, as in "2 GB", or in bytes: one that is estimated to need more is refused before it begins.
     ///

@@ -33,7 +33,7 @@ pub struct Arguments {
     /// Seed of the fit, and of the simulation
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Seconds that the choice of `auto` may take; an estimator that is not done by then is left out
+    /// Seconds that the choice of `auto` may take; an estimator that is not done by then is stopped and left out
     #[arg(long, value_name = "SECONDS", default_value_t = 300)]
     auto_seconds: u32,
     #[command(flatten)]

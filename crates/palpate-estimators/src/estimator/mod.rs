@@ -76,6 +76,14 @@ macro_rules! estimators {
             /// The fit was stopped.
             #[error("{0}")]
             Cancelled(#[from] Cancelled),
+            /// The choice of an estimator had no time to try any.
+            #[error("no estimator was done within the {seconds} s that the choice may take ({} was stopped): give it more time, or name an estimator", stopped.map_or_else(|| "the search for a drift".to_owned(), |kind| format!("`{kind}`")))]
+            NotInTime {
+                /// The time limit.
+                seconds: f64,
+                /// The estimator that was being tried; `None` before the first.
+                stopped: Option<&'static str>,
+            },
             /// No estimator suits the recording; the last one's complaint.
             #[error("no estimator suits the recording: {0}")]
             Choice(Box<EvaluationError<FitError>>),
@@ -508,7 +516,7 @@ impl Tried {
 pub struct TimeLimit<'a> {
     /// Tells seconds since any fixed moment.
     pub clock: &'a (dyn Fn() -> f64 + Sync),
-    /// Limit in seconds; an estimator that is not done by then is left out.
+    /// Limit in seconds; an estimator that is not done by then is stopped and left out.
     pub seconds: f64,
 }
 
@@ -544,49 +552,54 @@ pub const CHOICE_FOLDS: usize = 5;
 /// where the presses tell one, it is taken off the readings held out.
 ///
 /// # Errors
-/// [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason; and
-/// [`FitError::Cancelled`] when the watch stopped it.
+/// [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason;
+/// [`FitError::NotInTime`] when none was done in time; and [`FitError::Cancelled`] when the watch stopped it.
 pub fn choose(task: FitTask, limit: Option<TimeLimit>) -> Result<Choice, FitError> {
     let FitTask { setup, recording, seed, watch } = task;
+    let start_s = limit.map_or(0.0, |limit| (limit.clock)());
+    let is_over = || limit.is_some_and(|limit| (limit.clock)() - start_s >= limit.seconds);
+    let in_time = |progress| watch.report(progress).is_ok() && !is_over();
+    let limited = Watch::new(&in_time);
+    // Stopped by whoever watches, unless it was the time.
+    let stopped = |stopped: Option<&'static str>| match (watch.round(), limit) {
+        (Ok(()), Some(TimeLimit { seconds, .. })) => FitError::NotInTime { seconds, stopped },
+        _ => Cancelled.into(),
+    };
     let positions = recording.distinct_positions().len();
     let unsuited = |error| FitError::Choice(Box::new(error));
     let recording = recording.clone().in_order();
     let mut splits =
         Split::by_folds(&recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
-    let whole = FitTask::new(setup, &recording).watch(watch);
+    let whole = FitTask::new(setup, &recording).watch(limited);
     let course = Influence::offset_course(whole, &recording);
     let drift = match course
-        .and_then(|course| course.map(|_| take_off_drift(setup, &mut splits, watch)).transpose())
+        .and_then(|course| course.map(|_| take_off_drift(setup, &mut splits, limited)).transpose())
     {
         Ok(drift) => drift.flatten(),
-        Err(error) if Cancelled::caused(&error) => return Err(Cancelled.into()),
+        Err(error) if Cancelled::caused(&error) => return Err(stopped(None)),
         // Presses that tell no influence functions tell no drift; when that estimator is tried, it says why.
         Err(_) => {
             splits.iter_mut().for_each(|split| split.offsets = None);
             None
         }
     };
-    let start_s = limit.map_or(0.0, |limit| (limit.clock)());
-    let is_over = || limit.is_some_and(|limit| (limit.clock)() - start_s > limit.seconds);
     let (mut tried, mut left_out, mut last) = (Vec::new(), Vec::new(), None);
     let contenders = contenders(setup, &Estimator::Auto, recording.rows.len());
     let count = contenders.len();
     for (done, estimator) in contenders.into_iter().enumerate() {
         let kind = estimator.kind();
         watch.counted("trying estimators", "estimators", done, count)?;
-        if !tried.is_empty() && is_over() {
-            left_out.push((kind, NOT_IN_TIME.to_owned()));
-            continue;
-        }
-        let go_on = |progress| watch.report(progress).is_ok() && (tried.is_empty() || !is_over());
-        match evaluate_splits(setup, &estimator, &splits, seed, &|| 0.0, Watch::new(&go_on)) {
+        match evaluate_splits(setup, &estimator, &splits, seed, &|| 0.0, limited) {
             Ok(one) => {
                 if let Some(outcome) = Tried::of_evaluation(kind, &one.evaluation) {
                     tried.push((estimator, outcome));
                 }
             }
             Err(error) if Cancelled::caused(&error) => {
-                watch.round()?;
+                let why = stopped(Some(kind));
+                if tried.is_empty() || matches!(why, FitError::Cancelled(_)) {
+                    return Err(why);
+                }
                 left_out.push((kind, NOT_IN_TIME.to_owned()));
             }
             Err(error) => {
@@ -683,3 +696,6 @@ impl Locator {
         }
     }
 }
+
+#[cfg(test)]
+mod choice_tests;
