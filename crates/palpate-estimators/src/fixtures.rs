@@ -33,6 +33,11 @@ impl Example {
     }
 }
 
+/// Readings that a test takes: as many as PALPATE_READINGS says, else `usual`.
+pub(crate) fn readings(usual: usize) -> usize {
+    std::env::var("PALPATE_READINGS").ok().and_then(|count| count.parse().ok()).unwrap_or(usual)
+}
+
 /// The founding paper's beam.
 pub(crate) fn beam() -> Beam {
     Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap()

@@ -7,6 +7,7 @@ use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
+use crate::fixtures;
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelModel, Layout, NoiseError, Sensor, SensorKind};
@@ -96,7 +97,7 @@ fn tally(strain: bool, readings: usize) -> Tally {
 /// docs/load-profiles.md has these for 200 readings: PALPATE_READINGS=200. Few readings are far off, and four of them are among the
 /// first forty: a share needs a hundred.
 fn readings() -> usize {
-    std::env::var("PALPATE_READINGS").ok().and_then(|count| count.parse().ok()).unwrap_or(100)
+    fixtures::readings(100)
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::PRIOR_FORCES;
 use crate::closed_form::ClosedForm;
 use crate::fit::{Fit, FitTask, Locate, NoCheck};
-use crate::fixtures::{Example, force_95_n, paper};
+use crate::fixtures::{Example, force_95_n, paper, readings};
 use crate::influence::Influence;
 use crate::simulate::clean_reading;
 use palpate_core::Status;
@@ -15,8 +15,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// Distances from the left end, in millimetres.
 const PLACES_MM: [f64; 11] = [0.5, 1.0, 2.0, 4.0, 7.0, 10.0, 15.0, 22.0, 25.0, 40.0, 100.0];
 
-/// Readings at each place.
-const READINGS: usize = 4000;
+/// Readings at each place; docs/at-the-limit.md has the tables of 4,000: PALPATE_READINGS=4000.
+const READINGS: usize = 1800;
 
 /// The paper's beam, pressed with its known force.
 fn bench(force_is_known: bool) -> Example {
@@ -54,7 +54,7 @@ impl Row {
         let surface = bench.setup.surface().model().unwrap();
         let contact = Contact { position: Position::along(x_m), force_n };
         let truth = clean_reading(surface, bench.setup.layout(), contact);
-        for i in 0..READINGS {
+        for i in 0..readings(READINGS) {
             let reading =
                 measure(bench.setup.layout(), &truth, &ChannelErrors::none(bench.setup.layout()), rng);
             let estimate = locators[i % locators.len()].locate(&reading);
@@ -91,6 +91,9 @@ fn print_and_check(
 ) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(15);
     let mut wrong = Vec::new();
+    let readings = readings(READINGS);
+    // Half a percent off, and four standard deviations of the readings.
+    let margin = 0.6 + 400.0 * (0.95 * 0.05 / readings as f64).sqrt();
     for force_n in forces_n {
         eprintln!(
             "{title}, {force_n} N\n| from the end | contact found | place covered | force covered | mean width | mean error | greatest force | outside_model |\n|---|---|---|---|---|---|---|---|"
@@ -101,14 +104,15 @@ fn print_and_check(
             let mean = |sum: f64| sum / row.found as f64;
             eprintln!(
                 "| {place_mm} mm | {:.1} % | {place:.1} % | {force:.1} % | {:.2} mm | {:.2} mm | {:.2} N | {:.2} % |",
-                100.0 * row.found as f64 / READINGS as f64,
+                100.0 * row.found as f64 / readings as f64,
                 mean(row.width_mm),
                 mean(row.error_mm),
                 row.greatest_n,
                 row.percent(row.not_explained)
             );
-            let good = |percent: f64| (93.0..=97.0).contains(&percent) || row.found < READINGS;
-            if !good(place) || force < 93.0 || row.outside > 0 || row.greatest_n > PRIOR_FORCES * 3.0 {
+            let good = |percent: f64| (percent - 95.0).abs() <= margin || row.found < readings;
+            if !good(place) || force < 95.0 - margin || row.outside > 0 || row.greatest_n > PRIOR_FORCES * 3.0
+            {
                 wrong.push(format!("{force_n} N at {place_mm} mm: {row:?}"));
             }
         }

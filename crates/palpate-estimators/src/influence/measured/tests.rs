@@ -131,28 +131,29 @@ fn estimates_are_those_of_a_plain_sum_over_the_grid() {
         corner(Position { x_m, y_m }, 0.05, &mut rng)
     });
     let pad = fit(&raw_setup(*PAD, 4, None), &raw_recording(corners.collect()));
-    let touches: Vec<Row> = (0..30)
+    let touches: Vec<Row> = (0..25)
         .map(|_| {
             let position = Position { x_m: rng.random_range(0.0..0.03), y_m: rng.random_range(0.0..0.03) };
             corner(position, 0.05, &mut rng)
         })
         .collect();
-    check_against_sum(&pad, touches.iter().map(|row| row.reading.as_slice()), 10);
+    check_against_sum(&pad, touches.iter().map(|row| row.reading.as_slice()), 8);
     let dents = (0..507).map(|i| {
         let (x_m, y_m) = (0.0025 * f64::from(i % 13), 0.0025 * f64::from(i % 169 / 13));
         dent(Position { x_m, y_m }, 1.0 + 0.5 * f64::from(i / 169), &mut rng)
     });
     let soft = fit(&raw_setup(*PAD, 4, None), &raw_recording(dents.collect()));
-    let touches: Vec<Row> = (0..40)
+    let touches: Vec<Row> = (0..25)
         .map(|_| {
             let position = Position { x_m: rng.random_range(0.0..0.03), y_m: rng.random_range(0.0..0.03) };
             dent(position, rng.random_range(1.0..2.0), &mut rng)
         })
         .collect();
-    check_against_sum(&soft, touches.iter().map(|row| row.reading.as_slice()), 12);
+    check_against_sum(&soft, touches.iter().map(|row| row.reading.as_slice()), 8);
     if let Some((setup, recording)) = strip_recording("1d-water-1.5mm.csv") {
         let locator = fit(&setup, &recording);
-        check_against_sum(&locator, recording.rows.iter().map(|row| row.reading.as_slice()), 40);
+        let few = recording.rows.iter().step_by(3);
+        check_against_sum(&locator, few.map(|row| row.reading.as_slice()), 40);
     }
 }
 

@@ -161,18 +161,18 @@ fn drift_is_found_where_there_is_any() {
     }
 }
 
-/// Mean error in millimetres, and share of the 95 % intervals that hold the contact, of strips of 400 presses that drift: of locators
-/// from all presses, and from 200 in their place.
-fn condensed_under_drift(course: Course, places: usize) -> [[f64; 2]; 2] {
+/// Mean error in millimetres, and share of the 95 % intervals that hold the contact, of strips of so many presses that drift: of locators
+/// from all presses, and from half as many in their place.
+fn condensed_under_drift(presses: usize, course: Course, places: usize) -> [[f64; 2]; 2] {
     let count = benches(1);
     let mut sums = [[0.0; 2]; 2];
     for seed in 0..count {
-        let mut bench = Bench::strip(seed, 400, places);
+        let mut bench = Bench::strip(seed, presses, places);
         let touches = bench.touches(200);
         let (_, ends) = drift(&mut bench, course, Pace::Even);
         let (setup, recording) = (bench.setup(), bench.recording());
         let later = moved(&touches, &ends);
-        for (most, sums) in [usize::MAX, 200].into_iter().zip(&mut sums) {
+        for (most, sums) in [usize::MAX, presses / 2].into_iter().zip(&mut sums) {
             let task = FitTask::new(&setup, &recording);
             let locator = fit_condensed(task, Structure::ForceLinear, most).unwrap().unwrap();
             assert_eq!(locator.drifts().len(), GAUGES);
@@ -186,16 +186,19 @@ fn condensed_under_drift(course: Course, places: usize) -> [[f64; 2]; 2] {
 
 #[test]
 fn many_presses_under_drift_are_condensed_with_hardly_a_loss() {
+    // docs/measured.md has the figures of 400 presses.
+    let presses = if benches(0) == 0 { 280 } else { 400 };
     let mut sums = [[0.0; 2]; 2];
     for course in Course::ALL {
-        // One way along the strip, where a drift looks like a change of the offset with the position, and forty times.
-        for places in [400, 10] {
-            let found = condensed_under_drift(course, places);
+        // One way along the strip, where a drift looks like a change of the offset with the position, and many times.
+        for places in [presses, 10] {
+            let found = condensed_under_drift(presses, course, places);
             let [[all_mm, all_covered], [few_mm, few_covered]] = found;
             eprintln!(
-                "strip, 400 presses at {places} places, {course:?}: mean {all_mm:.3} mm, {:.1} % covered; {few_mm:.3} mm, {:.1} % from 200 in their place",
+                "strip, {presses} presses at {places} places, {course:?}: mean {all_mm:.3} mm, {:.1} % covered; {few_mm:.3} mm, {:.1} % from {} in their place",
                 100.0 * all_covered,
-                100.0 * few_covered
+                100.0 * few_covered,
+                presses / 2
             );
             sums.iter_mut().flatten().zip(found.iter().flatten()).for_each(|(sum, value)| *sum += value);
         }
