@@ -30,8 +30,7 @@ fn a_recording_is_located_again_to_the_last_bit() {
     let folder = bench();
     let record = ["record", "locator.json", "--from", BOARD, "--out", "press.mcap"];
     let told = said(&run(folder.path(), &[&record[..], &["--seconds", "1.5", "--json"]].concat()));
-    let samples: Vec<Value> =
-        objects(&told).into_iter().filter(|object| object["event"].is_null()).collect();
+    let samples: Vec<Value> = objects(&told).into_iter().filter(|object| object["event"].is_null()).collect();
     assert!(samples.len() > 500, "{}", samples.len());
 
     let output = run(folder.path(), &["replay", "press.mcap", "--json"]);
@@ -90,15 +89,10 @@ fn a_board_over_tcp_is_recorded_with_its_faults() {
     let to = format!("tcp://:{port}");
     let arguments =
         ["simulated-board", "rig.toml", "--to", &to, "--rate", "500 Hz", "--drop", "0.02", "--torn", "0.02"];
-    let mut board = palpate(folder.path())
-        .args(arguments)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut board =
+        palpate(folder.path()).args(arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let from = format!("tcp://127.0.0.1:{port}");
-    let record =
-        ["record", "locator.json", "--from", &from, "--out", "press.mcap", "--seconds", "3"];
+    let record = ["record", "locator.json", "--from", &from, "--out", "press.mcap", "--seconds", "3"];
     let told = said(&run(folder.path(), &record));
     board.kill().unwrap();
     board.wait().unwrap();

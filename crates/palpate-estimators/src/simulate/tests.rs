@@ -5,7 +5,8 @@ use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::Motion;
 
 use crate::fixtures::{
-    Example, along_the_beam, faulty_paper, moving_beam, moving_plate, over_the_plate, paper, plate, strip, swinging_beam,
+    Example, along_the_beam, faulty_paper, moving_beam, moving_plate, over_the_plate, paper, plate, strip,
+    swinging_beam,
 };
 use palpate_mechanics::sensing::ChannelModel;
 
@@ -147,7 +148,8 @@ fn stopped_everywhere<T>(mut work: impl FnMut(Watch) -> Result<T, SimulateError>
 fn simulations_stop_at_any_look_and_are_otherwise_the_same() {
     let plate = plate(6, ChannelModel { noise_sd: 1e-6, position_error_m: 1e-3, ..ChannelModel::default() });
     for Example { setup, training } in [noisy(), plate] {
-        let made = stopped_everywhere(|watch| setup.simulate_watched(&training.clone().repeated(60), 3, watch));
+        let made =
+            stopped_everywhere(|watch| setup.simulate_watched(&training.clone().repeated(60), 3, watch));
         assert_eq!(made, setup.simulate(&training.repeated(60), 3).unwrap());
         let loads = [UniformLoad::along(0.05, 0.09, 2.0)];
         let made = stopped_everywhere(|watch| simulate_loads_watched(&setup, &loads, 600, 3, watch));

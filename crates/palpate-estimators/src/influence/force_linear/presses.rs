@@ -110,8 +110,8 @@ impl Presses {
                 *mean -= centre[c];
             }
         }
-        let rounding =
-            (0..channels).map(|c| rounding_variance(rows.iter().map(|row| row.reading[c]))).collect();
+        let column = |c: usize| -> Vec<f64> { rows.iter().map(|row| row.reading[c]).collect() };
+        let rounding = (0..channels).map(|c| rounding_variance(&column(c))).collect();
         Self {
             positions_m: groups.iter().map(|group| group[0].position_m.clone()).collect(),
             force_n: groups.iter().map(|group| group[0].force_n).collect(),
@@ -269,13 +269,13 @@ impl Presses {
 }
 
 /// Variance of the error of rounding to a power of ten of which all values are multiples: a twelfth of its square; 0 where there is none.
-fn rounding_variance(values: impl Iterator<Item = f64> + Clone) -> f64 {
+fn rounding_variance(values: &[f64]) -> f64 {
     /// The coarsest and the finest power of ten that are looked at.
     const POWERS: std::ops::RangeInclusive<i32> = -9..=6;
     /// A multiple is one to within so much of the step, or of what a number in binary can hold.
     const WITHIN: f64 = 1e-6;
     let is_step = |step: &f64| {
-        values.clone().all(|value| {
+        values.iter().all(|value| {
             let steps = value / step;
             (steps - steps.round()).abs() <= WITHIN && steps.abs() < WITHIN / f64::EPSILON
         })

@@ -19,7 +19,7 @@ const CONTACTS_N: [f64; 3] = [2.0, 5.0, 20.0];
 const SIDE_M: f64 = 0.3;
 /// Calibrations, and readings of each at every distance; docs/at-the-limit.md has the table of 100: PALPATE_READINGS=100.
 const CALIBRATIONS: u64 = 20;
-const READINGS: usize = 50;
+const READINGS: usize = 45;
 
 fn bench() -> Example {
     let noise = ChannelModel { noise_sd: 5e-6, ..ChannelModel::default() };
