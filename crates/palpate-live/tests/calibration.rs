@@ -140,3 +140,20 @@ fn a_surface_that_is_touched_or_never_rests_is_not_taken() {
     }
     assert_eq!(guide.waiting(), Waiting::Untouched);
 }
+
+#[test]
+fn a_press_that_is_held_for_long_is_not_taken_for_an_untouched_surface() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let mut guide = Guide::new(plan(&rig)[..2].to_vec());
+    let mut hand = Hand::new(&rig.setup);
+    while guide.waiting() != Waiting::Release {
+        hand.obey(&mut guide, 1);
+    }
+    let position = guide.plan()[0].position;
+    hand.contact = Some(Contact { position, force_n: FORCE_N });
+    for _ in 0..2000 {
+        let (at, reading) = hand.reading();
+        assert_eq!(guide.add(at, &reading), Progress::None);
+    }
+    assert_eq!(guide.waiting(), Waiting::Release);
+}

@@ -99,9 +99,8 @@ impl Baseline {
         let readings = stretch.latest()?;
         let mean = mean(&readings);
         let size = self.size(pressed);
-        let is_let_go = self
-            .deviations(&mean)
-            .all(|(deviation, sd)| deviation <= PRESSED_SD * sd || deviation <= LEFT_SHARE * size);
+        let is_let_go =
+            self.deviations(&mean).all(|(deviation, sd)| deviation <= PRESSED_SD.max(LEFT_SHARE * size) * sd);
         (is_let_go && rests(&readings, self, size)).then_some(mean)
     }
 
