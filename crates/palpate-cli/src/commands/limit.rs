@@ -20,7 +20,7 @@ use palpate_mechanics::limit::{
 use palpate_mechanics::sensing::NoiseError;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
-use palpate_numerics::watch::Watch;
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{LimitReport, limit_report};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -160,8 +160,8 @@ fn setup(bench: &RigOrLocator, arguments: &Arguments) -> Result<Setup, Failure> 
 }
 
 fn complaint(error: LimitError, rig: &Path) -> Failure {
-    if let LimitError::Cancelled(cancelled) = error {
-        return Failure::from_error(&cancelled);
+    if Cancelled::caused(&error) {
+        return Failure::stopped();
     }
     let complaint = Complaint::about(rig, error);
     let help = match error {

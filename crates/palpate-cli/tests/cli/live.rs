@@ -119,10 +119,11 @@ fn bad_input_is_refused_with_its_place() {
         let told = refused(&[&record[..], &[url]].concat());
         assert!(told.contains(what), "{url}: {told}");
     }
-    fs::write(folder.path().join("rules.toml"), "[[rule]]\nname = \"a\"\nx = [\"0 mm\", \"9 N\"]\n").unwrap();
+    let rule = "[[rule]]\nname = \"a\"\ntopic = \"t\"\nmessage = \"1\"\nx = [\"0 mm\", \"9 N\"]\n";
+    fs::write(folder.path().join("rules.toml"), rule).unwrap();
     let rules = ["simulated:rig.toml", "--mqtt", "mqtt://127.0.0.1:1/a", "--rules", "rules.toml"];
     let told = refused(&[&record[..], &rules].concat());
-    assert!(told.contains("rules.toml:3:"), "{told}");
+    assert!(told.contains("rules.toml:5:"), "{told}");
     fs::write(folder.path().join("no.mcap"), "no recording").unwrap();
     let told = refused(&["replay", "no.mcap"]);
     assert!(told.contains("no.mcap"), "{told}");

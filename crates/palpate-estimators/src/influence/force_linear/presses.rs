@@ -275,10 +275,12 @@ fn rounding_variance(values: &[f64]) -> f64 {
     /// A multiple is one to within so much of the step, or of what a number in binary can hold.
     const WITHIN: f64 = 1e-6;
     let is_step = |step: &f64| {
-        values.iter().all(|value| {
+        let is_multiple = |value: &f64| {
             let steps = value / step;
             (steps - steps.round()).abs() <= WITHIN && steps.abs() < WITHIN / f64::EPSILON
-        })
+        };
+        // Of a step far above all values they would all be the multiple 0.
+        values.iter().all(is_multiple) && values.iter().any(|value| (value / step).round() != 0.0)
     };
     POWERS.rev().map(|power| 10f64.powi(power)).find(is_step).map_or(0.0, |step| step * step / 12.0)
 }
@@ -301,4 +303,24 @@ pub(super) fn shares(times: &[f64], of: &[f64]) -> Vec<f64> {
 
 pub(super) fn compare(a: &[f64], b: &[f64]) -> Ordering {
     a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_that_of_the_coarsest_step_of_all_values() {
+        let of = |values: &[f64], step: f64| {
+            let (found, expected) = (rounding_variance(values), step * step / 12.0);
+            assert!((found - expected).abs() <= 1e-9 * expected, "{values:?}: {found}, {expected}");
+        };
+        of(&[12.0, 7.0, -3.0], 1.0);
+        of(&[120.0, 70.0], 10.0);
+        of(&[1.25, 3.5, 0.0], 0.01);
+        // Metres: deflections in whole micrometres, and some that no converter has rounded.
+        of(&[1.5e-4, 2.53e-4], 1e-6);
+        of(&[1.2345678912e-4, 2.5e-4], 0.0);
+        of(&[0.0, 0.0], 0.0);
+    }
 }
