@@ -30,11 +30,13 @@ pub use warnings::Warning;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::influence::force_linear;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_numerics::{mean, random_order};
 use std::borrow::Cow;
+
+/// Degrees of freedom of a channel's noise that are taken for those of what is expected of it before: no more tell hardly anything.
+pub(crate) const LEAST_FREEDOM: f64 = 4.0;
 
 /// Readings with the contacts that caused them.
 #[derive(Clone, Debug, PartialEq)]
@@ -164,7 +166,7 @@ impl Recording {
     /// Whether forces were recorded, but so few rows repeat a place or are untouched that they hardly tell the noise of influence functions.
     pub fn hardly_tells_noise(&self) -> bool {
         let spare = self.rows.len().saturating_sub(self.distinct_positions().len() + 1);
-        self.rows.iter().all(|row| row.force_n.is_some()) && spare as f64 <= force_linear::LEAST_FREEDOM
+        self.rows.iter().all(|row| row.force_n.is_some()) && spare as f64 <= LEAST_FREEDOM
     }
 
     /// Checks that there are at least `needed` distinct positions.

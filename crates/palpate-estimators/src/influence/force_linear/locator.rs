@@ -13,7 +13,6 @@
 
 use super::drift::DriftCourse;
 use super::posterior::Functions;
-use super::presses::LEAST_FREEDOM;
 use super::prior::{Prior, Source};
 use super::scan::Scan;
 use crate::fit::{Locate, LocatorFault, NoCheck};
@@ -26,7 +25,7 @@ use crate::influence::inversion::{
 use crate::influence::lanes::{LANES, Lanes, in_lanes};
 use crate::influence::levenberg::{Equations, Unknowns};
 use crate::lightest_touch::LightestTouch;
-use crate::recording::Recording;
+use crate::recording::{LEAST_FREEDOM, Recording};
 use crate::setup::Setup;
 use crate::spread::{About, spread_bound, spread_score};
 use crate::status::{

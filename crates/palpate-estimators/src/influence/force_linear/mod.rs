@@ -21,7 +21,6 @@ mod scan;
 pub use drift::DriftCourse;
 pub(crate) use learning::{FOLDS, MOST_PRESSES, MOST_SEARCHED};
 pub use locator::{ForceLinearLocator, Scatter};
-pub(crate) use presses::LEAST_FREEDOM;
 pub use prior::Source;
 
 use super::config::Structure;

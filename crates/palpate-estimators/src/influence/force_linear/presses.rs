@@ -1,14 +1,11 @@
 //! Presses of recorded force, as the learning of influence functions takes them: repeats averaged, readings about their mean.
 
-use crate::recording::Recording;
+use crate::recording::{LEAST_FREEDOM, Recording};
 use crate::setup::Setup;
 use crate::thinning::thinned;
 use ndarray::{Array2, Axis as Dimension};
 use palpate_numerics::mean;
 use std::cmp::Ordering;
-
-/// Degrees of freedom of a channel's noise that are taken for those of what is expected of it before: no more tell hardly anything.
-pub(crate) const LEAST_FREEDOM: f64 = 4.0;
 
 /// Rows that count as repeats of one press.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
