@@ -136,7 +136,8 @@ pub fn compare<'py>(
                 let calibration = Calibration::from_training(bench, &training.0)?.at_forces_of_use();
                 calibration.trials_watched(calibrations, seed, watch)
             });
-            let how = format!("{calibrations} simulated calibrations");
+            let how =
+                format!("{calibrations} simulated calibration{}", if calibrations == 1 { "" } else { "s" });
             (trials?, "simulation".to_owned(), how)
         }
         (None, None) => {

@@ -174,9 +174,9 @@ impl Locator {
                 return Err(refused("`tare` needs a recording: simulated readings do not drift"));
             }
             None => {
-                let simulated = work::run_quietly(py, |watch| {
+                let simulated = work::run_quietly_with(py, |watch| {
                     simulate_at_watched(&self.setup, &all_over(extent), 1, seed, watch)
-                });
+                })?;
                 made =
                     simulated.map_err(|error| refused(format!("{error}; give a recording to judge by")))?;
                 &made

@@ -13,7 +13,7 @@ use palpate::mechanics::surface::{Extent, SurfaceSpec};
 use palpate::numerics::watch::{Cancelled, Watch};
 use palpate::rig::RigSections;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyBytes, PyDict, PyTuple};
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use serde_json::json;
 
 use crate::arrays::{self, Readings};
@@ -63,9 +63,7 @@ pub fn simulate_moving<'py>(
     let moving = moving.ok_or_else(|| refused("how the contact moves is not said: give a `motion`"))?;
     let known_n = force_n.or(press_n).or(setup.force_n());
     let pressed = (*setup).clone().with_force(known_n).map_err(refused)?;
-    let quietly = PyBool::new(py, false);
-    let timed =
-        work::run_with(py, Some(quietly.as_any()), None, |watch| simulate(&pressed, &moving, seed, watch))?;
+    let timed = work::run_quietly_with(py, |watch| simulate(&pressed, &moving, seed, watch))?;
     let timed = timed.map_err(|error| refused(format!("{error}; `force` says it, as in \"3 N\"")))?;
     let fields = Fields::new(py);
     let TimedRecording { mut recording, times_s, second } = timed;

@@ -52,7 +52,12 @@ where
     T: Send,
     E: Error + Send + 'static,
 {
-    run(py, Some(PyBool::new(py, false).as_any()), None, work)
+    run_quietly_with(py, work)?.map_err(|error| of_work(&error))
+}
+
+/// As [`run_quietly`], with the error of the work as it is.
+pub fn run_quietly_with<T: Send>(py: Python<'_>, work: impl FnOnce(Watch<'_>) -> T + Send) -> PyResult<T> {
+    run_with(py, Some(PyBool::new(py, false).as_any()), None, work)
 }
 
 /// As [`run`], with the error of the work as it is.

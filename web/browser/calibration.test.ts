@@ -11,7 +11,7 @@ const SIX_TWICE: [string, string][] = [
   ["count = 10\nrepeats = 10", "count = 6\nrepeats = 2"],
 ];
 
-/** What the page asks for. */
+/** The instruction on the page. */
 async function step(page: Page): Promise<string> {
   return (await page.locator("#calibration-step").textContent()) ?? "";
 }

@@ -156,7 +156,7 @@ export interface CalibrationRecord {
   outcome: CalibrationOutcome | null;
 }
 
-/** What a calibration ended with. */
+/** Outcome of a calibration. */
 export interface CalibrationOutcome {
   locator: string;
   presses: number;
@@ -164,6 +164,6 @@ export interface CalibrationOutcome {
   median_mm: number | null;
   mean_mm: number | null;
   gain_percent: number | null;
-  is_enough: boolean;
+  stop_percent: number | null;
   remarks: string[];
 }

@@ -40,7 +40,7 @@ describe("words of a calibration", () => {
   });
 
   test("end with the error at positions held out", () => {
-    const outcome = { locator: "a.json", presses: 12, folds: 5, median_mm: 0.0412, mean_mm: 0.06, gain_percent: 4, is_enough: true, remarks: [] };
+    const outcome = { locator: "a.json", presses: 12, folds: 5, median_mm: 0.0412, mean_mm: 0.06, gain_percent: 4, stop_percent: 5, remarks: [] };
     const words = stepWords({ ...PRESSING, phase: "done", outcome });
     expect(words).toBe("Fitted to 12 presses: error at positions held out 0.041 mm (median), 0.060 mm (mean)");
     expect(stepWords({ ...PRESSING, phase: "done", outcome: { ...outcome, median_mm: null } })).toBe("Fitted to 12 presses.");

@@ -177,7 +177,7 @@ impl Need {
     }
 }
 
-/// Whether what `node --version` prints, as `v20.19.1`, is 20.19 or later: what the dashboard's build asks for.
+/// True for versions, as `node --version` prints them (`v20.19.1`), from 20.19 on: the dashboard's build asks for that.
 fn is_recent_node(version: &str) -> bool {
     let mut numbers =
         version.trim().trim_start_matches('v').split('.').map_while(|number| number.parse::<u32>().ok());

@@ -1,9 +1,10 @@
 //! Files and folders that a command may write: what must not be lost is refused with a reason, and what is written appears whole.
 
 use crate::failure::{Complaint, Failure};
+use palpate_live::whole_file::{self, folder_of};
 use palpate_report::ReportFile;
 use std::fs::{self, Metadata};
-use std::io::{Error, ErrorKind, Write};
+use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
 /// Results of a study, which is finished once they are there.
@@ -97,17 +98,8 @@ impl Target {
     /// Writes the file under a temporary name and renames it, so that nobody ever sees half of it. A link stays, and what it
     /// leads to is written; a file that is replaced keeps its mode.
     pub fn write(&self, bytes: &[u8]) -> Result<(), Failure> {
-        let place = self.place()?;
-        let write = || -> std::io::Result<()> {
-            let mut file = temporary_file(folder_of(&place))?;
-            file.write_all(bytes)?;
-            if let Ok(replaced) = fs::metadata(&place) {
-                file.as_file().set_permissions(replaced.permissions())?;
-            }
-            file.persist(&place)?;
-            Ok(())
-        };
-        write().map_err(|error| cannot("write", &self.path, &error))
+        self.place()?;
+        whole_file::write(&self.path, bytes).map_err(|error| cannot("write", &self.path, &error))
     }
 
     /// The file with all links followed, which may be written.
@@ -130,7 +122,7 @@ impl Target {
                 }
                 fs::canonicalize(&self.path)
             }
-            Err(error) if error.kind() == ErrorKind::NotFound => follow_links(&self.path),
+            Err(error) if error.kind() == ErrorKind::NotFound => whole_file::place(&self.path),
             Err(error) => Err(error),
         };
         let place = place.map_err(|error| cannot("write", &self.path, &error))?;
@@ -165,20 +157,6 @@ fn what_it_is(there: &Metadata) -> &'static str {
 #[cfg(not(unix))]
 fn what_it_is(_: &Metadata) -> &'static str {
     "it is no regular file"
-}
-
-/// The path at the end of a name's links, or the name itself, where nothing is there yet.
-fn follow_links(path: &Path) -> std::io::Result<PathBuf> {
-    /// As many as Linux follows.
-    const MOST: usize = 40;
-    let mut place = path.to_owned();
-    for _ in 0..MOST {
-        match fs::read_link(&place) {
-            Ok(to) => place = folder_of(&place).join(to),
-            Err(_) => return Ok(place),
-        }
-    }
-    Err(Error::other("its links lead in a circle"))
 }
 
 /// A folder that takes a report, with all files that belong to it.
@@ -270,20 +248,7 @@ fn is_of_a_report(name: &str) -> bool {
 
 /// An error where a folder does not take a file: it is better known before an hour of work than after it.
 fn check_takes_files(folder: &Path) -> std::io::Result<()> {
-    temporary_file(folder).map(drop)
-}
-
-fn temporary_file(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".palpate-");
-    // Results are for whoever may read files that are made here, as the umask says.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
-}
-
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    whole_file::temporary(folder).map(drop)
 }
 
 /// The complaint that a path cannot be used.

@@ -47,7 +47,7 @@ pub enum SimulateError {
     Cancelled(#[from] Cancelled),
 }
 
-/// What the watch is told of.
+/// Stage of the work, for the watch.
 const STAGE: &str = "simulating";
 /// Readings between two looks whether to go on.
 const READINGS_EACH: usize = 256;

@@ -19,3 +19,4 @@ pub mod sink;
 pub mod source;
 pub mod stage;
 pub mod stamp;
+pub mod whole_file;

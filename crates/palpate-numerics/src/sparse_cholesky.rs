@@ -29,7 +29,7 @@ const MOST_ZEROS: f64 = 0.2;
 /// As [`MOST_ZEROS`], in supernodes that are large enough.
 const FEW_ZEROS: f64 = 0.02;
 
-/// What the watch is told of.
+/// Stage of the work, for the watch.
 const STAGE: &str = "factoring the equations";
 /// Columns whose patterns are found, and multiply-adds of a solution, between two looks whether to go on: some milliseconds.
 const COLUMNS_EACH: usize = 1 << 10;

@@ -42,10 +42,10 @@ impl Stage {
             ("the clearance", self.clearance_m),
             ("the speed of travel", self.travel_m_per_s),
             ("the speed of pressing", self.press_m_per_s),
-            ("the limit of the force", self.force_limit_n.unwrap_or(1.0)),
         ];
         let depths = self.depths_m.iter().map(|depth_m| ("the depth", *depth_m));
-        OutOfRange::check_positive(positive.into_iter().chain(depths))
+        let limit = self.force_limit_n.map(|limit_n| ("the limit of the force", limit_n));
+        OutOfRange::check_positive(positive.into_iter().chain(depths).chain(limit))
     }
 
     /// The greatest depth.

@@ -1,6 +1,7 @@
-//! What tests of any crate need: real recordings, and a word when they are not there.
+//! Tools of the tests of any crate: real recordings, and a word when they are not there; work that is stopped.
 #![forbid(unsafe_code)]
 
 pub mod data;
 pub mod json_numbers;
 pub mod skip;
+pub mod stopping;

@@ -127,7 +127,7 @@ export class CalibrationPanel {
   }
 }
 
-/** What a person does now. */
+/** Instruction for the person. */
 export function stepWords(state: CalibrationRecord): string {
   switch (state.phase) {
     case "ready":
@@ -189,11 +189,13 @@ function errorWords(outcome: CalibrationOutcome): string {
 }
 
 function gainWords(outcome: CalibrationOutcome): string {
-  const gain = outcome.is_enough
-    ? "More presses would lower the error by less than 5 %."
-    : outcome.gain_percent === null
+  const { gain_percent, stop_percent } = outcome;
+  const gain =
+    gain_percent === null || stop_percent === null
       ? ""
-      : `Endlessly many more presses would lower the expected error by ${outcome.gain_percent.toFixed(0)} %.`;
+      : gain_percent < stop_percent
+        ? `More presses would lower the error by less than ${stop_percent} %.`
+        : `Endlessly many more presses would lower the expected error by ${gain_percent.toFixed(0)} %.`;
   return [`The locator is in ${outcome.locator}.`, gain, ...outcome.remarks].filter((words) => words !== "").join(" ");
 }
 

@@ -1,12 +1,13 @@
 // A surface of one direction from the side: supports, sensors, deflected shape, contact.
 
-import type { CalibrationRecord, ContactRecord, SurfaceInfo } from "../protocol";
+import type { ContactRecord, PlaceRecord, SurfaceInfo } from "../protocol";
 import { linear, roundUp, ticks } from "../model/scale";
 import { naturalSpline } from "../model/spline";
 import { isPlaced, number } from "../words";
 import { disc, segment, type Frame } from "./canvas";
 import { palette } from "./palette";
 import type { Shown } from "./surface";
+import { drawTargets } from "./targets";
 
 /** Millimetres of the units that deflections are read in. */
 const MM: Record<string, number> = { nm: 1e-6, um: 1e-3, "µm": 1e-3, mm: 1, cm: 10, m: 1000, in: 25.4 };
@@ -34,7 +35,10 @@ export class LineView {
     drawSupports(ctx, surface, x, level);
     drawBeam(ctx, x(0), x(surface.length_mm), level, shape);
     drawSensors(ctx, shown, x, level, shape);
-    if (shown.calibration !== null) drawTargets(ctx, shown.calibration, x, level);
+    if (shown.calibration !== null) {
+      drawTargets(ctx, shown.calibration, (place) => [x(place.x_mm), level - 10]);
+      if (shown.calibration.next !== null) drawNext(ctx, shown.calibration.next, x, level);
+    }
     drawContact(frame, shown, x, level, shape);
   }
 
@@ -154,22 +158,11 @@ function drawSensors(ctx: CanvasRenderingContext2D, shown: Shown, x: (mm: number
   }
 }
 
-/** Places of a calibration: hollow while presses are left, full when all were taken, and an arrow at the next one. */
-function drawTargets(ctx: CanvasRenderingContext2D, calibration: CalibrationRecord, x: (mm: number) => number, level: number): void {
-  const { accent, ink, card } = palette();
-  for (const place of calibration.places) {
-    ctx.strokeStyle = accent;
-    ctx.fillStyle = place.left === 0 ? accent : card;
-    ctx.lineWidth = 1.5;
-    disc(ctx, x(place.x_mm), level - 10, 4);
-    ctx.fill();
-    ctx.stroke();
-  }
-  const next = calibration.next;
-  if (next === null) return;
+/** An arrow at the place to be pressed next. */
+function drawNext(ctx: CanvasRenderingContext2D, next: PlaceRecord, x: (mm: number) => number, level: number): void {
   const px = x(next.x_mm);
   drawArrow(ctx, px, level - 16, 36);
-  label(ctx, `${next.x_mm.toFixed(1)} mm`, px, level - 56, ink);
+  label(ctx, `${next.x_mm.toFixed(1)} mm`, px, level - 56, palette().ink);
 }
 
 function drawContact({ ctx, height }: Frame, shown: Shown, x: (mm: number) => number, level: number, shape: (px: number) => number): void {

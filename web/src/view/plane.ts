@@ -1,11 +1,12 @@
 // A surface of two directions from above: sensors, and contacts with their 95 % regions.
 
-import type { CalibrationRecord, ContactRecord } from "../protocol";
+import type { ContactRecord, PlaceRecord } from "../protocol";
 import { fit, linear, ticks } from "../model/scale";
 import { isPlaced, number } from "../words";
 import { disc, segment, type Frame } from "./canvas";
 import { palette } from "./palette";
 import type { Shown } from "./surface";
+import { drawTargets } from "./targets";
 
 const MARGIN = { left: 44, right: 16, top: 14, bottom: 30 };
 /** The radius that holds 95 % of a normal distribution in the plane, in standard deviations: √(−2 ln 0.05). */
@@ -37,7 +38,10 @@ export function drawPlane({ ctx, width, height }: Frame, shown: Shown): void {
   ctx.font = palette().font;
   drawFrame(ctx, place, length, across, perUnit);
   drawSensors(ctx, shown, place);
-  if (shown.calibration !== null) drawTargets(ctx, shown.calibration, place);
+  if (shown.calibration !== null) {
+    drawTargets(ctx, shown.calibration, (target) => [place.x(target.x_mm), place.y(target.y_mm ?? 0)]);
+    if (shown.calibration.next !== null) drawNext(ctx, shown.calibration.next, place);
+  }
   drawTrail(ctx, shown, place);
   const sample = shown.sample;
   if (sample === null || !isPlaced(sample.status)) return;
@@ -90,19 +94,9 @@ function drawSensors(ctx: CanvasRenderingContext2D, shown: Shown, { x, y }: Plac
   }
 }
 
-/** Places of a calibration: hollow while presses are left, full when all were taken, and a cross in a ring at the next one. */
-function drawTargets(ctx: CanvasRenderingContext2D, calibration: CalibrationRecord, { x, y }: Place): void {
-  const { accent, card, contact, ink } = palette();
-  ctx.lineWidth = 1.5;
-  for (const place of calibration.places) {
-    ctx.strokeStyle = accent;
-    ctx.fillStyle = place.left === 0 ? accent : card;
-    disc(ctx, x(place.x_mm), y(place.y_mm ?? 0), 4);
-    ctx.fill();
-    ctx.stroke();
-  }
-  const next = calibration.next;
-  if (next === null) return;
+/** A cross in a ring at the place to be pressed next. */
+function drawNext(ctx: CanvasRenderingContext2D, next: PlaceRecord, { x, y }: Place): void {
+  const { contact, ink } = palette();
   const [px, py] = [x(next.x_mm), y(next.y_mm ?? 0)];
   ctx.strokeStyle = contact;
   ctx.lineWidth = 2.5;

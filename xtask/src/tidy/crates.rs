@@ -5,9 +5,9 @@ use super::project::{Crate, Project};
 
 /// Top to bottom: a crate may depend on those above it.
 const ORDER: [&str; 15] = [
-    "palpate-testing",
     "palpate-core",
     "palpate-numerics",
+    "palpate-testing",
     "palpate-mechanics",
     "palpate-estimators",
     "palpate-design",

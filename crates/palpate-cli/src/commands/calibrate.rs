@@ -7,8 +7,8 @@ use crate::target::{Inputs, Target};
 use crate::{input, output};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::calibration::{
-    self, Calibration, CalibrationError, DepthKnowledge, Journal, JournalError, Machine, MachineError,
-    MachineNote, Note, PlanError, Press, Waiting,
+    self, Assessment, Calibration, CalibrationError, DepthKnowledge, Journal, JournalError, Machine,
+    MachineError, MachineNote, Note, Press, Waiting,
 };
 use palpate_live::input::Input;
 use palpate_live::pipeline::WAITING;
@@ -17,6 +17,7 @@ use palpate_live::stage::{StageThread, StageUrl};
 use palpate_live::stamp::HostClock;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_length_mm;
+use palpate_numerics::watch::Cancelled;
 use palpate_rig::{Rig, Stage};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel, sync_channel};
@@ -66,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let journal = journal(arguments, &rig, stage.as_ref())?;
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
     let plan = calibration::plan(&rig, arguments.force, depths_m, journal.rows())
-        .map_err(|error| about_plan(&arguments.rig, error))?;
+        .map_err(|error| Complaint::about(&arguments.rig, error))?;
     if let Some(press) = plan.first() {
         let extent = rig.setup.surface().extent();
         remark!("{} presses to go; the first at {}", plan.len(), place(*press, extent));
@@ -121,21 +122,13 @@ pub fn pressed_for(rig: &Path) -> String {
     format!("palpate {}, pressed for {}", env!("CARGO_PKG_VERSION"), rig.display())
 }
 
-/// A complaint about a rig that does not say where to press.
-pub fn about_plan(rig: &Path, error: PlanError) -> Failure {
-    Complaint::about(rig, error).into()
-}
-
 /// A complaint about presses that cannot be kept.
 pub fn about_journal(rig: &Path, error: &JournalError) -> Failure {
     let complaint = match error {
         JournalError::Nuisance { .. } | JournalError::Numbered => Complaint::about(rig, error),
         _ => Complaint::new(error),
     };
-    match error.help() {
-        Some(help) => complaint.help(help).into(),
-        None => complaint.into(),
-    }
+    complaint.help(error.help()).into()
 }
 
 /// Presses of a plan, guided; those that are taken are on disk.
@@ -347,22 +340,24 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure>
     let locator =
         observer.watch(|watch| rig.estimator.fit_task(task.watch(watch))).map_err(|error| failed(&error))?;
     out.write(locator.to_json().map_err(Complaint::new)?.as_bytes())?;
-    let assessment =
-        observer.watch(|watch| calibration::Assessment::new(rig, &recording, arguments.seed, watch));
-    let presses = assessment.presses;
+    let presses = recording.touched().rows.len();
     output::say(format!("{} fitted to {presses} presses: {}", locator.kind(), arguments.out.display()))?;
+    let assessment = observer
+        .watch(|watch| Assessment::new(rig, &recording, arguments.seed, watch))
+        .map_err(|Cancelled| Failure::Interrupted("stopped before its error was estimated".to_owned()))?;
     if let Some(held_out) = assessment.held_out {
         let (median, mean) = (format_length_mm(held_out.median_m), format_length_mm(held_out.mean_m));
         let folds = held_out.folds;
         output::say(format!("error at positions held out ({folds} folds): median {median}, mean {mean}"))?;
     }
     assessment.remarks.iter().for_each(|remark| remark!("{remark}"));
-    match assessment.gain_percent {
-        _ if assessment.is_enough => {
-            output::say("more presses would lower the error by less than 5 %".to_owned())
+    match assessment.gain {
+        Some(gain) if gain.is_enough() => {
+            output::say(format!("more presses would lower the error by less than {} %", gain.stop_percent))
         }
         Some(gain) => output::say(format!(
-            "endlessly many more presses would lower the expected error by {gain:.0} %: `palpate design positions {} --data {}` says where",
+            "endlessly many more presses would lower the expected error by {:.0} %: `palpate design positions {} --data {}` says where",
+            gain.percent,
             arguments.rig.display(),
             arguments.presses.display()
         )),

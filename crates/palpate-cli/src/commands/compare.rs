@@ -176,7 +176,10 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
             Some(_) => "",
             None => " by the force of the presses, half and twice that in turn",
         };
-        let how = format!("{calibrations} simulated calibrations, judged at {judged} positions each{forces}");
+        let plural = if calibrations == 1 { "" } else { "s" };
+        let how = format!(
+            "{calibrations} simulated calibration{plural}, judged at {judged} positions each{forces}"
+        );
         return Ok(Trials { data: "simulation".to_owned(), source: how.clone(), how, trials });
     };
     let recording = recording.in_order();

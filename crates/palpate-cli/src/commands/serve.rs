@@ -1,6 +1,6 @@
 //! `palpate serve`: a session that browsers follow.
 
-use super::calibrate::{about_journal, about_plan, pressed_for};
+use super::calibrate::{about_journal, pressed_for};
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RigOrLocator};
 use crate::progress::{self, Observer};
@@ -162,7 +162,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     let rig = input::read_rig(path)?;
     let before = if presses.exists() { input::read_recording(&rig.setup, presses)?.rows } else { Vec::new() };
     // What cannot be calibrated is refused here, where the place in the file can be shown.
-    plan(&rig, arguments.force, &[], &before).map_err(|error| about_plan(path, error))?;
+    plan(&rig, arguments.force, &[], &before).map_err(|error| Complaint::about(path, error))?;
     let comment = pressed_for(path);
     Journal::new(&rig.setup, presses, comment.clone(), Vec::new(), DepthKnowledge::Unknown)
         .map_err(|error| about_journal(path, &error))?;

@@ -2,19 +2,19 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::Stdio;
 
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{Evaluation, limit_ratio};
 use palpate_rig::Rig;
 
-use crate::support::command::{complained, palpate, said};
+use crate::support::command::{Running, complained, palpate, said};
 
 const RIG: &str = include_str!("../../../../examples/fsi-like.toml");
 
 /// A board and its machine, both behind TCP, until it is dropped.
 struct Bench {
-    child: Child,
+    _board: Running,
     from: String,
     stage: String,
 }
@@ -32,7 +32,7 @@ impl Bench {
         let stage = lines.next().expect("the place of the machine");
         let from = lines.next().expect("the place of the board");
         let stage = format!("gcode:{}", stage.rsplit(' ').next().unwrap());
-        Self { child, from, stage }
+        Self { _board: Running(child), from, stage }
     }
 
     fn calibrate(&self, folder: &Path, more: &[&str]) -> std::process::Command {
@@ -40,13 +40,6 @@ impl Bench {
         command.args(["calibrate", "rig.toml", "--from", &self.from, "--stage", &self.stage]);
         command.args(["--presses", "presses.csv", "--out", "locator.json"]).args(more);
         command
-    }
-}
-
-impl Drop for Bench {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 

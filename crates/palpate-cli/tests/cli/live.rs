@@ -1,12 +1,11 @@
 //! `record`, `replay` and `simulated-board` from outside: what is recorded is located again, and a killed process leaves a file that opens.
 
-use crate::support::command::{complained, folder, palpate, run, said};
+use crate::support::command::{Running, complained, folder, palpate, run, said};
 use crate::support::examples::NOISY_BEAM;
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -53,25 +52,20 @@ fn a_recording_is_located_again_to_the_last_bit() {
     assert!(refused.contains("press.mcap: it is there already"), "{refused}");
 }
 
-/// Begins to record with lines of JSON on stdout.
-fn begin(folder: &Path) -> Child {
-    let arguments = ["record", "locator.json", "--from", BOARD, "--out", "press.mcap", "--json"];
-    palpate(folder).args(arguments).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
-}
-
 #[test]
 fn a_killed_process_loses_the_last_tenth_of_a_second_at_most() {
     let folder = bench();
-    let mut child = begin(folder.path());
-    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mut record = palpate(folder.path());
+    record.args(["record", "locator.json", "--from", BOARD, "--out", "press.mcap", "--json"]);
+    let mut recorder = Running(record.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap());
+    let mut lines = BufReader::new(recorder.0.stdout.take().unwrap()).lines();
     let start = Instant::now();
     let mut told = Vec::new();
     while start.elapsed() < Duration::from_secs(2) || told.len() < 1000 {
         told.push(lines.next().unwrap().unwrap());
     }
     // SIGKILL: nothing of the process runs any more.
-    child.kill().unwrap();
-    child.wait().unwrap();
+    drop(recorder);
     told.extend(lines.map_while(Result::ok));
     // The last line may be torn.
     let last = told.iter().rev().find_map(|line| serde_json::from_str::<Value>(line).ok()).unwrap();
@@ -85,17 +79,14 @@ fn a_killed_process_loses_the_last_tenth_of_a_second_at_most() {
 #[test]
 fn a_board_over_tcp_is_recorded_with_its_faults() {
     let folder = bench();
-    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-    let to = format!("tcp://:{port}");
-    let arguments =
-        ["simulated-board", "rig.toml", "--to", &to, "--rate", "500 Hz", "--drop", "0.02", "--torn", "0.02"];
-    let mut board =
-        palpate(folder.path()).args(arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let from = format!("tcp://127.0.0.1:{port}");
+    let arguments = ["simulated-board", "rig.toml", "--rate", "500 Hz", "--drop", "0.02", "--torn", "0.02"];
+    let mut board = palpate(folder.path());
+    board.args(arguments).args(["--to", "tcp://:0"]).stderr(Stdio::piped());
+    let mut board = Running(board.spawn().unwrap());
+    let mut words = BufReader::new(board.0.stderr.take().unwrap()).lines().map(Result::unwrap);
+    let from = words.next().expect("the place of the board");
     let record = ["record", "locator.json", "--from", &from, "--out", "press.mcap", "--seconds", "3"];
     let told = said(&run(folder.path(), &record));
-    board.kill().unwrap();
-    board.wait().unwrap();
     let number = |after: &str| -> u64 {
         let end = told.find(after).unwrap();
         let text = told[..end].trim_end().rsplit(' ').next().unwrap();

@@ -40,7 +40,10 @@ impl LearntInfluence<'_, '_> {
     }
 }
 
-/// What is done with the learnt influence function of a sensor, whose number comes first.
+/// Nodes of a table that are filled between two looks whether to go on.
+pub(super) const NODES_EACH: usize = 16;
+
+/// Consumer of the learnt influence function of a sensor, whose number comes first.
 pub(super) type Take<'t> = dyn FnMut(usize, &LearntInfluence) -> Result<(), Cancelled> + 't;
 
 /// Learns the influence functions of all living sensors at `places`, and hands each, with the sensor's number, to `take`.

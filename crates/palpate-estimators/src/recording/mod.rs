@@ -163,7 +163,7 @@ impl Recording {
         positions
     }
 
-    /// Whether forces were recorded, but so few rows repeat a place or are untouched that they hardly tell the noise of influence functions.
+    /// True for presses with forces of which too few repeat a place or are untouched to tell the noise of influence functions.
     pub fn hardly_tells_noise(&self) -> bool {
         let spare = self.rows.len().saturating_sub(self.distinct_positions().len() + 1);
         self.rows.iter().all(|row| row.force_n.is_some()) && spare as f64 <= LEAST_FREEDOM

@@ -1,8 +1,7 @@
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use super::*;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::Motion;
+use palpate_testing::stopping::stopped_at_every_look;
 
 use crate::fixtures::{
     Example, along_the_beam, faulty_paper, moving_beam, moving_plate, over_the_plate, paper, plate, strip,
@@ -130,29 +129,15 @@ fn sensors_sit_beside_their_places_by_no_more_than_they_may() {
     assert!(largest <= 5e-4 && largest > 4.9e-4 && mean.abs() < 5e-5, "{largest} {mean}");
 }
 
-/// Does `work` under watches that stop it at its first look, at its second and so on, and gives what it makes when nothing stops it.
-fn stopped_everywhere<T>(mut work: impl FnMut(Watch) -> Result<T, SimulateError>) -> T {
-    for n in 0.. {
-        let looks = AtomicUsize::new(0);
-        let watch = |_| looks.fetch_add(1, Ordering::Relaxed) < n;
-        match work(Watch::new(&watch)) {
-            Ok(made) => return made,
-            Err(error) => assert!(Cancelled::caused(&error), "{n}: {error}"),
-        }
-        assert_eq!(looks.into_inner(), n + 1, "it went on");
-    }
-    unreachable!("it never ends")
-}
-
 #[test]
 fn simulations_stop_at_any_look_and_are_otherwise_the_same() {
     let plate = plate(6, ChannelModel { noise_sd: 1e-6, position_error_m: 1e-3, ..ChannelModel::default() });
     for Example { setup, training } in [noisy(), plate] {
-        let made =
-            stopped_everywhere(|watch| setup.simulate_watched(&training.clone().repeated(60), 3, watch));
+        let (made, _) =
+            stopped_at_every_look(|watch| setup.simulate_watched(&training.clone().repeated(60), 3, watch));
         assert_eq!(made, setup.simulate(&training.repeated(60), 3).unwrap());
         let loads = [UniformLoad::along(0.05, 0.09, 2.0)];
-        let made = stopped_everywhere(|watch| simulate_loads_watched(&setup, &loads, 600, 3, watch));
+        let (made, _) = stopped_at_every_look(|watch| simulate_loads_watched(&setup, &loads, 600, 3, watch));
         assert_eq!(made, simulate_loads(&setup, &loads, 600, 3).unwrap());
     }
     for Example { setup, .. } in [moving_beam(), moving_plate()] {
@@ -165,7 +150,7 @@ fn simulations_stop_at_any_look_and_are_otherwise_the_same() {
             rate_hz: 1000.0,
         };
         let setup = setup.with_force(Some(3.0)).unwrap();
-        let made = stopped_everywhere(|watch| simulate_moving_watched(&setup, &moving, 3, watch));
+        let (made, _) = stopped_at_every_look(|watch| simulate_moving_watched(&setup, &moving, 3, watch));
         assert_eq!(made, simulate_moving(&setup, &moving, 3).unwrap());
     }
 }

@@ -1,10 +1,10 @@
-//! How good a calibration is, and what more presses would gain.
+//! Assessment of a calibration: its error at positions held out, and the gain of more presses.
 
 use palpate_design::positions::{PositionDesign, next_press};
 use palpate_estimators::evaluation::cross_validate;
 use palpate_estimators::fit::FitTask;
 use palpate_estimators::recording::Recording;
-use palpate_numerics::watch::Watch;
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::Rig;
 
 /// Folds of the cross-validation.
@@ -21,32 +21,41 @@ pub struct HeldOut {
     pub mean_m: f64,
 }
 
+/// Gain of more presses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gain {
+    /// By how much endlessly many presses would lower the expected error, in %.
+    pub percent: f64,
+    /// Gain in % below which more presses are not worth it.
+    pub stop_percent: f64,
+}
+
+impl Gain {
+    /// True where more presses are not worth it.
+    pub fn is_enough(&self) -> bool {
+        self.percent < self.stop_percent
+    }
+}
+
 /// Assessment of a calibration.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Assessment {
-    /// Presses of the recording.
-    pub presses: usize,
     /// Errors at positions held out; `None` where they are too few, or a fold cannot be fitted.
     pub held_out: Option<HeldOut>,
-    /// By how much endlessly many presses would lower the expected error, in %; `None` where that is not known.
-    pub gain_percent: Option<f64>,
-    /// Whether that is too little to go on.
-    pub is_enough: bool,
+    /// Gain of more presses; `None` where it is not known.
+    pub gain: Option<Gain>,
     /// Reasons why something is not known.
     pub remarks: Vec<String>,
 }
 
 impl Assessment {
     /// The assessment of a recording of a rig, which fits its estimator anew for every fold.
-    pub fn new(rig: &Rig, recording: &Recording, seed: u64, watch: Watch) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch stopped it.
+    pub fn new(rig: &Rig, recording: &Recording, seed: u64, watch: Watch) -> Result<Self, Cancelled> {
+        let mut own = Self::default();
         let touched = recording.touched();
-        let mut own = Self {
-            presses: touched.rows.len(),
-            held_out: None,
-            gain_percent: None,
-            is_enough: false,
-            remarks: Vec::new(),
-        };
         if touched.distinct_positions().len() >= FOLDS {
             let task = FitTask::new(&rig.setup, recording).seed(seed).watch(watch);
             match cross_validate(&rig.estimator, task, FOLDS) {
@@ -57,17 +66,19 @@ impl Assessment {
                         mean_m: summary.average_m,
                     });
                 }
+                Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
                 Err(error) => own.remarks.push(format!("no error at positions held out: {error}")),
             }
         }
         let design = rig.training.as_ref().map_or_else(PositionDesign::default, PositionDesign::for_training);
         match next_press(&rig.setup, &touched, &design, watch) {
             Ok(advice) => {
-                own.gain_percent = Some(advice.remaining_gain_percent());
-                own.is_enough = advice.is_enough();
+                let percent = advice.remaining_gain_percent();
+                own.gain = Some(Gain { percent, stop_percent: advice.stop_percent });
             }
+            Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
             Err(error) => own.remarks.push(format!("no advice on more presses: {error}")),
         }
-        own
+        Ok(own)
     }
 }

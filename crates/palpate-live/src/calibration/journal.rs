@@ -1,9 +1,9 @@
 //! The file of the presses of a calibration.
 
-use palpate_estimators::recording::{self, Column, Columns, CsvError, Recording, Row};
+use crate::whole_file;
+use palpate_estimators::recording::{self, Column, Columns, Recording, Row};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::units::Dimension;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Presses so far, and the file that has them.
@@ -38,29 +38,17 @@ pub enum JournalError {
         /// Why.
         error: std::io::Error,
     },
-    /// The file cannot be read again.
-    #[error("cannot read {}: {error}", path.display())]
-    Open {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        error: std::io::Error,
-    },
-    /// The file is not a recording of the bench.
-    #[error(transparent)]
-    Read(#[from] CsvError),
 }
 
 impl JournalError {
     /// The remedy.
-    pub fn help(&self) -> Option<&'static str> {
+    pub fn help(&self) -> &'static str {
         match self {
             Self::Nuisance { .. } => {
-                Some("leave `nuisance` out of [recording], or record with a program of your own")
+                "leave `nuisance` out of [recording], or record with a program of your own"
             }
-            Self::Numbered => Some("name the channels of [recording] instead of counting them"),
-            Self::Write { .. } => Some("make room, or name another file"),
-            Self::Open { .. } | Self::Read(_) => None,
+            Self::Numbered => "name the channels of [recording] instead of counting them",
+            Self::Write { .. } => "make room, or name another file",
         }
     }
 }
@@ -129,16 +117,6 @@ impl Journal {
         Ok(())
     }
 
-    /// The recording as its file has it.
-    ///
-    /// # Errors
-    /// [`JournalError`] for a file that is gone, or was changed meanwhile.
-    pub fn recording(&self) -> Result<Recording, JournalError> {
-        let bytes = std::fs::read(&self.path)
-            .map_err(|error| JournalError::Open { path: self.path.clone(), error })?;
-        Ok(self.setup.read_recording(&self.path.display().to_string(), bytes.as_slice())?)
-    }
-
     fn save(&self) -> Result<(), JournalError> {
         let mut rows = self.rows.clone();
         // An untouched row is told from a press by its force, where presses have one.
@@ -148,7 +126,7 @@ impl Journal {
         let recording = Recording::new(self.setup.layout(), "calibration", rows);
         let mut csv = Vec::new();
         recording::write_as(&recording, &self.columns, &self.comment, &mut csv)
-            .and_then(|()| replace(&self.path, &csv))
+            .and_then(|()| whole_file::write(&self.path, &csv))
             .map_err(|error| JournalError::Write { path: self.path.clone(), error })
     }
 }
@@ -160,19 +138,6 @@ pub enum DepthKnowledge {
     Known,
     /// A hand presses.
     Unknown,
-}
-
-/// Writes a file under a temporary name and renames it, so that a process that is killed leaves the presses of before or those of now. Both are on
-/// the disk before the next press is asked for.
-pub(crate) fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".part");
-    let part = path.with_file_name(name);
-    let mut file = std::fs::File::create(&part)?;
-    file.write_all(bytes)?;
-    file.sync_all()?;
-    drop(file);
-    std::fs::rename(&part, path)
 }
 
 /// The columns of the file of presses: those that the rig reads.

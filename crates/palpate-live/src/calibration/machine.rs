@@ -37,7 +37,7 @@ pub enum MachineError {
         /// The limit.
         limit_n: f64,
     },
-    /// Nothing was read.
+    /// Readings that stay away.
     #[error("no reading came for {} s: the machine was stopped", SILENT.as_secs())]
     Silent,
     /// Somebody stopped it.
@@ -53,7 +53,7 @@ pub enum MachineError {
     NoRest,
 }
 
-/// What a machine does, in words for people.
+/// Step of a machine that people are told of.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MachineNote {
     /// It looks for its end stops.
@@ -68,7 +68,7 @@ pub enum MachineNote {
 enum State {
     /// It waits for the first reading: nothing moves unseen.
     Blind,
-    /// It moves; what follows then.
+    /// It moves.
     Moving,
     Up,
     Down,

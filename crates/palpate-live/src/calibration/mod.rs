@@ -2,7 +2,7 @@
 //!
 //! The [`Guide`] is told readings with their instants and says what it waits for; it touches no device, file or clock. A [`Calibration`] feeds it with
 //! what a source brings, and keeps every press in the file of a [`Journal`] before the next one is asked for. A [`Machine`] presses where a
-//! person would; an [`Assessment`] says how good the outcome is.
+//! person would; an [`Assessment`] tells the error of the outcome, and the gain of more presses.
 
 mod assessment;
 mod guide;
@@ -13,9 +13,8 @@ mod repeats;
 mod run;
 mod settling;
 
-pub use assessment::{Assessment, HeldOut};
+pub use assessment::{Assessment, Gain, HeldOut};
 pub use guide::{Guide, Press, Progress, Waiting};
-pub(crate) use journal::replace;
 pub use journal::{DepthKnowledge, Journal, JournalError};
 pub use machine::{Machine, MachineError, MachineNote};
 pub use plan::{PlanError, plan};

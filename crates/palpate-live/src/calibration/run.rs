@@ -1,4 +1,4 @@
-//! A calibration that runs: what a source brings goes in, rows on disk and notes come out.
+//! A calibration in progress: arrivals of a source in, rows on disk and notes out.
 
 use super::guide::{Guide, Press, Progress, Waiting};
 use super::journal::{Journal, JournalError};
@@ -29,7 +29,7 @@ pub enum CalibrationError {
     },
 }
 
-/// What happened.
+/// Note on what a calibration has read or done.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Note {
     /// The source is there; its name.
@@ -70,7 +70,7 @@ pub struct Calibration {
     bad: BTreeMap<BadFrame, u64>,
     readings: u64,
     last: Vec<f64>,
-    /// Whether readings are shown to the guide: not while a machine moves.
+    /// True while readings are shown to the guide: not while a machine moves.
     is_guided: bool,
 }
 

@@ -2,16 +2,18 @@
 
 use crate::calibration::{
     Assessment, Calibration, CalibrationError, DepthKnowledge, Journal, JournalError, Note, PlanError, Press,
-    Waiting, last_deviation_percent, places, plan, replace,
+    Waiting, last_deviation_percent, places, plan,
 };
 use crate::frame::{Channel, ColumnsError};
 use crate::input::Input;
 use crate::pipeline::WAITING;
 use crate::source::{Source, SourceError, SourceUrl};
 use crate::stamp::HostClock;
+use crate::whole_file;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::recording::Row;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
@@ -22,7 +24,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// What is to be calibrated, from which source, and where the outcome goes.
+/// Plan of a calibration: rig, source of the readings, files of the outcome.
 #[derive(Debug)]
 pub struct CalibrationPlan {
     /// The rig.
@@ -139,7 +141,7 @@ struct OutcomeRecord {
     median_mm: Option<f64>,
     mean_mm: Option<f64>,
     gain_percent: Option<f64>,
-    is_enough: bool,
+    stop_percent: Option<f64>,
     remarks: Vec<String>,
 }
 
@@ -175,11 +177,6 @@ struct Shared {
     problem: Option<String>,
 }
 
-/// Presses to fit.
-pub struct Presses {
-    rows: Vec<Row>,
-}
-
 impl Calibrator {
     /// A calibration that has not begun.
     pub fn new(mut plan: CalibrationPlan) -> Self {
@@ -188,7 +185,7 @@ impl Calibrator {
         Self { channels: Channel::all_of(&plan.rig.setup), plan, state: Mutex::new(state) }
     }
 
-    /// What is calibrated.
+    /// The plan.
     pub fn plan(&self) -> &CalibrationPlan {
         &self.plan
     }
@@ -275,7 +272,7 @@ impl Calibrator {
     ///
     /// # Errors
     /// [`CalibratorError::NoPress`], or [`CalibratorError::GoesOn`] where they are fitted already.
-    pub fn begin_fit(&self) -> Result<Presses, CalibratorError> {
+    pub fn begin_fit(&self) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if matches!(state.phase(), Phase::Fitting | Phase::Assessing) {
             return Err(CalibratorError::GoesOn);
@@ -286,12 +283,12 @@ impl Calibrator {
             return Err(CalibratorError::NoPress);
         }
         (state.phase, state.problem) = (Phase::Fitting, None);
-        Ok(Presses { rows: state.rows.clone() })
+        Ok(())
     }
 
-    /// Fits presses, writes the locator, has a session `begin` with it, and assesses it.
-    pub fn fit(&self, presses: &Presses, begin: impl FnOnce(Locator) -> Result<(), String>) {
-        let outcome = self.try_to_fit(presses, begin);
+    /// Fits the presses on disk, writes the locator, has a session `begin` with it, and assesses it.
+    pub fn fit(&self, begin: impl FnOnce(Locator) -> Result<(), String>) {
+        let outcome = self.try_to_fit(begin);
         let mut state = self.lock();
         match outcome {
             Ok(outcome) => {
@@ -301,31 +298,30 @@ impl Calibrator {
         }
     }
 
-    fn try_to_fit(
-        &self,
-        presses: &Presses,
-        begin: impl FnOnce(Locator) -> Result<(), String>,
-    ) -> Result<OutcomeRecord, String> {
-        let CalibrationPlan { rig, presses: path, comment, seed, out, .. } = &self.plan;
-        let journal =
-            Journal::new(&rig.setup, path, comment.clone(), presses.rows.clone(), DepthKnowledge::Unknown);
-        let recording = journal.and_then(|journal| journal.recording()).map_err(|error| error.to_string())?;
+    fn try_to_fit(&self, begin: impl FnOnce(Locator) -> Result<(), String>) -> Result<OutcomeRecord, String> {
+        let CalibrationPlan { rig, presses, seed, out, .. } = &self.plan;
+        let name = presses.display().to_string();
+        let bytes = std::fs::read(presses).map_err(|error| format!("cannot read {name}: {error}"))?;
+        let recording =
+            rig.setup.read_recording(&name, bytes.as_slice()).map_err(|error| error.to_string())?;
         let task = FitTask::new(&rig.setup, &recording).seed(*seed);
         let locator = rig.estimator.fit_task(task).map_err(|error| error.to_string())?;
         let json = locator.to_json().map_err(|error| error.to_string())?;
-        replace(out, json.as_bytes()).map_err(|error| format!("cannot write {}: {error}", out.display()))?;
+        whole_file::write(out, json.as_bytes())
+            .map_err(|error| format!("cannot write {}: {error}", out.display()))?;
         begin(locator)?;
         self.lock().phase = Phase::Assessing;
-        let assessment = Assessment::new(rig, &recording, *seed, Watch::NONE);
+        let assessment =
+            Assessment::new(rig, &recording, *seed, Watch::NONE).map_err(|error| error.to_string())?;
         let held_out = assessment.held_out;
         Ok(OutcomeRecord {
             locator: out.display().to_string(),
-            presses: assessment.presses,
+            presses: recording.touched().rows.len(),
             folds: held_out.map(|held_out| held_out.folds),
             median_mm: held_out.map(|held_out| held_out.median_m * 1e3),
             mean_mm: held_out.map(|held_out| held_out.mean_m * 1e3),
-            gain_percent: assessment.gain_percent,
-            is_enough: assessment.is_enough,
+            gain_percent: assessment.gain.map(|gain| gain.percent),
+            stop_percent: assessment.gain.map(|gain| gain.stop_percent),
             remarks: assessment.remarks,
         })
     }
@@ -377,7 +373,7 @@ impl Calibrator {
         tell_places(calibration.journal().rows(), to_come, extent, record);
         record.next = next.map(|(_, press)| PlaceRecord {
             force_n: press.force_n,
-            ..PlaceRecord::at(press.position, extent)
+            ..PlaceRecord::of_position(press.position, extent)
         });
         record.last_percent = shared.last_percent;
         record.source.clone_from(&shared.source);
@@ -418,7 +414,7 @@ impl State {
 }
 
 impl PlaceRecord {
-    fn at(position: palpate_mechanics::contact::Position, extent: Extent) -> Self {
+    fn of_position(position: Position, extent: Extent) -> Self {
         let y_mm = extent.width_m().map(|_| position.y_m * 1e3);
         Self { x_mm: position.x_m * 1e3, y_mm, ..Self::default() }
     }
@@ -433,7 +429,7 @@ fn tell_places(rows: &[Row], to_come: &[Press], extent: Extent, record: &mut Cal
             taken: place.taken,
             left: place.left,
             spread_percent: place.spread_percent,
-            ..PlaceRecord::at(place.position, extent)
+            ..PlaceRecord::of_position(place.position, extent)
         })
         .collect();
 }

@@ -275,13 +275,13 @@ impl Live {
     /// [`LiveError`] where no press was taken, or a fit goes on already.
     pub(super) fn finish_calibration(self: &Arc<Self>) -> Result<(), LiveError> {
         let calibrator = self.calibrator()?;
-        let fit = calibrator.begin_fit()?;
+        calibrator.begin_fit()?;
         let live = Arc::clone(self);
         std::thread::Builder::new().name("fit".to_owned()).spawn(move || {
             let Ok(calibrator) = live.calibrator() else { return };
             let url = calibrator.plan().from.clone();
             let name = calibrator.plan().out_name();
-            calibrator.fit(&fit, |locator| {
+            calibrator.fit(|locator| {
                 let subject = Subject::of_locator(locator, &name, false);
                 *live.subject.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(subject);
                 live.begin(&url).map_err(|error| error.to_string())

@@ -30,32 +30,23 @@ pub struct SessionInfo {
     source: Option<String>,
     recording: Option<Value>,
     has_simulated: bool,
-    /// Whether the server has a calibration, which `/api/calibration` tells.
+    /// True where the server has a calibration, which `/api/calibration` tells.
     calibrates: bool,
 }
 
 impl SessionInfo {
     /// The description of sessions of a locator of this name.
     pub fn new(locator: &Locator, name: &str, has_simulated: bool) -> Self {
-        let setup = &locator.setup;
-        let known_n = setup.force_n();
-        let baseline = locator.tare();
         let description = description::locator(locator);
         Self {
-            version: env!("CARGO_PKG_VERSION"),
             locator: Some(json!({ "name": name, "kind": locator.kind(), "description": description })),
-            surface: surface(setup.surface()),
-            channels: channels(setup),
-            force: json!({ "known_n": known_n, "unknown": known_n.is_none() }),
-            tare: match &baseline {
+            tare: match locator.tare() {
                 Ok(_) => json!({ "available": true, "follows": locator.false_alarm_rate().is_some() }),
                 Err(why) => json!({ "available": false, "follows": false, "why": why.to_string() }),
             },
             limit: limit(locator),
-            source: None,
-            recording: None,
             has_simulated,
-            calibrates: false,
+            ..Self::of_setup(&locator.setup)
         }
     }
 

@@ -1,4 +1,4 @@
-//! The thread of a machine: what it is asked for, and the stop that is heeded whatever it does.
+//! The thread of a machine: orders to it, and the stop that it heeds whatever it does.
 
 use super::gcode::{Firmware, GcodeStage, StageError, StageLink};
 use super::url::StageUrl;

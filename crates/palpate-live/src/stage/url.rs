@@ -1,4 +1,4 @@
-//! `gcode:serial:///dev/ttyUSB0?baud=115200` and `gcode:tcp://host:port`: where a machine is.
+//! URLs of machines: `gcode:serial:///dev/ttyUSB0?baud=115200` and `gcode:tcp://host:port`.
 
 use super::gcode::StageLink;
 use crate::source::{Address, SourceUrl};
@@ -37,7 +37,7 @@ pub enum StageUrl {
 pub struct StageUrlError {
     /// The text.
     pub text: String,
-    /// What is wrong with it, from `: ` on, where more is known.
+    /// Its problem, from `: ` on, where more is known.
     pub problem: String,
 }
 

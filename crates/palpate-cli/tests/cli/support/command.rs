@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::Value;
 use tempfile::TempDir;
@@ -20,6 +20,16 @@ pub fn palpate(folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
     command.current_dir(folder).env("NO_COLOR", "1").stdin(Stdio::null());
     command
+}
+
+/// A process that is killed when it is dropped.
+pub struct Running(pub Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }
 
 /// Runs it to its end.

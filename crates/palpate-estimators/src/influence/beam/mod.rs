@@ -17,12 +17,9 @@ pub use search::Scratch;
 pub use table::{FittedInfluence, InfluenceTable};
 
 use super::config::{Influence, InfluenceFitError};
-use super::learning::{LearntInfluence, learn};
+use super::learning::{LearntInfluence, NODES_EACH, learn};
 use crate::fit::FitTask;
 use palpate_mechanics::contact::Position;
-
-/// Nodes that are filled between two looks whether to go on.
-const NODES_EACH: usize = 16;
 
 /// Fits the influence functions of a line with a model.
 pub(super) fn fit(config: Influence, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {

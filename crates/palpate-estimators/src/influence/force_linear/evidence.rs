@@ -120,15 +120,15 @@ pub(super) struct Evidence<'a> {
     /// Readings of the presses by a source of unit amplitude at each place.
     sources: Array2<f64>,
     repeats: RepeatedNoise,
-    expected: Vec<ExpectedNoise>,
+    noise_priors: Vec<NoisePrior>,
 }
 
-/// What is expected of a channel's noise before anything is known of its scatter.
+/// Prior of a channel's noise.
 ///
 /// As many presses as coefficients are explained without any noise: what they leave open is filled with what boards are like. Their
 /// noise is about a hundredth of what presses change, give or take a factor of three, with heavy tails (Student's t of one degree of
 /// freedom), as there are boards far better and far worse; and it is no less than rounding.
-struct ExpectedNoise {
+struct NoisePrior {
     /// Mean square of the changes.
     changes: f64,
     rounding: f64,
@@ -136,7 +136,7 @@ struct ExpectedNoise {
     weight: f64,
 }
 
-impl ExpectedNoise {
+impl NoisePrior {
     fn of_channels(presses: &Presses) -> Vec<Self> {
         let channel = |c: usize| {
             let (_, changes) = mean_and_variance(presses.means.column(c).iter().copied());
@@ -227,7 +227,7 @@ impl<'a> Evidence<'a> {
             effects: prior.effects(presses),
             sources: prior.sources(presses, sensors_m),
             repeats: RepeatedNoise::new(presses, prior),
-            expected: ExpectedNoise::of_channels(presses),
+            noise_priors: NoisePrior::of_channels(presses),
         }
     }
 
@@ -289,8 +289,8 @@ impl<'a> Evidence<'a> {
             .map(|c| {
                 let fit =
                     self.channel(&restricted, ratio, c, &white.column(c), (&sources, &products.column(c)));
-                let expected = self.expected[c].log_density(fit.noise_variance());
-                ChannelFit { evidence: fit.evidence + expected, ..fit }
+                let of_noise = self.noise_priors[c].log_density(fit.noise_variance());
+                ChannelFit { evidence: fit.evidence + of_noise, ..fit }
             })
             .collect::<Vec<_>>();
         fits.iter().all(|fit| fit.evidence.is_finite()).then_some(fits)

@@ -148,7 +148,7 @@ pub struct ForceLinearLocator {
     noise_bound: f64,
     /// The most that a contact takes off the square of noise alone.
     detection_bound: f64,
-    /// Whether open offsets do not hide contacts.
+    /// True where offsets are known well enough to tell an untouched board from contacts.
     tells_untouched: bool,
 }
 
@@ -360,7 +360,7 @@ impl ForceLinearLocator {
         self.stored.presses
     }
 
-    /// Whether so few rows repeat a place or are untouched that the noise is hardly more than what is expected of boards.
+    /// True where the noise rests on its prior: too few rows repeat a place or are untouched.
     pub fn noise_is_hardly_told(&self) -> bool {
         self.stored.noise_freedom <= LEAST_FREEDOM
     }
@@ -505,13 +505,13 @@ impl ForceLinearLocator {
         (0..self.places()).all(|place| taken(place) <= self.detection_bound)
     }
 
-    /// Whether an untouched board is told from contacts half as hard as the presses. Without rows of force 0 few presses may leave the
+    /// True where an untouched board is told from contacts half as hard as the presses. Without rows of force 0 few presses may leave the
     /// offsets so open that the readings of such contacts are within the bounds of noise: then no reading is `no_contact`.
     pub fn tells_untouched(&self) -> bool {
         self.tells_untouched
     }
 
-    /// Whether open offsets are not what hides such contacts: at three of four places they are told from noise, or would not be with
+    /// True unless open offsets hide such contacts: at three of four places they are told from noise, or would not be with
     /// offsets that are known either.
     fn offsets_are_told(&self) -> bool {
         const SHARE: f64 = 0.5;
@@ -638,7 +638,7 @@ impl ForceLinearLocator {
         Inversion::new(self.seen(relative)).estimate(self.told_force(), limits)
     }
 
-    /// Whether noise alone explains a reading.
+    /// True for a reading that noise alone explains.
     #[cfg(test)]
     pub fn is_noise(&self, reading: &[f64]) -> bool {
         self.is_no_contact(&self.relative(reading))

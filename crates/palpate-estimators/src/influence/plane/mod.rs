@@ -15,12 +15,9 @@ pub use locator::{PlaneLocator, PlaneScratch};
 pub use table::PlaneTable;
 
 use super::config::{Influence, InfluenceFitError};
-use super::learning::{LearntInfluence, learn};
+use super::learning::{LearntInfluence, NODES_EACH, learn};
 use crate::fit::FitTask;
 use palpate_mechanics::contact::Position;
-
-/// Nodes that are filled between two looks whether to go on.
-const NODES_EACH: usize = 16;
 
 /// Fits the influence functions of a plane with a model.
 pub(super) fn fit(config: Influence, task: FitTask) -> Result<PlaneLocator, InfluenceFitError> {

@@ -1,0 +1,86 @@
+//! Files that are written whole: under a temporary name first, so that nobody ever sees half of one.
+
+use std::io::{Error, Result, Write};
+use std::path::{Path, PathBuf};
+use tempfile::{Builder, NamedTempFile};
+
+/// Writes a file that is on the disk, whole, when this returns. A link stays, and what it leads to is written; a file that is replaced keeps
+/// its mode.
+///
+/// # Errors
+/// The folder takes no file, or the disk is full; then the file of before is there still.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    let place = place(path)?;
+    let mut file = temporary(folder_of(&place))?;
+    file.write_all(bytes)?;
+    if let Ok(replaced) = std::fs::metadata(&place) {
+        file.as_file().set_permissions(replaced.permissions())?;
+    }
+    file.as_file().sync_all()?;
+    file.persist(&place)?;
+    Ok(())
+}
+
+/// The file with all links followed, whether it is there yet or not.
+///
+/// # Errors
+/// Links that lead in a circle.
+pub fn place(path: &Path) -> Result<PathBuf> {
+    /// As many as Linux follows.
+    const MOST: usize = 40;
+    let mut place = path.to_owned();
+    for _ in 0..MOST {
+        match std::fs::read_link(&place) {
+            Ok(to) => place = folder_of(&place).join(to),
+            Err(_) => return Ok(place),
+        }
+    }
+    Err(Error::other("its links lead in a circle"))
+}
+
+/// A temporary file in a folder, which shows that the folder takes files; it is removed when it is dropped.
+///
+/// # Errors
+/// The folder takes none.
+pub fn temporary(folder: &Path) -> Result<NamedTempFile> {
+    let mut builder = Builder::new();
+    builder.prefix(".palpate-");
+    // Results are for whoever may read files that are made here, as the umask says.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder)
+}
+
+/// The folder of a file.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::{PermissionsExt, symlink};
+
+    #[test]
+    fn links_stay_and_modes_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        symlink("file", &link).unwrap();
+        write(&link, b"one").unwrap();
+        std::fs::set_permissions(&file, PermissionsExt::from_mode(0o600)).unwrap();
+        write(&link, b"two").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(std::fs::read(&file).unwrap(), b"two");
+        assert_eq!(std::fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing temporary is left");
+    }
+
+    #[test]
+    fn links_in_a_circle_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+        symlink("b", &a).unwrap();
+        symlink("a", &b).unwrap();
+        assert!(write(&a, b"").unwrap_err().to_string().contains("circle"));
+    }
+}
