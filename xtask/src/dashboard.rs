@@ -2,8 +2,10 @@
 
 use std::fs;
 use std::io::ErrorKind;
+use std::panic::resume_unwind;
 use std::path::Path;
 use std::process::Command;
+use std::thread::{self, JoinHandle};
 use std::time::SystemTime;
 
 use anyhow::{Context, Result};
@@ -36,17 +38,25 @@ pub fn build(root: &Path) -> Result<bool> {
     Ok(bytes <= MOST_BYTES)
 }
 
-/// Builds the dashboard and the server, which is among what `tested` tells cargo to build, and runs the tests of both.
-pub fn test(root: &Path, skips: Skips, skipped: &Skipped, tested: &[&str]) -> Result<(bool, Option<Counts>)> {
+/// A dashboard that is being built.
+pub type Building = JoinHandle<Result<bool>>;
+
+/// Builds the dashboard in the background, where Node is.
+pub fn begin_build(root: &Path) -> Option<Building> {
+    let root = root.to_path_buf();
+    NODE.is_there(&root).then(|| thread::spawn(move || build(&root)))
+}
+
+/// Waits for a dashboard; true where there is none to wait for.
+pub fn wait(building: Option<Building>) -> Result<bool> {
+    building.map_or(Ok(true), |building| building.join().unwrap_or_else(|panic| resume_unwind(panic)))
+}
+
+/// Runs the tests of the dashboard and, in a browser, those of the server that was built with it.
+pub fn test(root: &Path, skips: Skips, skipped: &Skipped) -> Result<(bool, Option<Counts>)> {
     if !NODE.is_there(root) {
         println!("{}", NODE.describe());
         return Ok((skips == Skips::Pass, None));
-    }
-    let mut server = Command::new("cargo");
-    server.args(["build", "--quiet"]).args(tested).current_dir(root);
-    // The dashboard first: the server holds it.
-    if !(build(root)? && run::shown(&mut server)?) {
-        return Ok((false, None));
     }
     let before = skipped.lines()?.len();
     let (mut succeeded, mut counts) = (true, None);

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -32,15 +33,20 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     let skipped = Skipped::begin(root)?;
     let mut missing = Vec::new();
     let prerequisites = step("prerequisites", || prerequisites(root, skips, &mut missing))?;
-    // An environment is made while the compiler waits for one crate or another.
+    // Python's environment and the dashboard are made while the compiler waits for one crate or another; the server holds the dashboard.
     let environment = python::make_environment(root);
+    let dashboard = dashboard::begin_build(root);
     let steps = [
         prerequisites,
         step("formatting", || shown(root, &["fmt", "--all", "--check"]))?,
         step("clippy", || {
             shown(root, &[&["clippy", "--all-targets"], &EVERYTHING[..], &["--", "-D", "warnings"]].concat())
         })?,
-        step("build", || shown(root, &[&["build"], &TESTED[..]].concat()))?,
+        step("build", || {
+            let has_dashboard = dashboard::wait(dashboard)?;
+            let (succeeded, counts) = shown(root, &[&["build"], &TESTED[..]].concat())?;
+            Ok((has_dashboard && succeeded, counts))
+        })?,
         step("tests", || tests(root, skips, &skipped))?,
         step("doc tests", || watched(cargo(root, &[&["test", "--doc"], &EVERYTHING[..]].concat())))?,
         step("docs", || {
@@ -48,7 +54,7 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
             Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
         })?,
         step("Python tests", || python::test(root, skips, environment, &TESTED))?,
-        step("dashboard", || dashboard::test(root, skips, &skipped, &TESTED))?,
+        step("dashboard", || dashboard::test(root, skips, &skipped))?,
         step("tidy", || Ok((tidy::run(root)?, None)))?,
     ];
     let lines = skipped.lines()?;
@@ -81,7 +87,10 @@ fn prerequisites(root: &Path, skips: Skips, missing: &mut Vec<String>) -> Outcom
 
 fn tests(root: &Path, skips: Skips, skipped: &Skipped) -> Outcome {
     let mut command = if NEXTEST.is_there(root) {
-        cargo(root, &[&["nextest", "run", "--no-fail-fast"], &EVERYTHING[..]].concat())
+        // One more than there are cores: many a test waits for a board or a server.
+        let threads =
+            format!("--test-threads={}", thread::available_parallelism().map_or(2, |cores| cores.get() + 1));
+        cargo(root, &[&["nextest", "run", "--no-fail-fast", &threads], &EVERYTHING[..]].concat())
     } else {
         cargo(root, &[&["test", "--lib", "--bins", "--tests", "--no-fail-fast"], &EVERYTHING[..]].concat())
     };

@@ -1,7 +1,7 @@
 //! Levenberg's steps down the misfit of a contact (K. Levenberg, Quart. Appl. Math. 2, 1944, with Marquardt's scaling by the diagonal).
 
 use super::lanes::{Lanes, sum_of};
-use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
+use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
 use palpate_numerics::small::{Ldl, Matrix};
 
 /// Position along and across, and the force or whatever else a reading depends on.
@@ -42,25 +42,46 @@ impl<I: Iterator<Item = (Lanes, Lanes, [Lanes; 3])>> Kernel for SumGroups<I> {
 
     #[inline(always)] // Compiled for the instructions of its caller.
     fn run<S: Simd>(self) -> Equations {
-        let mut sums = [S::F64::splat(0.0); 10];
-        for (weights, e, [x, y, t]) in self.channels {
-            let [weights, e, x, y, t] = [&weights, &e, &x, &y, &t].map(S::F64::load);
-            let [we, wx, wy] = [weights * e, weights * x, weights * y];
-            let terms = [
-                (we, e),
-                (we, x),
-                (we, y),
-                (we, t),
-                (wx, x),
-                (wx, y),
-                (wx, t),
-                (wy, y),
-                (wy, t),
-                (weights * t, t),
-            ];
-            sums.iter_mut().zip(terms).for_each(|(sum, (a, b))| *sum = a.mul_add(b, *sum));
+        let mut sums = EquationSums::new();
+        for (weights, e, slopes) in self.channels {
+            let [weights, e] = [&weights, &e].map(S::F64::load);
+            sums.add(weights, e, slopes.each_ref().map(S::F64::load));
         }
-        let [misfit, ex, ey, et, xx, xy, xt, yy, yt, tt] = sums.map(sum_of);
+        sums.equations()
+    }
+}
+
+/// Products of weights, residuals and derivatives, eight channels side by side.
+pub(super) struct EquationSums<V>([V; 10]);
+
+impl<V: Eight<Real = f64>> EquationSums<V> {
+    #[inline(always)] // Compiled for the instructions of its caller.
+    pub fn new() -> Self {
+        Self([V::splat(0.0); 10])
+    }
+
+    /// With the weights V⁻¹, the residual and the derivatives of eight channels more.
+    #[inline(always)] // Compiled for the instructions of its caller.
+    pub fn add(&mut self, weights: V, e: V, [x, y, t]: [V; 3]) {
+        let [we, wx, wy] = [weights * e, weights * x, weights * y];
+        let terms = [
+            (we, e),
+            (we, x),
+            (we, y),
+            (we, t),
+            (wx, x),
+            (wx, y),
+            (wx, t),
+            (wy, y),
+            (wy, t),
+            (weights * t, t),
+        ];
+        self.0.iter_mut().zip(terms).for_each(|(sum, (a, b))| *sum = a.mul_add(b, *sum));
+    }
+
+    #[inline(always)] // Compiled for the instructions of its caller.
+    pub fn equations(self) -> Equations {
+        let [misfit, ex, ey, et, xx, xy, xt, yy, yt, tt] = self.0.map(sum_of);
         Equations { misfit, right: [ex, ey, et], information: [[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]] }
     }
 }

@@ -175,6 +175,12 @@ pub trait Eight: Number + Vector<8> {
     /// Bit i is set where lane i is below `other`'s.
     fn below(self, other: Self) -> u8;
 
+    /// `value` where the lane of `self` is below that of `bound`, `other` where it is not.
+    #[inline(always)]
+    fn where_below(self, bound: Self, value: Self, other: Self) -> Self {
+        value.or(self.below(bound), other)
+    }
+
     /// ((0 + 4) + (2 + 6)) + ((1 + 5) + (3 + 7)), by lane.
     #[inline(always)]
     fn sum(self) -> f64 {

@@ -21,6 +21,7 @@ use crate::influence::measured::MeasuredError;
 use ndarray::{Array1, Array2, Axis as Dimension};
 use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::watch::{Cancelled, Watch};
+use std::sync::Arc;
 
 impl Presses {
     /// No more than about `most` presses that tell of a separable prior without drift what all of these tell; `fits` are the noise and
@@ -125,11 +126,12 @@ impl Presses {
                 })
                 .collect();
             let force_n = all.prior.force_of_relative_response(sums.mean_square.sqrt());
-            self.repeated.force_n.push(force_n);
-            self.repeated.freedom.push((cell.len() - ends.len()) as f64);
             let squares = squares * all.prior.relative_noise(force_n, &sums.position_m);
-            self.repeated.positions_m.push(sums.position_m.clone());
-            self.repeated.squares.push_row(squares.view()).expect("as many channels as all presses have");
+            let repeated = Arc::make_mut(&mut self.repeated);
+            repeated.force_n.push(force_n);
+            repeated.freedom.push((cell.len() - ends.len()) as f64);
+            repeated.positions_m.push(sums.position_m.clone());
+            repeated.squares.push_row(squares.view()).expect("as many channels as all presses have");
         }
     }
 

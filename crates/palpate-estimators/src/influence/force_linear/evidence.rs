@@ -199,7 +199,7 @@ struct RepeatedNoise {
 
 impl RepeatedNoise {
     fn new(presses: &Presses, prior: &Prior) -> Self {
-        let Repeated { positions_m, force_n, freedom, squares } = &presses.repeated;
+        let Repeated { positions_m, force_n, freedom, squares } = &*presses.repeated;
         let relative: Array1<f64> = force_n
             .iter()
             .zip(positions_m)

@@ -6,6 +6,7 @@ use crate::thinning::thinned;
 use ndarray::{Array2, Axis as Dimension};
 use palpate_numerics::mean;
 use std::cmp::Ordering;
+use std::sync::Arc;
 
 /// Rows that count as repeats of one press.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +35,8 @@ pub(super) struct Presses {
     pub means: Array2<f64>,
     /// Variance of what rounding does to a reading of each channel, as of converters that count; 0 where it is none that is seen.
     pub rounding: Vec<f64>,
-    pub repeated: Repeated,
+    /// Those of parts of the presses are the same.
+    pub repeated: Arc<Repeated>,
 }
 
 /// Scatter of the presses that were repeated, a row a press.
@@ -115,12 +117,12 @@ impl Presses {
             count: groups.iter().map(|group| group.len() as f64).collect(),
             time: groups.iter().map(|group| mean(group.iter().map(|row| row.time))).collect(),
             row: groups.iter().map(|group| group[0].row).collect(),
-            repeated: Repeated {
+            repeated: Arc::new(Repeated {
                 positions_m: repeated.iter().map(|i| groups[*i][0].position_m.clone()).collect(),
                 force_n: repeated.iter().map(|i| groups[*i][0].force_n).collect(),
                 freedom: repeated.iter().map(|i| (groups[*i].len() - 1) as f64).collect(),
                 squares: squares.select(Dimension(0), &repeated),
-            },
+            }),
             centre,
             means,
             rounding,
@@ -184,10 +186,10 @@ impl Presses {
             centre: of(&self.centre),
             means: self.means.select(Dimension(1), channels),
             rounding: of(&self.rounding),
-            repeated: Repeated {
+            repeated: Arc::new(Repeated {
                 squares: self.repeated.squares.select(Dimension(1), channels),
-                ..self.repeated.clone()
-            },
+                ..(*self.repeated).clone()
+            }),
             ..self.clone()
         }
     }
@@ -202,7 +204,9 @@ impl Presses {
             time: of(&self.time),
             row: kept.iter().map(|i| self.row[*i]).collect(),
             means: self.means.select(Dimension(0), kept),
-            ..self.clone()
+            centre: self.centre.clone(),
+            rounding: self.rounding.clone(),
+            repeated: Arc::clone(&self.repeated),
         }
     }
 

@@ -62,30 +62,34 @@ impl Cells {
 
     /// The cells that are no dearer than those around them, the cheapest first.
     pub(super) fn valleys(self, looks: &[Look], most: usize) -> Vec<usize> {
-        let counts = self.counts();
-        let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
-        let is_valley = |cell: &usize| {
-            let [i, j] = self.indices(*cell);
-            let cost = looks[*cell].cost;
-            if !cost.is_finite() {
-                return false;
-            }
-            for i in around(i, counts[0]) {
-                for j in around(j, counts[1]) {
-                    let other = i * counts[1] + j;
-                    let (from, is_before) = (looks[other].cost, other < *cell);
-                    if from < cost || is_before && from == cost {
-                        return false;
-                    }
-                }
-            }
-            true
-        };
-        let mut valleys: Vec<usize> = (0..looks.len()).filter(is_valley).collect();
+        let counts @ [rows, columns] = self.counts();
+        let cells = (0..rows).flat_map(|i| (0..columns).map(move |j| [i, j]));
+        let mut valleys: Vec<usize> =
+            cells.filter(|cell| is_valley(looks, counts, *cell)).map(|[i, j]| i * columns + j).collect();
         valleys.sort_by(|a, b| looks[*a].cost.total_cmp(&looks[*b].cost));
         valleys.truncate(most);
         valleys
     }
+}
+
+/// True of a cell of a grid of so many that is cheaper than those around it before it, and no dearer than those behind it.
+fn is_valley(looks: &[Look], [rows, columns]: [usize; 2], [i, j]: [usize; 2]) -> bool {
+    let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
+    let cell = i * columns + j;
+    let cost = looks[cell].cost;
+    // Two of its neighbours tell most cells.
+    let is_before = i > 0 && looks[cell - columns].cost <= cost;
+    let is_behind = i + 1 < rows && looks[cell + columns].cost < cost;
+    !is_before
+        && !is_behind
+        && cost.is_finite()
+        && around(i, rows).all(|i| {
+            around(j, columns).all(|j| {
+                let other = i * columns + j;
+                let from = looks[other].cost;
+                !(from < cost || other < cell && from == cost)
+            })
+        })
 }
 
 /// Numbers of the middles of cells, in blocks of eight, by which a reading looks at them.

@@ -92,9 +92,10 @@ pub(in crate::influence) struct Stencil {
 
 impl Stencil {
     /// Around a place of a row of `count` nodes.
+    #[inline]
     pub fn new(place: f64, count: usize) -> Self {
         let used = count.min(4);
-        let first = ((place.floor() - 1.0).max(0.0) as usize).min(count - used);
+        let first = ((place - 1.0).max(0.0) as usize).min(count - used);
         let t = place - first as f64;
         let (weights, slopes) = match used {
             1 => ([1.0, 0.0, 0.0, 0.0], [0.0; 4]),
@@ -104,13 +105,14 @@ impl Stencil {
                 (weights, [t - 1.5, 2.0 - 2.0 * t, t - 0.5, 0.0])
             }
             _ => {
+                const SIXTH: f64 = 1.0 / 6.0;
                 let [a, b, c] = [t - 1.0, t - 2.0, t - 3.0];
-                let weights = [-a * b * c / 6.0, 0.5 * t * b * c, -0.5 * t * a * c, t * a * b / 6.0];
+                let weights = [-SIXTH * (a * b * c), 0.5 * t * b * c, -0.5 * t * a * c, SIXTH * (t * a * b)];
                 let slopes = [
-                    -(a * b + a * c + b * c) / 6.0,
+                    -SIXTH * (a * b + a * c + b * c),
                     0.5 * (t * b + t * c + b * c),
                     -0.5 * (t * a + t * c + a * c),
-                    (t * a + t * b + a * b) / 6.0,
+                    SIXTH * (t * a + t * b + a * b),
                 ];
                 (weights, slopes)
             }

@@ -11,10 +11,11 @@ use crate::influence::inversion::{
     Cells, Explain, Explained, Inversion, Layers, Limits, Look, Slopes, Stencil, ToldForce, look_at_cells,
 };
 use crate::influence::lanes::{LANES, Lanes, in_lanes};
-use crate::influence::levenberg::{Equations, Unknowns};
+use crate::influence::levenberg::{EquationSums, Equations, Unknowns};
 use crate::influence::noise::Whitening;
 use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
+use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
 
 /// Role of the nuisance coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -70,7 +71,7 @@ struct Search {
     lengths: Vec<[f64; 2]>,
 }
 
-/// Nodes of a cell along either axis of a plane, where every place has a line of nodes; elsewhere 1.
+/// Nodes of a cell along either axis, where every place has a line of nodes; elsewhere 1.
 const STRIDE: usize = 3;
 /// Straight parts of a line from a node to the next.
 const PARTS: usize = 4;
@@ -83,7 +84,7 @@ impl Search {
     fn new(table: &Table, whitening: &Whitening) -> Self {
         let Table { x, y, nuisance, .. } = table;
         let axes = [*x, *y];
-        let stride = if y.count > 1 && nuisance.count > 1 { STRIDE } else { 1 };
+        let stride = if nuisance.count > 1 { STRIDE } else { 1 };
         let cells = Cells::new([x.count, y.count], stride);
         let mut search = Self {
             means: Layers::new(axes, nuisance.count, table.channels(), |place, node, c| {
@@ -349,22 +350,14 @@ impl Seen<'_> {
     /// The equations where the latent number is the nuisance coordinate.
     fn equations_of_line(&mut self, [x, y, latent]: Unknowns) -> Equations {
         let Search { means, .. } = &self.locator.search;
-        let Stencil { first, used, weights: shares, slopes } = Stencil::new(latent, self.nodes());
-        means.interpolate_slopes([x, y], first..first + used, &mut self.slopes);
-        let groups = self.reading.len();
-        Equations::new((0..groups).map(|g| {
-            let [mut mean, mut along, mut across, mut by_node] = [[0.0; LANES]; 4];
-            for (k, of_node) in self.slopes[g..].iter().step_by(groups).enumerate() {
-                for l in 0..LANES {
-                    mean[l] += shares[k] * of_node[0][l];
-                    along[l] += shares[k] * of_node[1][l];
-                    across[l] += shares[k] * of_node[2][l];
-                    by_node[l] += slopes[k] * of_node[0][l];
-                }
-            }
-            let residual = std::array::from_fn(|l| self.reading[g][l] - mean[l]);
-            (self.weights[g], residual, [along, across, by_node])
-        }))
+        let stencil = Stencil::new(latent, self.nodes());
+        means.interpolate_slopes([x, y], stencil.first..stencil.first + stencil.used, &mut self.slopes);
+        InstructionSet::best().run(LineEquations {
+            reading: &self.reading,
+            weights: &self.weights,
+            slopes: &self.slopes,
+            stencil,
+        })
     }
 
     /// The equations where the latent number is a gain, in standard deviations.
@@ -384,6 +377,42 @@ impl Seen<'_> {
     /// Nodes of the nuisance coordinate.
     fn nodes(&self) -> usize {
         self.locator.stored.table.nuisance.count
+    }
+}
+
+/// Sums the equations of a reading between nodes of the nuisance coordinate.
+struct LineEquations<'a> {
+    reading: &'a [Lanes],
+    /// 1/V.
+    weights: &'a [Lanes],
+    /// Means and slopes at the nodes of the stencil, one node after the other.
+    slopes: &'a [Slopes],
+    stencil: Stencil,
+}
+
+impl Kernel for LineEquations<'_> {
+    type Output = Equations;
+    const FUSED: bool = true;
+
+    #[inline(always)] // Compiled for the instructions of its caller.
+    fn run<S: Simd>(self) -> Equations {
+        let Self { reading, weights, slopes, stencil } = self;
+        let groups = reading.len();
+        let mut sums = EquationSums::new();
+        for (g, (z, weights)) in reading.iter().zip(weights).enumerate() {
+            let [mut mean, mut along, mut across, mut by_node] = [S::F64::splat(0.0); 4];
+            for (k, at_node) in slopes[g..].iter().step_by(groups).enumerate() {
+                let [value, x, y] = at_node.each_ref().map(S::F64::load);
+                let share = S::F64::splat(stencil.weights[k]);
+                mean = value.mul_add(share, mean);
+                along = x.mul_add(share, along);
+                across = y.mul_add(share, across);
+                by_node = value.mul_add(S::F64::splat(stencil.slopes[k]), by_node);
+            }
+            let [z, weights] = [z, weights].map(S::F64::load);
+            sums.add(weights, z - mean, [along, across, by_node]);
+        }
+        sums.equations()
     }
 }
 
