@@ -39,6 +39,9 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     let steps = [
         prerequisites,
         step("formatting", || shown(root, &["fmt", "--all", "--check"]))?,
+        step("fuzz lock", || {
+            shown(root, &["fetch", "--quiet", "--locked", "--manifest-path", "fuzz/Cargo.toml"])
+        })?,
         step("clippy", || {
             shown(root, &[&["clippy", "--all-targets"], &EVERYTHING[..], &["--", "-D", "warnings"]].concat())
         })?,
