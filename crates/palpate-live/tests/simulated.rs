@@ -119,6 +119,13 @@ impl<'a> Bench<'a> {
         self.board.finger_mut().obey(line).unwrap();
     }
 
+    /// Lets the surface alone at first, so that the baseline is known before anything touches.
+    fn untouched_first(mut self) -> Self {
+        self.finger("lift");
+        self.take(200);
+        self
+    }
+
     /// The next so many samples, and the events with them.
     fn take(&mut self, frames: usize) -> (Vec<Sample>, Vec<Event>) {
         let mut out = Vec::new();
@@ -189,7 +196,8 @@ fn a_tracked_contact_is_closer_than_single_readings_and_its_intervals_hold_it() 
 fn a_tracker_is_carried_over_gaps_and_immense_readings() {
     let rig = Rig::from_toml(RIG).unwrap();
     let locator = locator(&rig);
-    let mut bench = Bench::new(&rig, &locator, Estimation::Track { frequency_hz: None });
+    let tracked = Estimation::Track { frequency_hz: None };
+    let mut bench = Bench::new(&rig, &locator, tracked).untouched_first();
     bench.finger("finger 120 0 3");
     let sd_m = |sample: &Sample| sample.estimate.contact.uncertainty.unwrap().covariance[0].sqrt();
     let (before, _) = bench.take(500);
@@ -223,7 +231,7 @@ fn a_low_pass_leaves_the_noise_that_it_should_and_is_reset_by_silence() {
     let rig = Rig::from_toml(RIG).unwrap();
     let locator = locator(&rig);
     let held = |estimation: Estimation| {
-        let mut bench = Bench::new(&rig, &locator, estimation);
+        let mut bench = Bench::new(&rig, &locator, estimation).untouched_first();
         bench.finger("finger 120 0 3");
         let (samples, _) = bench.take(5000);
         (bench, positions_m(&samples[1000..]))
