@@ -9,6 +9,8 @@ export interface ContactRecord {
   y_95_mm?: [number, number];
   sd_mm?: number;
   sd_force_n?: number;
+  /** Covariance of the position on a plane, xx, xy and yy; of the first contact of a sample. */
+  covariance_mm2?: [number, number, number];
   force_95_n?: [number, number];
   trade_off?: string;
 }

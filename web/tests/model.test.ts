@@ -1,5 +1,6 @@
 import { describe, expect, test } from "vitest";
 import { Baseline } from "../src/model/baseline";
+import { ofCovariance, ofIntervals } from "../src/model/ellipse";
 import { envelope } from "../src/model/envelope";
 import { FIRST_CHANNEL, FORCE, History, TIME, X, X_LOW } from "../src/model/history";
 import { forceFactor, limitAt } from "../src/model/limit";
@@ -291,5 +292,29 @@ describe("pace", () => {
     pace.frame(60_000);
     expect(pace.due("chart", 0, 100)).toBe(true);
     expect(pace.due("chart", 100, 100)).toBe(true);
+  });
+});
+
+describe("ellipses", () => {
+  test("without covariance of x and y, intervals and variances say the same", () => {
+    const intervals = ofIntervals([10 - 1.96 * 2, 10 + 1.96 * 2], [5 - 1.96, 5 + 1.96]);
+    const covariance = ofCovariance(10, 5, [4, 0, 1]);
+    expect([covariance.x_mm, covariance.y_mm, covariance.angle]).toEqual([10, 5, 0]);
+    for (const i of [0, 1] as const) expect(intervals.half_mm[i]).toBeCloseTo(covariance.half_mm[i], 9);
+  });
+
+  test("the half axes are those of the covariance turned back, at whatever angle", () => {
+    for (const angle of [-1.2, -0.4, 0.3, 1.1]) {
+      const [c, s] = [Math.cos(angle), Math.sin(angle)];
+      // 3² along the axis, 1² across it.
+      const ellipse = ofCovariance(0, 0, [9 * c * c + s * s, (9 - 1) * s * c, 9 * s * s + c * c]);
+      expect(ellipse.angle).toBeCloseTo(angle, 9);
+      expect(ellipse.half_mm[0]).toBeCloseTo(3 * 2.4477, 6);
+      expect(ellipse.half_mm[1]).toBeCloseTo(2.4477, 6);
+    }
+  });
+
+  test("a position that is known along a line has an ellipse without width, not NaN", () => {
+    expect(ofCovariance(0, 0, [1, 1, 1]).half_mm[1]).toBeCloseTo(0, 6);
   });
 });

@@ -4,7 +4,7 @@ use crate::chunks::Chunks;
 use crate::failure::{Complaint, Failure};
 use crate::remark::remark;
 use palpate_estimators::estimator::{Locator, LocatorFileError};
-use palpate_estimators::recording::{CsvError, Recording};
+use palpate_estimators::recording::{self, Columns, CsvError, Recording};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::units::{Dimension, Quantity};
 use palpate_rig::{Rig, RigError};
@@ -110,8 +110,13 @@ impl RecordingFiles {
 
 /// A recording of a bench in one file, with its dialect and its warnings said on stderr.
 pub fn read_recording(setup: &Setup, path: &Path) -> Result<Recording, Failure> {
+    read_recording_as(setup, path, &setup.recording_columns())
+}
+
+/// The same of a file with these columns.
+pub fn read_recording_as(setup: &Setup, path: &Path, columns: &Columns) -> Result<Recording, Failure> {
     let (bytes, name) = (read_bytes(path)?, path.display().to_string());
-    with_warnings(setup.read_recording(&name, bytes.as_slice()), &name)
+    with_warnings(recording::read(&name, bytes.as_slice(), &setup.schema(columns)), &name)
 }
 
 fn with_warnings(recording: Result<Recording, CsvError>, name: &str) -> Result<Recording, Failure> {

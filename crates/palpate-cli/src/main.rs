@@ -19,6 +19,8 @@ mod lines;
 mod output;
 mod progress;
 mod remark;
+mod rules;
+mod session;
 mod tables;
 mod tare;
 mod target;

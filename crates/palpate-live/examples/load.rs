@@ -113,19 +113,22 @@ fn follow(address: SocketAddr, query: &str) -> Result<WebSocket<TcpStream>, Box<
     Ok(socket)
 }
 
-/// Milliseconds from the last byte of each reading to its packet, and readings that did not come.
+/// Milliseconds from the last byte of each arrival to its packet, and readings that did not come.
 fn samples(socket: &mut WebSocket<TcpStream>) -> (Vec<f64>, u64) {
     let (mut latencies_ms, mut lost, mut expected) = (Vec::new(), 0, 0);
     while let Ok(message) = socket.read() {
         let now_ns = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
         let Message::Binary(packet) = message else { continue };
         let channels = usize::from(u16::from_le_bytes([packet[2], packet[3]]));
-        for sample in packet[8..].chunks_exact(44 + 4 * channels) {
+        let mut last_ns = now_ns;
+        for sample in packet[8..].chunks_exact(48 + 4 * channels) {
             let u64_at = |at: usize| sample[at..at + 8].try_into().map_or(0, u64::from_le_bytes);
             lost += u64_at(0).saturating_sub(expected);
             expected = u64_at(0) + 1;
-            latencies_ms.push(now_ns.saturating_sub(u64_at(8)) as f64 * 1e-6);
+            last_ns = u64_at(8);
         }
+        // Of the readings that arrived together, the last one has the time of its last byte.
+        latencies_ms.push(now_ns.saturating_sub(last_ns) as f64 * 1e-6);
     }
     (latencies_ms, lost)
 }

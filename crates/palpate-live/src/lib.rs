@@ -4,6 +4,7 @@
 //! device, file or clock, so that the same bytes at the same instants give the same answers, in a test, a replay or on the bench.
 
 pub mod calibration;
+pub mod commander;
 pub mod device_clock;
 pub mod event;
 pub mod frame;

@@ -1,8 +1,9 @@
 //! The thread of a session: what sources and users bring goes in, and what follows goes to the sinks.
 
 use crate::input::{Arrival, Input};
-use crate::session::{Output, Session};
+use crate::session::{Estimation, Output, Session};
 use crate::sink::{Batch, ChannelRecord, Sink, StateRecord};
+use crate::source::SourceUrl;
 use crate::stamp::HostClock;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -12,6 +13,31 @@ use std::time::{Duration, Instant};
 pub const WAITING: usize = 1024;
 /// Time between two states.
 const STATE_EVERY: Duration = Duration::from_micros(16_667);
+
+/// A source whose readings come at another pace than that at which they were taken.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "a recording at speed={speed} has other times than its readings, by which a low-pass filter and a tracker go; use speed=1, or `palpate replay`"
+)]
+pub struct PaceError {
+    /// The pace.
+    pub speed: f64,
+}
+
+/// Checks that readings of a source come at the pace at which they were taken, where an estimation goes by their times.
+///
+/// # Errors
+/// [`PaceError`].
+pub fn check_pace(estimation: &Estimation, from: &SourceUrl) -> Result<(), PaceError> {
+    match (estimation, from) {
+        (Estimation::LowPass { .. } | Estimation::Track { .. }, SourceUrl::File { speed, .. })
+            if *speed != 1.0 =>
+        {
+            Err(PaceError { speed: *speed })
+        }
+        _ => Ok(()),
+    }
+}
 
 /// Runs a session until the source has ended, everybody who sends has gone, or it is to stop.
 pub fn run(session: &mut Session, clock: HostClock, inputs: &Receiver<Input>, sinks: &mut [Box<dyn Sink>]) {

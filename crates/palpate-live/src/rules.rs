@@ -1,4 +1,4 @@
-//! Rules: what is published when a contact is somewhere, or presses so hard, or something happens.
+//! Rules: what is published, or sent to the board, when a contact is somewhere, or presses so hard, or something happens.
 //!
 //! A rule file is TOML:
 //!
@@ -16,6 +16,10 @@
 //! event = "source_lost"
 //! topic = "machine/stop"
 //! message = "sensor"
+//!
+//! [[rule]]
+//! event = "touch_down"
+//! command = "brake"              # a line to the board that the readings come from
 //! ```
 
 use crate::event::EventRecord;
@@ -29,7 +33,7 @@ use std::time::Duration;
 use toml::Spanned;
 
 /// Rules of a file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rules(Vec<Rule>);
 
 /// A rule.
@@ -39,10 +43,22 @@ pub struct Rule {
     pub name: String,
     /// When it acts.
     pub condition: Condition,
-    /// The topic on which it publishes.
-    pub topic: String,
-    /// The message.
-    pub message: String,
+    /// What it does then.
+    pub action: Action,
+}
+
+/// What a rule does when it acts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Publishes a message of MQTT.
+    Publish {
+        /// The topic.
+        topic: String,
+        /// The message.
+        message: String,
+    },
+    /// Sends a line to the board that the readings come from.
+    Command(String),
 }
 
 /// When a rule acts.
@@ -90,6 +106,10 @@ const EVENTS: [&str; 14] = [
     "trouble",
     "mark",
 ];
+/// Events at which the board is away, so that no command can be sent to it.
+const AWAY: [&str; 2] = ["source_lost", "source_ended"];
+/// Most bytes of a command.
+const LONGEST_COMMAND: usize = 200;
 /// Most rules of a file.
 const MOST: usize = 1000;
 
@@ -109,8 +129,9 @@ struct RuleIn {
     force: Option<Spanned<[Spanned<String>; 2]>>,
     hold: Option<Spanned<String>>,
     event: Option<Spanned<String>>,
-    topic: Spanned<String>,
-    message: String,
+    topic: Option<Spanned<String>>,
+    message: Option<Spanned<String>>,
+    command: Option<Spanned<String>>,
 }
 
 impl Rules {
@@ -135,17 +156,19 @@ impl Rules {
     pub fn as_slice(&self) -> &[Rule] {
         &self.0
     }
+
+    /// The rules that publish messages, and those that send commands to the board.
+    pub fn by_action(self) -> (Self, Self) {
+        let publishes = |rule: &Rule| matches!(rule.action, Action::Publish { .. });
+        let (publishing, commanding) = self.0.into_iter().partition(publishes);
+        (Self(publishing), Self(commanding))
+    }
 }
 
 impl Rule {
     fn read(number: usize, given: Spanned<RuleIn>) -> Result<Self, RuleError> {
         let span = given.span();
         let given = given.into_inner();
-        let topic = given.topic.get_ref();
-        if topic.is_empty() || topic.len() > 1000 || topic.contains(['+', '#', '\0']) {
-            let problem = "`topic` must have 1 to 1000 bytes, and none of + and #".to_owned();
-            return Err(error_at(given.topic.span(), problem));
-        }
         let hold = match &given.hold {
             None => Duration::ZERO,
             Some(hold) => duration(hold)?,
@@ -154,6 +177,7 @@ impl Rule {
         let y_m = band("y", Dimension::Length, given.y.as_ref())?;
         let force_n = band("force", Dimension::Force, given.force.as_ref())?;
         let of_contact = [&given.x, &given.y, &given.force].into_iter().flatten().next();
+        let event_at = given.event.as_ref().map(Spanned::span);
         let condition = match (given.event, of_contact) {
             (Some(event), Some(_)) => {
                 return Err(error_at(
@@ -182,12 +206,56 @@ impl Rule {
                 ));
             }
         };
+        let action = action(span, given.topic, given.message, given.command)?;
+        if let (Condition::Event(event), Action::Command(_), Some(at)) = (&condition, &action, event_at)
+            && AWAY.contains(&event.as_str())
+        {
+            let problem = format!("`command` does not go with `{event}`: the board is not there then");
+            return Err(error_at(at, problem));
+        }
         Ok(Self {
             name: given.name.map_or_else(|| format!("rule {number}"), Spanned::into_inner),
             condition,
-            topic: given.topic.into_inner(),
-            message: given.message,
+            action,
         })
+    }
+}
+
+/// The action of a rule at `rule` in the file: a message on a topic, or a command.
+fn action(
+    rule: Range<usize>,
+    topic: Option<Spanned<String>>,
+    message: Option<Spanned<String>>,
+    command: Option<Spanned<String>>,
+) -> Result<Action, RuleError> {
+    match (topic, message, command) {
+        (Some(topic), Some(message), None) => {
+            let text = topic.get_ref();
+            if text.is_empty() || text.len() > 1000 || text.contains(['+', '#', '\0']) {
+                let problem = "`topic` must have 1 to 1000 bytes, and none of + and #".to_owned();
+                return Err(error_at(topic.span(), problem));
+            }
+            Ok(Action::Publish { topic: topic.into_inner(), message: message.into_inner() })
+        }
+        (None, None, Some(command)) => {
+            let text = command.get_ref();
+            if text.trim().is_empty() || text.len() > LONGEST_COMMAND || text.contains(char::is_control) {
+                let problem = format!(
+                    "`command` must be a line of 1 to {LONGEST_COMMAND} bytes, without control characters"
+                );
+                return Err(error_at(command.span(), problem));
+            }
+            Ok(Action::Command(command.into_inner()))
+        }
+        (Some(other), _, Some(_)) | (None, Some(other), Some(_)) => {
+            let problem = "a rule has `topic` and `message`, or a `command`; write two rules".to_owned();
+            Err(error_at(other.span(), problem))
+        }
+        (Some(topic), None, None) => Err(error_at(topic.span(), "`topic` needs a `message`".to_owned())),
+        (None, Some(message), None) => Err(error_at(message.span(), "`message` needs a `topic`".to_owned())),
+        (None, None, None) => {
+            Err(error_at(rule, "the rule has no `topic` and `message`, and no `command`".to_owned()))
+        }
     }
 }
 
@@ -377,7 +445,10 @@ mod tests {
         ] {
             watch.add(&Output::Event(EventRecord { time_s: 0.0, event }), |rule| {
                 acted += 1;
-                assert_eq!(rule.message, "sensor");
+                assert_eq!(
+                    rule.action,
+                    Action::Publish { topic: "stop".to_owned(), message: "sensor".to_owned() }
+                );
             });
         }
         assert_eq!(acted, 1);
@@ -402,5 +473,32 @@ mod tests {
             assert_eq!(&text[error.span.clone().unwrap()], meant, "{error}");
         }
         assert!(Rules::from_toml("").is_err());
+    }
+
+    #[test]
+    fn a_rule_publishes_or_commands_and_its_mistakes_are_named_at_their_place() {
+        let rules = "[[rule]]\nevent = \"mark\"\ncommand = \"led on\"\n".to_owned() + FILE;
+        let (publishing, commanding) = Rules::from_toml(&rules).unwrap().by_action();
+        assert_eq!(publishing.as_slice().len(), 2);
+        assert_eq!(commanding.as_slice()[0].action, Action::Command("led on".to_owned()));
+        let long = format!("command = \"{}\"", "x".repeat(201));
+        for (lines, meant) in [
+            ("command = \"a\\nb\"", "\"a\\nb\""),
+            ("command = \" \"", "\" \""),
+            (long.as_str(), &long[10..]),
+            ("command = \"a\"\ntopic = \"t\"\nmessage = \"\"", "\"t\""),
+            ("command = \"a\"\nmessage = \"m\"", "\"m\""),
+            ("topic = \"t\"", "\"t\""),
+            ("message = \"m\"", "\"m\""),
+            ("topic = \"t/#\"\nmessage = \"m\"", "\"t/#\""),
+        ] {
+            let text = format!("[[rule]]\nevent = \"mark\"\n{lines}\n");
+            let error = Rules::from_toml(&text).unwrap_err();
+            assert_eq!(&text[error.span.clone().unwrap()], meant, "{error}");
+        }
+        let text = "[[rule]]\nevent = \"source_lost\"\ncommand = \"a\"\n";
+        let error = Rules::from_toml(text).unwrap_err();
+        assert_eq!(&text[error.span.clone().unwrap()], "\"source_lost\"", "{error}");
+        assert!(Rules::from_toml("[[rule]]\nevent = \"mark\"\n").is_err());
     }
 }

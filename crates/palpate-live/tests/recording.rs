@@ -6,7 +6,7 @@ use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::input::{Arrival, Arrived, Command, Input};
 use palpate_live::recording::{self, Playback, Recorded, RecordingError, RecordingSwitch};
 use palpate_live::sample::Sample;
-use palpate_live::session::{Session, SessionConfig};
+use palpate_live::session::{Estimation, Session, SessionConfig};
 use palpate_live::simulated_board::{BoardConfig, Finger, SimulatedBoard};
 use palpate_live::sink::{Batch, Sink};
 use palpate_live::stamp::Stamp;
@@ -36,14 +36,14 @@ fn bench() -> (Rig, Locator) {
 
 fn switch(locator: &Locator) -> (RecordingSwitch, Receiver<Input>) {
     let (to, from) = sync_channel(64);
-    (RecordingSwitch::new(locator, "simulated:rig.toml", to).unwrap(), from)
+    (RecordingSwitch::new(locator, Estimation::Single, "simulated:rig.toml", to).unwrap(), from)
 }
 
 /// Takes so many readings of a simulated board through a session and into a sink, and returns the samples.
 fn session(rig: &Rig, locator: &Locator, frames: u64, sink: &mut impl Sink) -> Vec<Sample> {
     let config = BoardConfig { rate_hz: 200.0, seed: 3, ..BoardConfig::default() };
     let mut board = SimulatedBoard::new(&rig.setup, &config, Finger::random(rig, 3)).unwrap();
-    let mut session = Session::new(locator, &SessionConfig::default());
+    let mut session = Session::new(locator, &SessionConfig::default()).unwrap();
     let mut samples = Vec::new();
     for frame in 0..frames {
         let elapsed = board.next_at();

@@ -146,8 +146,8 @@ fn every_sample_comes_as_json_and_as_packets() {
     while expected < 300 {
         let Message::Binary(packet) = binary.read().unwrap() else { panic!("no packet") };
         let u32_at = |at: usize| u32::from_le_bytes(packet[at..at + 4].try_into().unwrap());
-        assert_eq!(&packet[..4], [b'p', 1, 8, 0]);
-        let each = 44 + 4 * 8;
+        assert_eq!(&packet[..4], [b'p', 2, 8, 0]);
+        let each = 48 + 4 * 8;
         assert_eq!(packet.len(), 8 + each * u32_at(4) as usize);
         for sample in packet[8..].chunks(each) {
             assert_eq!(u64::from_le_bytes(sample[..8].try_into().unwrap()), expected);
@@ -155,7 +155,7 @@ fn every_sample_comes_as_json_and_as_packets() {
                 let f32_at =
                     |at: usize| f64::from(f32::from_le_bytes(sample[at..at + 4].try_into().unwrap()));
                 assert!((f32_at(20) - first["x_mm"].as_f64().unwrap()).abs() < 1e-3);
-                assert!((f32_at(44) / first["reading"][0].as_f64().unwrap() - 1.0).abs() < 1e-6);
+                assert!((f32_at(48) / first["reading"][0].as_f64().unwrap() - 1.0).abs() < 1e-6);
             }
             expected += 1;
         }

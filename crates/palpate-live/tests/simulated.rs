@@ -1,10 +1,12 @@
 //! A simulated board through a session: what the finger does is what the session says.
 
+use palpate_core::Status;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::event::Event;
 use palpate_live::input::{Arrival, Arrived};
-use palpate_live::session::{Output, Session, SessionConfig};
+use palpate_live::sample::Sample;
+use palpate_live::session::{Estimation, Output, Session, SessionConfig};
 use palpate_live::simulated_board::{BoardConfig, Finger, FrameForm, SimulatedBoard};
 use palpate_live::stamp::Stamp;
 use palpate_rig::Rig;
@@ -28,7 +30,7 @@ fn a_finger_is_followed_from_touch_down_to_lift_off() {
     )
     .unwrap();
     let mut finger = Finger::random(&rig, 3);
-    let mut session = Session::new(&locator, &SessionConfig::default());
+    let mut session = Session::new(&locator, &SessionConfig::default()).unwrap();
     let mut out = Vec::new();
     let start_ns = 1_800_000_000_000_000_000;
     let (mut downs, mut offs, mut errors_m) = (0_i32, 0_i32, Vec::new());
@@ -76,7 +78,7 @@ fn binary_frames_keep_the_hosts_time_whatever_the_boards_clock_does() {
     let frames = FrameForm::Binary { clock_ppm: 300.0 };
     let config = BoardConfig { rate_hz: 100.0, seed: 3, frames, ..BoardConfig::default() };
     let mut board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, 3)).unwrap();
-    let mut session = Session::new(&locator, &SessionConfig::default());
+    let mut session = Session::new(&locator, &SessionConfig::default()).unwrap();
     let mut out = Vec::new();
     let start_ns = 1_800_000_000_000_000_000;
     for frame in 0..6000_u64 {
@@ -95,4 +97,179 @@ fn binary_frames_keep_the_hosts_time_whatever_the_boards_clock_does() {
     // A stream is known to be binary once a frame has ended.
     assert!(session.counters().readings >= 5998, "{:?}", session.counters());
     assert_eq!(session.counters().lost_frames, 0);
+}
+
+/// A session on the rig's bench, whose finger does what it is told, or goes its own way.
+struct Bench<'a> {
+    session: Session<'a>,
+    board: SimulatedBoard<'a>,
+    /// Time for which the board is silent, all in all.
+    silent: Duration,
+}
+
+impl<'a> Bench<'a> {
+    fn new(rig: &'a Rig, locator: &'a Locator, estimation: Estimation) -> Self {
+        let config = BoardConfig { rate_hz: 500.0, seed: 5, ..BoardConfig::default() };
+        let board = SimulatedBoard::new(&rig.setup, &config, Finger::random(rig, 5)).unwrap();
+        let config = SessionConfig { estimation, ..SessionConfig::default() };
+        Self { session: Session::new(locator, &config).unwrap(), board, silent: Duration::ZERO }
+    }
+
+    fn finger(&mut self, line: &str) {
+        self.board.finger_mut().obey(line).unwrap();
+    }
+
+    /// Lets the surface alone at first, so that the baseline is known before anything touches.
+    fn untouched_first(mut self) -> Self {
+        self.finger("lift");
+        self.take(200);
+        self
+    }
+
+    /// The next so many samples, and the events with them.
+    fn take(&mut self, frames: usize) -> (Vec<Sample>, Vec<Event>) {
+        let mut out = Vec::new();
+        for _ in 0..frames {
+            let elapsed = self.board.next_at();
+            let arrival = Arrival::Bytes(self.board.send_until(elapsed));
+            let elapsed = elapsed + self.silent;
+            let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
+            self.session.receive(&Arrived { at, arrival }, &mut out);
+        }
+        let (mut samples, mut events) = (Vec::new(), Vec::new());
+        for output in out {
+            match output {
+                Output::Sample(sample) => samples.push(*sample),
+                Output::Event(record) => events.push(record.event),
+            }
+        }
+        (samples, events)
+    }
+}
+
+/// Mean and standard deviation of the positions, in metres.
+fn positions_m(samples: &[Sample]) -> (f64, f64) {
+    let xs = || samples.iter().map(|sample| sample.estimate.contact.position.x_m);
+    let count = samples.len() as f64;
+    let mean = xs().sum::<f64>() / count;
+    (mean, (xs().map(|x_m| (x_m - mean).powi(2)).sum::<f64>() / count).sqrt())
+}
+
+#[test]
+fn a_tracked_contact_is_closer_than_single_readings_and_its_intervals_hold_it() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let locator = locator(&rig);
+    let of = |estimation: Estimation| {
+        let mut bench = Bench::new(&rig, &locator, estimation);
+        let mut finger = Finger::random(&rig, 5);
+        let (samples, events) = bench.take(10_000);
+        let (mut errors_m, mut held) = (Vec::new(), 0);
+        for sample in &samples {
+            let truth = finger.contact_at(sample.number as f64 / 500.0);
+            let (Some(truth), Status::Located) = (truth, sample.estimate.status) else { continue };
+            let contact = sample.estimate.contact;
+            errors_m.push(contact.position.distance_m(truth.position));
+            let (low_m, high_m) = contact.uncertainty.unwrap().x_95_m;
+            held += usize::from((low_m..=high_m).contains(&truth.position.x_m));
+        }
+        let count = |is: fn(&Event) -> bool| events.iter().filter(|event| is(event)).count();
+        let downs = count(|event| matches!(event, Event::TouchDown { .. }));
+        let offs = count(|event| matches!(event, Event::LiftOff { .. }));
+        let mean_m = errors_m.iter().sum::<f64>() / errors_m.len() as f64;
+        println!(
+            "{estimation:?}: {:.4} mm, {} of {} held, {downs} touch-downs",
+            1e3 * mean_m,
+            held,
+            errors_m.len()
+        );
+        assert!(errors_m.len() > 4000 && downs.abs_diff(offs) <= 1);
+        (mean_m, held as f64 / errors_m.len() as f64, downs)
+    };
+    let (single_m, _, single_downs) = of(Estimation::Single);
+    let (tracked_m, held, downs) = of(Estimation::Track { frequency_hz: None });
+    assert!(tracked_m < 0.5 * single_m, "{tracked_m} {single_m}");
+    assert!((0.88..=1.0).contains(&held), "{held}");
+    assert_eq!(downs, single_downs);
+}
+
+#[test]
+fn a_tracker_is_carried_over_gaps_and_immense_readings() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let locator = locator(&rig);
+    let tracked = Estimation::Track { frequency_hz: None };
+    let mut bench = Bench::new(&rig, &locator, tracked).untouched_first();
+    bench.finger("finger 120 0 3");
+    let sd_m = |sample: &Sample| sample.estimate.contact.uncertainty.unwrap().covariance[0].sqrt();
+    let (before, _) = bench.take(500);
+    // Ten seconds, and four months: what was known is worth ever less, and readings are as good as before.
+    for silent_s in [10.0, 1e7] {
+        bench.silent += Duration::from_secs_f64(silent_s);
+        bench.finger("finger 280 0 3");
+        let (after, events) = bench.take(500);
+        assert!(events.iter().any(|event| matches!(event, Event::Gap { .. })), "{events:?}");
+        assert!(sd_m(&after[0]) > 2.0 * sd_m(&before[499]), "{silent_s} s");
+        assert_eq!(after[499].estimate.status, Status::Located);
+        assert!((after[499].estimate.contact.position.x_m - 0.28).abs() < 2e-4, "{silent_s} s");
+    }
+    let line = palpate_live::source::line(&[1e300; 8]).into_bytes();
+    let elapsed = bench.board.next_at() + bench.silent;
+    let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
+    let mut out = Vec::new();
+    bench.session.receive(&Arrived { at, arrival: Arrival::Bytes(line) }, &mut out);
+    for output in &out {
+        let Output::Sample(sample) = output else { continue };
+        assert!(sample.estimate.is_in_numbers() && sample.estimate.status != Status::Located, "{sample:?}");
+    }
+    let (after, _) = bench.take(500);
+    assert!(after.iter().all(|sample| sample.estimate.is_in_numbers()));
+    assert!((after[499].estimate.contact.position.x_m - 0.28).abs() < 2e-4);
+}
+
+/// α/(2 − α) of the variance of single readings is left.
+#[test]
+fn a_low_pass_leaves_the_noise_that_it_should_and_is_reset_by_silence() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let locator = locator(&rig);
+    let held = |estimation: Estimation| {
+        let mut bench = Bench::new(&rig, &locator, estimation).untouched_first();
+        bench.finger("finger 120 0 3");
+        let (samples, _) = bench.take(5000);
+        (bench, positions_m(&samples[1000..]))
+    };
+    let (_, (_, single_m)) = held(Estimation::Single);
+    let (mut bench, (mean_m, filtered_m)) = held(Estimation::LowPass { cutoff_hz: 10.0 });
+    let alpha = 1.0 - (-std::f64::consts::TAU * 10.0 / 500.0_f64).exp();
+    let expected = (alpha / (2.0 - alpha)).sqrt();
+    let ratio = filtered_m / single_m;
+    assert!((ratio / expected - 1.0).abs() < 0.15, "{ratio}, {expected} expected");
+    assert!((mean_m - 0.12).abs() < 2e-4, "{mean_m}");
+    // Within a stream the filter is late; after a silence the first reading stands for itself.
+    bench.finger("finger 280 0 3");
+    let (late, _) = bench.take(2);
+    assert!((late[1].estimate.contact.position.x_m - 0.28).abs() > 0.01, "{:?}", late[1].estimate.contact);
+    bench.take(500);
+    bench.silent += Duration::from_secs(2);
+    bench.finger("finger 120 0 3");
+    let (first, events) = bench.take(1);
+    assert!(matches!(events[0], Event::Gap { .. }), "{events:?}");
+    assert!((first[0].estimate.contact.position.x_m - 0.12).abs() < 2e-3, "{:?}", first[0].estimate.contact);
+}
+
+#[test]
+fn a_session_that_cannot_be_had_is_refused_with_the_reason() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let influence = locator(&rig);
+    let refused = |locator: &Locator, estimation: Estimation| {
+        let config = SessionConfig { estimation, ..SessionConfig::default() };
+        Session::new(locator, &config).err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    let cutoff = refused(&influence, Estimation::LowPass { cutoff_hz: f64::NAN });
+    assert!(cutoff.contains("the cut-off frequency is NaN"), "{cutoff}");
+    let frequency = refused(&influence, Estimation::Track { frequency_hz: Some(-1.0) });
+    assert!(frequency.contains("the natural frequency is -1"), "{frequency}");
+    let recording = rig.simulate(0).unwrap();
+    let centroid = palpate_estimators::estimator::Estimator::Centroid(palpate_estimators::centroid::Centroid);
+    let centroid = centroid.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
+    let kind = refused(&centroid, Estimation::Track { frequency_hz: None });
+    assert!(kind.contains("influence locator"), "{kind}");
 }

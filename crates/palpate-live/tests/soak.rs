@@ -5,7 +5,7 @@
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::input::{Arrival, Arrived};
 use palpate_live::recording::RecordingSwitch;
-use palpate_live::session::{Session, SessionConfig};
+use palpate_live::session::{Estimation, Session, SessionConfig};
 use palpate_live::simulated_board::{BoardConfig, FaultConfig, Finger, SimulatedBoard};
 use palpate_live::sink::{Batch, Sink};
 use palpate_live::stamp::Stamp;
@@ -42,11 +42,11 @@ fn every_line_is_accounted_for_and_memory_stays_flat() {
     )
     .unwrap()
     .with_faults(faults, 1);
-    let mut session = Session::new(&locator, &SessionConfig::default());
+    let mut session = Session::new(&locator, &SessionConfig::default()).unwrap();
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("soak");
     let _ = std::fs::remove_dir_all(&folder);
     let (reports, _reports) = sync_channel(64);
-    let mut recorder = RecordingSwitch::new(&locator, "soak", reports).unwrap();
+    let mut recorder = RecordingSwitch::new(&locator, Estimation::Single, "soak", reports).unwrap();
     recorder.begin_in(&folder, Some("soak"), 0).unwrap();
 
     let end = Duration::from_secs_f64(60.0 * minutes);

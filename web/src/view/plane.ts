@@ -1,6 +1,7 @@
 // A surface of two directions from above: sensors, and contacts with their 95 % regions.
 
 import type { ContactRecord, PlaceRecord } from "../protocol";
+import { ofCovariance, ofIntervals, RADIUS_95, type Ellipse } from "../model/ellipse";
 import { fit, linear, ticks } from "../model/scale";
 import { isPlaced, number } from "../words";
 import { disc, segment, type Frame } from "./canvas";
@@ -9,10 +10,6 @@ import type { Shown } from "./surface";
 import { drawTargets } from "./targets";
 
 const MARGIN = { left: 44, right: 16, top: 14, bottom: 30 };
-/** The radius that holds 95 % of a normal distribution in the plane, in standard deviations: √(−2 ln 0.05). */
-const RADIUS_95 = 2.4477;
-/** The same of an interval. */
-const HALF_95 = 1.96;
 
 interface Place {
   x: (mm: number) => number;
@@ -124,7 +121,8 @@ function drawTrail(ctx: CanvasRenderingContext2D, shown: Shown, { x, y }: Place)
 function drawContact(ctx: CanvasRenderingContext2D, one: ContactRecord, place: Place, words: string, mark: "full" | "hollow"): void {
   const { contact, card, ink } = palette();
   const [px, py] = [place.x(one.x_mm), place.y(one.y_mm ?? 0)];
-  if (one.x_95_mm !== undefined && one.y_95_mm !== undefined) drawRegion(ctx, one.x_95_mm, one.y_95_mm, place, mark);
+  const ellipse = ellipseOf(one);
+  if (ellipse !== null) drawRegion(ctx, ellipse, place, mark);
   ctx.lineWidth = 2;
   disc(ctx, px, py, 6);
   if (mark === "full") {
@@ -144,17 +142,22 @@ function drawContact(ctx: CanvasRenderingContext2D, one: ContactRecord, place: P
   ctx.fillText(words, Math.min(Math.max(px, half), ctx.canvas.clientWidth - half), Math.max(py - 10, 14));
 }
 
-/** The 95 % intervals of both directions, taken for those of a normal distribution whose directions are independent. */
-function drawRegion(ctx: CanvasRenderingContext2D, x_95: [number, number], y_95: [number, number], { x, y }: Place, mark: "full" | "hollow"): void {
-  const [left, right] = x_95.map(x) as [number, number];
-  const [bottom, top] = y_95.map(y) as [number, number];
-  const [cx, cy] = [(left + right) / 2, (top + bottom) / 2];
-  const grow = RADIUS_95 / HALF_95;
-  const [rx, ry] = [Math.max(1, ((right - left) / 2) * grow), Math.max(1, ((bottom - top) / 2) * grow)];
+/** The ellipse of the covariance; of the intervals where there is none, or where force and place trade off and it does not describe what is known. */
+function ellipseOf(one: ContactRecord): Ellipse | null {
+  if (one.covariance_mm2 !== undefined && one.trade_off === undefined) return ofCovariance(one.x_mm, one.y_mm ?? 0, one.covariance_mm2);
+  return one.x_95_mm !== undefined && one.y_95_mm !== undefined ? ofIntervals(one.x_95_mm, one.y_95_mm) : null;
+}
+
+function drawRegion(ctx: CanvasRenderingContext2D, { x_mm, y_mm, half_mm, angle }: Ellipse, { x, y }: Place, mark: "full" | "hollow"): void {
+  const [cx, cy, perUnit] = [x(x_mm), y(y_mm), x(1) - x(0)];
+  const [rx, ry] = half_mm.map((half) => Math.max(1, half * perUnit)) as [number, number];
+  // Up on the surface is up on the page, where angles go clockwise.
+  const turned = -angle;
   const colour = palette().contact;
   if (mark === "full") {
     ctx.save();
     ctx.translate(cx, cy);
+    ctx.rotate(turned);
     ctx.scale(rx, ry);
     const heat = ctx.createRadialGradient(0, 0, 0, 0, 0, 1.4);
     for (let share = 0; share <= 1; share += 0.125) {
@@ -170,7 +173,7 @@ function drawRegion(ctx: CanvasRenderingContext2D, x_95: [number, number], y_95:
   ctx.lineWidth = 1.5;
   if (mark === "hollow") ctx.setLineDash([3, 2]);
   ctx.beginPath();
-  ctx.ellipse(cx, cy, rx, ry, 0, 0, 2 * Math.PI);
+  ctx.ellipse(cx, cy, rx, ry, turned, 0, 2 * Math.PI);
   ctx.stroke();
   ctx.setLineDash([]);
 }

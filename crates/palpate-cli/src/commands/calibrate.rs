@@ -104,16 +104,22 @@ fn stage(arguments: &Arguments, rig: &Rig) -> Result<Option<Stage>, Failure> {
 /// The file of presses, empty, or with the presses that it had.
 fn journal(arguments: &Arguments, rig: &Rig, stage: Option<&Stage>) -> Result<Journal, Failure> {
     let path = &arguments.presses;
+    let depths = match stage {
+        None => DepthKnowledge::Unknown,
+        Some(stage) if stage.depths_m.len() > 1 => DepthKnowledge::Several,
+        Some(_) => DepthKnowledge::One,
+    };
+    let columns =
+        Journal::columns(&rig.setup, depths).map_err(|error| about_journal(&arguments.rig, &error))?;
     let before = match (path.exists(), arguments.resume) {
         (false, _) => Vec::new(),
-        (true, true) => input::read_recording(&rig.setup, path)?.rows,
+        (true, true) => input::read_recording_as(&rig.setup, path, &columns)?.rows,
         (true, false) => {
             let complaint = Complaint::new(format!("{} is there already", path.display()));
             return Err(complaint.help("--resume goes on with its presses; another name begins anew").into());
         }
     };
-    let depth = if stage.is_some() { DepthKnowledge::Known } else { DepthKnowledge::Unknown };
-    Journal::new(&rig.setup, path, pressed_for(&arguments.rig), before, depth)
+    Journal::new(&rig.setup, path, pressed_for(&arguments.rig), before, depths)
         .map_err(|error| about_journal(&arguments.rig, &error))
 }
 

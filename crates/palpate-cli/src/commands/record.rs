@@ -3,15 +3,15 @@
 use crate::failure::{Complaint, Failure};
 use crate::progress::{self, interrupted};
 use crate::remark::remark;
+use crate::session::SessionOptions;
 use crate::target::{Inputs, Target};
-use crate::{input, output};
+use crate::{input, output, rules};
 use palpate_live::event::Event;
 use palpate_live::input::Input;
 use palpate_live::pipeline;
 use palpate_live::recording::{RecordingStatus, RecordingSwitch};
-use palpate_live::rules::Rules;
-use palpate_live::session::{Counters, Session, SessionConfig};
-use palpate_live::sink::{Batch, JsonLines, MqttSink, MqttUrl, Sink};
+use palpate_live::session::Counters;
+use palpate_live::sink::{Batch, CommandSink, JsonLines, MqttSink, MqttUrl, Sink};
 use palpate_live::source::{Source, SourceUrl};
 use palpate_live::stamp::HostClock;
 use palpate_mechanics::units::format_count;
@@ -35,14 +35,16 @@ pub struct Arguments {
     /// End after so long
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<f64>,
+    #[command(flatten)]
+    session: SessionOptions,
     /// Print samples and events as lines of JSON, too
     #[arg(long)]
     json: bool,
     /// Publish them to a broker, too: mqtt://host/topic
     #[arg(long, value_name = "URL")]
     mqtt: Option<MqttUrl>,
-    /// Publish the messages of a rule file there, too
-    #[arg(long, value_name = "FILE.toml", requires = "mqtt")]
+    /// Publish the messages of a rule file there, and send its commands to the board
+    #[arg(long, value_name = "FILE.toml")]
     rules: Option<PathBuf>,
 }
 
@@ -59,21 +61,37 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // Complains of what is no place for a file; the recorder itself makes it, and writes over nothing.
     Target::new(&arguments.out, &Inputs::new([arguments.locator.as_path()]))?;
+    arguments.session.check_source(&arguments.from)?;
     let locator = input::read_locator(&arguments.locator)?;
     let clock = HostClock::new();
     let (to, from) = sync_channel(pipeline::WAITING);
-    let mut session = Session::new(&locator, &SessionConfig::default());
+    let mut session = arguments.session.session(&locator, &arguments.locator)?;
+    session
+        .set_columns(arguments.from.columns())
+        .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
     let mut sinks: Vec<Box<dyn Sink>> = vec![Box::new(Words)];
+    let (publishing, commanding) = rules::read(arguments.rules.as_deref())?;
+    if let (None, Some(path)) = (&arguments.mqtt, &arguments.rules) {
+        rules::refuse_publishing(&publishing, path, "--mqtt mqtt://host/topic names a broker")?;
+    }
     if let Some(url) = &arguments.mqtt {
-        let rules = arguments.rules.as_deref().map(read_rules).transpose()?;
-        let sink = MqttSink::new(url, session.channels(), session.extent(), rules, to.clone());
+        let sink = MqttSink::new(url, session.channels(), session.extent(), publishing, to.clone());
         sinks.push(Box::new(sink.map_err(Complaint::new)?));
     }
     if arguments.json {
         sinks.push(Box::new(JsonLines::new(std::io::stdout(), session.channels(), session.extent())));
     }
     let source = Source::open(&arguments.from, Path::new(""), clock, to.clone()).map_err(Complaint::new)?;
-    let recording = RecordingSwitch::new(&locator, &arguments.from.to_string(), to.clone());
+    if !commanding.as_slice().is_empty() {
+        let commander = source.commander().map_err(|error| {
+            let complaint =
+                Complaint::new(format!("--from {}: --rules has a `command`: {error}", arguments.from));
+            complaint.help("name a source with a way back, or leave rules with `command` out")
+        })?;
+        sinks.push(Box::new(CommandSink::new(commanding, commander, to.clone())));
+    }
+    let estimation = arguments.session.config().estimation;
+    let recording = RecordingSwitch::new(&locator, estimation, &arguments.from.to_string(), to.clone());
     let recording = recording.map_err(Complaint::new)?;
     recording.begin(&arguments.out).map_err(Complaint::new)?;
     sinks.push(Box::new(recording.clone()));
@@ -82,14 +100,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     drop((source, stop, sinks));
     let status = recording.end().unwrap_or_default();
     finish(arguments, &status, session.counters())
-}
-
-fn read_rules(path: &Path) -> Result<Rules, Failure> {
-    let text = input::read_text(path)?;
-    Rules::from_toml(&text).map_err(|error| {
-        let span = error.span.clone().unwrap_or(0..0);
-        Complaint::new(error).at_span(&path.display().to_string(), &text, span).into()
-    })
 }
 
 /// Says what was recorded.

@@ -3,6 +3,7 @@
 use crate::failure::{Complaint, Failure};
 use crate::progress::interrupted;
 use crate::remark::remark;
+use crate::session::SessionOptions;
 use crate::{input, output};
 use palpate_estimators::estimate_record::EstimateRecord;
 use palpate_estimators::estimator::Locator;
@@ -10,7 +11,7 @@ use palpate_estimators::recording::csv_row;
 use palpate_live::frame::Channel;
 use palpate_live::input::{Arrival, Arrived};
 use palpate_live::recording::{Head, Playback, Recorded};
-use palpate_live::session::{Output, Session, SessionConfig};
+use palpate_live::session::{Estimation, Output, Session};
 use palpate_live::stamp::Stamp;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_count;
@@ -19,7 +20,10 @@ use serde_json::{Map, Value};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Locate the readings of a recording again, by the locator that it holds or by another.
+/// Locate the readings of a recording again, by the locator that it holds or by another, filtered or followed.
+///
+/// Without --locator, --low-pass and --track the tared readings are located again as they were in the session. With any of them the raw readings go
+/// through a session from its start.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The recording, whole or cut off
@@ -27,6 +31,8 @@ pub struct Arguments {
     /// Locate by this locator, from the raw readings
     #[arg(long, value_name = "LOCATOR")]
     locator: Option<PathBuf>,
+    #[command(flatten)]
+    session: SessionOptions,
     /// Print one JSON object a line instead of CSV
     #[arg(long)]
     json: bool,
@@ -47,17 +53,22 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         remark!("{} was cut off, or is being written; it is read up to there", arguments.recording.display());
     }
     let mut out = std::io::stdout().lock();
-    match &arguments.locator {
+    let (path, locator) = match &arguments.locator {
         None => {
-            let locator = input::parse_locator(&arguments.recording, &playback.head().locator)?;
-            by_the_same(arguments, &locator, playback, &mut out)
+            let path = &arguments.recording;
+            (path, input::parse_locator(path, &playback.head().locator)?)
         }
         Some(path) => {
             let locator = input::read_locator(path)?;
             check_channels(playback.head(), &locator)?;
-            by_another(arguments, &locator, playback, &mut out)
+            (path, locator)
         }
+    };
+    if arguments.locator.is_none() && arguments.session.config().estimation == Estimation::Single {
+        return by_the_same(arguments, &locator, playback, &mut out);
     }
+    let session = arguments.session.session(&locator, path)?;
+    by_another(arguments, session, playback, &mut out)
 }
 
 /// Locates what was located, and says whether every estimate is the same.
@@ -68,11 +79,17 @@ fn by_the_same(
     out: &mut impl std::io::Write,
 ) -> Result<(), Failure> {
     let extent = locator.setup.surface().extent();
+    let follower = playback.head().estimation.follower(locator);
+    let mut follower = follower.map_err(|error| Complaint::about(&arguments.recording, error))?;
     begin(arguments, extent, out)?;
     let (mut count, mut others) = (0_u64, 0_u64);
     while let Some(recorded) = playback.next_recorded().map_err(Complaint::new)? {
         let Recorded::Estimate { number, unix_ns, located, estimate: before } = recorded else { continue };
-        let estimate = locator.locate(&located).map_err(Complaint::new)?;
+        let single = locator.locate(&located).map_err(Complaint::new)?;
+        let estimate = match &mut follower {
+            Some(follower) => follower.follow(unix_ns, &located, single),
+            None => single,
+        };
         let line =
             Line { number, time_s: unix_ns as f64 * 1e-9, estimate: EstimateRecord::new(&estimate, extent) };
         count += 1;
@@ -96,14 +113,13 @@ fn by_the_same(
     Ok(())
 }
 
-/// Takes the raw readings through a session of another locator.
+/// Takes the raw readings through another session.
 fn by_another(
     arguments: &Arguments,
-    locator: &Locator,
+    mut session: Session,
     mut playback: Playback,
     out: &mut impl std::io::Write,
 ) -> Result<(), Failure> {
-    let mut session = Session::new(locator, &SessionConfig::default());
     let extent = session.extent();
     begin(arguments, extent, out)?;
     let mut first_ns = None;

@@ -5,6 +5,8 @@ use crate::failure::{Complaint, Failure};
 use crate::input::{self, RigOrLocator};
 use crate::progress::{self, Observer};
 use crate::remark::remark;
+use crate::rules;
+use crate::session::SessionOptions;
 use crate::target::{Inputs, Target};
 use palpate_estimators::estimator::{Estimator, Locator};
 use palpate_estimators::fit::{Fit, FitTask};
@@ -56,6 +58,11 @@ pub struct Arguments {
     /// A folder in which browsers may record the session
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
+    #[command(flatten)]
+    session: SessionOptions,
+    /// Send the commands of a rule file to the board
+    #[arg(long, value_name = "FILE.toml")]
+    rules: Option<PathBuf>,
     /// The address to listen at; any but loopback needs --token
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8377")]
     listen: SocketAddr,
@@ -71,16 +78,24 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(from) = &arguments.from {
+        arguments.session.check_source(from)?;
+    }
+    let (publishing, commanding) = rules::read(arguments.rules.as_deref())?;
+    if let Some(path) = &arguments.rules {
+        rules::refuse_publishing(&publishing, path, "`palpate record --mqtt` has one")?;
+    }
     let token = match arguments.token.as_deref() {
         Some("auto") => Some(made_up_token()?),
         given => given.map(str::to_owned),
     };
     let access =
         Access::new(arguments.listen, token.clone(), arguments.host_name.clone()).map_err(refused)?;
-    let live = Arc::new(match calibration(arguments)? {
-        Some(plan) => recorded(Live::calibrating(plan, PathBuf::new()), arguments),
+    let live = match calibration(arguments)? {
+        Some(plan) => configured(Live::calibrating(plan, PathBuf::new()), arguments),
         None => live(arguments)?,
-    });
+    };
+    let live = Arc::new(live.with_commands(commanding));
     let server =
         Server::start(arguments.listen, access, Arc::clone(&live)).map_err(|error| match &error {
             ServerError::Listen { .. } => {
@@ -128,11 +143,15 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
     if let Err(error) = locator.tare() {
         remark!("warning: no tare, so offsets that have moved stay in the readings: {error}");
     }
+    // A locator that does not go with the options is refused before anything is served.
+    arguments.session.session(&locator, path)?;
     // URLs name paths as the command line does: from the folder it was started in.
-    Ok(recorded(Live::new(locator, &name, simulated, PathBuf::new()), arguments))
+    Ok(configured(Live::new(locator, &name, simulated, PathBuf::new()), arguments))
 }
 
-fn recorded(live: Live, arguments: &Arguments) -> Live {
+/// The same with the recordings and sessions of the arguments.
+fn configured(live: Live, arguments: &Arguments) -> Live {
+    let live = live.with_sessions(arguments.session.config());
     match &arguments.record {
         Some(folder) => live.with_recordings(folder.clone()),
         None => live,

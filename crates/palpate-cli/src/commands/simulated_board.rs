@@ -16,7 +16,8 @@ use std::time::{Duration, Instant};
 
 /// Send what the board of a rig would send, with its noise and with faults, as a serial port or over a network.
 ///
-/// Lines from the other end move its finger: `finger X Y FORCE` in mm and N, `lift`, `reset`; `disconnect` pulls its cable for a second.
+/// Lines from the other end move its finger: `finger X Y FORCE` in mm and N, `lift`, `reset`; `disconnect` pulls its cable for a second. Other lines are
+/// commands, which are shown on stderr and counted.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The rig
@@ -146,7 +147,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let machine = machine(arguments, &rig)?;
     let link = Link::open(&arguments.to).map_err(Complaint::new)?;
     remark!("{}", link.name());
-    Plugged { board, link, machine, away_until: None }.run(arguments)
+    Plugged { board, link, machine, away_until: None, commands: 0 }.run(arguments)
 }
 
 fn load_cell(arguments: &Arguments, rig: &Rig) -> Result<Option<LoadCell>, Failure> {
@@ -214,6 +215,8 @@ struct Plugged<'a> {
     link: Link,
     machine: Option<PluggedMachine>,
     away_until: Option<Instant>,
+    /// Commands that came from the other end.
+    commands: u64,
 }
 
 impl Plugged<'_> {
@@ -257,10 +260,14 @@ impl Plugged<'_> {
 
     fn obey(&mut self) -> Result<(), Failure> {
         for line in self.link.lines() {
-            if line.trim() == "disconnect" {
+            let line = line.trim();
+            if line == "disconnect" {
                 self.disconnect()?;
-            } else if let Err(problem) = self.board.finger_mut().obey(&line) {
-                remark!("`{}`: {problem}", line.trim());
+            } else if !Finger::knows(line) {
+                self.commands += 1;
+                remark!("command {}: {line}", self.commands);
+            } else if let Err(problem) = self.board.finger_mut().obey(line) {
+                remark!("`{line}`: {problem}");
             }
         }
         Ok(())
@@ -275,12 +282,13 @@ impl Plugged<'_> {
     fn finish(&self, unsent: u64) -> Result<(), Failure> {
         let sent = self.board.sent();
         let words = format!(
-            "{} frames whole, {} torn, {} left out; of these {} while unplugged, {} that nobody read",
+            "{} frames whole, {} torn, {} left out; of these {} while unplugged, {} that nobody read; {} commands received",
             format_count(sent.whole),
             format_count(sent.torn),
             format_count(sent.dropped),
             format_count(unsent),
             format_count(self.link.unread),
+            format_count(self.commands),
         );
         if interrupted() {
             return Err(Failure::Interrupted(words));

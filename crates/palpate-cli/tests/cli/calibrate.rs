@@ -66,6 +66,47 @@ fn a_machine_calibrates_to_the_limit_unattended() {
     let evaluation = Evaluation::new(&locator, &trial.judged).unwrap();
     let ratio = limit_ratio(&rig.setup, &evaluation).unwrap();
     assert!((0.8..1.2).contains(&ratio), "{ratio} × the limit");
+    presses_that_are_missing_are_pressed_again(folder.path(), &bench);
+}
+
+/// Names of the columns of a file.
+fn heading_of(csv: &str) -> impl Iterator<Item = &str> {
+    csv.lines().find(|line| !line.starts_with('#')).unwrap().split(',')
+}
+
+/// As after presses that were left out: of the first place one to each depth, and one of another place.
+fn presses_that_are_missing_are_pressed_again(folder: &Path, bench: &Bench) {
+    let path = folder.join("presses.csv");
+    let whole = std::fs::read_to_string(&path).unwrap();
+    let depths = |text: &str| -> Vec<(String, String)> {
+        let column = |name: &str| heading_of(text).position(|cell| cell == name).unwrap();
+        let (at, depth) = (column("position_mm"), column("depth_mm"));
+        let lines = text.lines().filter(|line| !line.starts_with('#')).skip(1);
+        let rows = lines.map(|line| line.split(',').collect::<Vec<&str>>());
+        let mut pressed: Vec<_> = rows
+            .filter(|row| row[depth] != "0")
+            .map(|row| (row[at].to_owned(), row[depth].to_owned()))
+            .collect();
+        pressed.sort();
+        pressed
+    };
+    let all = depths(&whole);
+    assert_eq!(all.iter().filter(|(_, depth)| depth == "1").count(), 27, "{all:?}");
+    let mut pressed = 0;
+    let mut is_kept = |line: &&str| {
+        let row: Vec<&str> = line.split(',').collect();
+        let touches = heading_of(&whole).zip(&row).any(|(name, cell)| name == "depth_mm" && *cell != "0");
+        pressed += usize::from(touches && !line.starts_with('#'));
+        // The heading is no press, though its cell is not 0.
+        !(touches && [3, 6, 41].contains(&pressed))
+    };
+    let kept: Vec<&str> = whole.lines().filter(|line| is_kept(line)).collect();
+    std::fs::write(&path, kept.join("\n") + "\n").unwrap();
+    let output = bench.calibrate(folder, &["--resume"]).output().unwrap();
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    said(&output);
+    assert!(words.contains("3 presses to go"), "{words}");
+    assert_eq!(depths(&std::fs::read_to_string(&path).unwrap()), all);
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod init;
 mod learnt;
 mod limit;
 mod live;
+mod live_session;
 mod nuisances;
 mod outputs;
 mod plane;

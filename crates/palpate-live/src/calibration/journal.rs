@@ -3,7 +3,7 @@
 use crate::whole_file;
 use palpate_estimators::recording::{self, Column, Columns, Recording, Row};
 use palpate_estimators::setup::Setup;
-use palpate_mechanics::units::Dimension;
+use palpate_mechanics::units::{Dimension, Unit};
 use std::path::{Path, PathBuf};
 
 /// Presses so far, and the file that has them.
@@ -53,13 +53,14 @@ impl JournalError {
     }
 }
 
+/// Name of the column of depths, where the rig has none.
+const DEPTH: &str = "depth_mm";
 /// Seconds between the presses of a file and those that go on with it. The time between two runs is not known; what drifted in it is told by the
 /// untouched rows of both.
 const BETWEEN_RUNS_S: f64 = 60.0;
 
 impl Journal {
-    /// A journal that goes on with these rows of before; the file is written with the next press. Where a machine `knows_depths`, a nuisance
-    /// coordinate that is a length is the depth.
+    /// A journal that goes on with these rows of before; the file is written with the next press.
     ///
     /// # Errors
     /// [`JournalError`] where the columns of the rig's recordings cannot be told.
@@ -68,12 +69,40 @@ impl Journal {
         path: &Path,
         comment: String,
         before: Vec<Row>,
-        knows_depths: DepthKnowledge,
+        depths: DepthKnowledge,
     ) -> Result<Self, JournalError> {
-        let columns = columns(setup, knows_depths)?;
+        let columns = Self::columns(setup, depths)?;
         let last_s = before.iter().filter_map(|row| row.time_s).fold(0.0, f64::max);
         let later_s = if before.is_empty() { 0.0 } else { last_s + BETWEEN_RUNS_S };
         Ok(Self { setup: setup.clone(), columns, comment, path: path.to_owned(), rows: before, later_s })
+    }
+
+    /// The columns of a file of presses: those that the rig reads, and where a machine presses to several depths one more, `depth_mm`, by which its rows are
+    /// told from one another when a calibration is gone on with. Where a machine presses, a nuisance coordinate of the rig that is a length is the depth.
+    ///
+    /// # Errors
+    /// [`JournalError`] for columns that nothing tells the values of, or that have no names.
+    pub fn columns(setup: &Setup, depths: DepthKnowledge) -> Result<Columns, JournalError> {
+        let columns = setup.recording_columns();
+        let is_depth = |nuisance: &recording::ValueColumn| nuisance.unit.dimension() == Dimension::Length;
+        let mut nuisances = columns.nuisances();
+        let has_depth = match (nuisances.next(), nuisances.next(), depths) {
+            (None, ..) => false,
+            (Some(nuisance), None, DepthKnowledge::One | DepthKnowledge::Several) if is_depth(nuisance) => {
+                true
+            }
+            (Some(nuisance), ..) => {
+                return Err(JournalError::Nuisance { column: nuisance.column.clone() });
+            }
+        };
+        drop(nuisances);
+        if columns.channels.iter().any(|channel| matches!(channel.column, Column::Number(_))) {
+            return Err(JournalError::Numbered);
+        }
+        Ok(match (depths, Unit::from_symbol("mm")) {
+            (DepthKnowledge::Several, Some(mm)) if !has_depth => columns.nuisance(DEPTH, mm),
+            _ => columns,
+        })
     }
 
     /// The rows so far, of presses and of the untouched surface.
@@ -134,25 +163,10 @@ impl Journal {
 /// Knowledge of the depth of presses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthKnowledge {
-    /// A machine presses to a depth.
-    Known,
     /// A hand presses.
     Unknown,
-}
-
-/// The columns of the file of presses: those that the rig reads.
-fn columns(setup: &Setup, depth: DepthKnowledge) -> Result<Columns, JournalError> {
-    let columns = setup.recording_columns();
-    let is_depth = |nuisance: &recording::ValueColumn| nuisance.unit.dimension() == Dimension::Length;
-    let mut nuisances = columns.nuisances();
-    match (nuisances.next(), nuisances.next(), depth) {
-        (None, ..) => {}
-        (Some(nuisance), None, DepthKnowledge::Known) if is_depth(nuisance) => {}
-        (Some(nuisance), ..) => return Err(JournalError::Nuisance { column: nuisance.column.clone() }),
-    }
-    drop(nuisances);
-    if columns.channels.iter().any(|channel| matches!(channel.column, Column::Number(_))) {
-        return Err(JournalError::Numbered);
-    }
-    Ok(columns)
+    /// A machine presses to one depth.
+    One,
+    /// A machine presses to several depths.
+    Several,
 }

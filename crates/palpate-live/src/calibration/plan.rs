@@ -19,6 +19,9 @@ pub enum PlanError {
 /// The presses of a rig's training positions that are not among the rows of before: each position as often as the rig repeats it, with each of
 /// `depths_m` where a machine presses. The force is `force_n`, where it is given, else that of the rig; it is not known where depths differ.
 ///
+/// A row is one of the presses of its position and, where it says its depth, of that depth: presses that were left out are asked for again, wherever
+/// they stood. The depth of a row is its nuisance coordinate ([`Journal`](super::Journal)).
+///
 /// # Errors
 /// [`PlanError`] where the rig has no positions, or they cannot be laid out.
 pub fn plan(
@@ -35,20 +38,23 @@ pub fn plan(
     };
     let mut plan = Vec::new();
     for position in training.positions(rig.setup.surface().extent())? {
-        let done = before.iter().filter(|row| row.touches() && is_at(row, position)).count();
-        let presses = depths
-            .iter()
-            .flat_map(|depth_m| std::iter::repeat_n(*depth_m, training.repeats))
-            .map(|depth_m| Press { position, force_n, depth_m });
-        plan.extend(presses.skip(done));
+        for depth_m in &depths {
+            let press = Press { position, force_n, depth_m: *depth_m };
+            let done = before.iter().filter(|row| row.touches() && is_of(row, &press)).count();
+            plan.extend(std::iter::repeat_n(press, training.repeats.saturating_sub(done)));
+        }
     }
     Ok(plan)
 }
 
-/// True for a row of this position, but for the rounding of its file.
-fn is_at(row: &Row, position: palpate_mechanics::contact::Position) -> bool {
+/// True for a row of this place and depth, but for the rounding of its file.
+fn is_of(row: &Row, press: &Press) -> bool {
     const ROUNDING_M: f64 = 1e-9;
-    row.position.distance_m(position) < ROUNDING_M
+    let is_deep = match (row.nuisances.first(), press.depth_m) {
+        (Some(row_m), Some(press_m)) => (row_m - press_m).abs() < ROUNDING_M,
+        _ => true,
+    };
+    is_deep && row.position.distance_m(press.position) < ROUNDING_M
 }
 
 #[cfg(test)]
@@ -64,7 +70,7 @@ mod tests {
         Row {
             position: press.position,
             force_n: Some(1.0),
-            nuisances: Vec::new(),
+            nuisances: press.depth_m.into_iter().collect(),
             time_s: None,
             reading: vec![0.5, 0.5],
         }
@@ -98,5 +104,27 @@ mod tests {
         before[2].position.x_m += 1e-13;
         before.push(Row { force_n: Some(0.0), position: Position::default(), ..before[0].clone() });
         assert_eq!(plan(&rig(), None, &[1e-3, 2e-3], &before).unwrap(), all[7..]);
+    }
+
+    #[test]
+    fn presses_that_were_left_out_are_asked_for_again_wherever_they_stood() {
+        let all = plan(&rig(), None, &[1e-3, 2e-3], &[]).unwrap();
+        // Left out: the second press of the first depth, the last of the second depth, and all of the third place.
+        let left_out = |i: usize| [1, 5].contains(&i) || (12..18).contains(&i);
+        let before: Vec<Row> =
+            all[..24].iter().enumerate().filter(|(i, _)| !left_out(*i)).map(|(_, p)| pressed(p)).collect();
+        let expected = [&all[1..2], &all[5..6], &all[12..18], &all[24..]].concat();
+        assert_eq!(plan(&rig(), None, &[1e-3, 2e-3], &before).unwrap(), expected);
+        // One place pressed more often than the rig asks for takes nothing from another.
+        let often: Vec<Row> = std::iter::repeat_n(pressed(&all[0]), 9).collect();
+        assert_eq!(plan(&rig(), None, &[1e-3, 2e-3], &often).unwrap(), all[3..]);
+    }
+
+    #[test]
+    fn a_hand_s_presses_that_were_left_out_are_asked_for_again() {
+        let all = plan(&rig(), None, &[], &[]).unwrap();
+        let before = [pressed(&all[0]), pressed(&all[4])];
+        let expected = [&all[..2], &all[3..5], &all[6..]].concat();
+        assert_eq!(plan(&rig(), None, &[], &before).unwrap(), expected);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::RecordingError;
 use crate::frame::Channel;
+use crate::session::Estimation;
 use palpate_estimators::estimator::Locator;
 use palpate_mechanics::surface::Extent;
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,8 @@ pub struct Head {
     pub source: String,
     /// Channels of a reading, in their order.
     pub channels: Vec<RecordedChannel>,
+    /// How the session came from tared readings to estimates.
+    pub estimation: Estimation,
     /// The locator, as its file has it.
     pub locator: String,
 }
@@ -40,7 +43,7 @@ pub(super) struct Subject {
 }
 
 impl Subject {
-    pub fn new(locator: &Locator, source: &str) -> Result<Self, RecordingError> {
+    pub fn new(locator: &Locator, estimation: Estimation, source: &str) -> Result<Self, RecordingError> {
         let channels = Channel::all_of(&locator.setup);
         let recorded = channels.iter().map(|channel| RecordedChannel {
             name: channel.name.clone(),
@@ -51,6 +54,7 @@ impl Subject {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             source: source.to_owned(),
             channels: recorded.collect(),
+            estimation,
             locator: locator.to_json().map_err(|error| RecordingError::Encode(error.to_string()))?,
         };
         Ok(Self { head, channels, extent: locator.setup.surface().extent() })
@@ -66,15 +70,27 @@ impl Head {
     /// The metadata that say it, beside the locator.
     pub(super) fn metadata(&self) -> BTreeMap<String, String> {
         let channels = serde_json::to_string(&self.channels).unwrap_or_default();
+        let estimation = serde_json::to_string(&self.estimation).unwrap_or_default();
         let of = |key: &str, value: &str| (key.to_owned(), value.to_owned());
-        BTreeMap::from([of("version", &self.version), of("source", &self.source), of("channels", &channels)])
+        BTreeMap::from([
+            of("version", &self.version),
+            of("source", &self.source),
+            of("channels", &channels),
+            of("estimation", &estimation),
+        ])
     }
 
-    /// The head that metadata and an attachment say; `None` where the channels are not there.
+    /// The head that metadata and an attachment say; `None` where the channels are not there, or the estimation is not one that is known. Without any
+    /// readings were located by themselves.
     pub(super) fn from_metadata(metadata: &BTreeMap<String, String>, locator: String) -> Option<Self> {
         let text = |key: &str| metadata.get(key).cloned().unwrap_or_default();
+        let estimation = match metadata.get("estimation") {
+            Some(estimation) => serde_json::from_str(estimation).ok()?,
+            None => Estimation::Single,
+        };
         Some(Self {
             version: text("version"),
+            estimation,
             source: text("source"),
             channels: serde_json::from_str(metadata.get("channels")?).ok()?,
             locator,

@@ -3,6 +3,7 @@
 use super::RecordingError;
 use super::head::{Head, LOCATOR, METADATA};
 use super::schemas::TOPICS;
+use crate::session::Estimation;
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::fs::File;
@@ -73,6 +74,7 @@ impl McapFile {
             version: String::new(),
             source: String::new(),
             channels: Vec::new(),
+            estimation: Estimation::default(),
             locator: String::new(),
         };
         let mut own = Self {
@@ -153,7 +155,7 @@ impl McapFile {
         let metadata = metadata.ok_or_else(|| lacks("it has no metadata `palpate`"))?;
         let locator = locator.ok_or_else(|| lacks("no `locator.json` is attached"))?;
         self.head = Head::from_metadata(&metadata, locator)
-            .ok_or_else(|| lacks("its metadata do not say its channels"))?;
+            .ok_or_else(|| lacks("its metadata do not say its channels and how readings were located"))?;
         Ok(())
     }
 

@@ -295,6 +295,8 @@ impl Playback {
                 let mut estimate: Map<String, Value> = serde_json::from_slice(data).ok()?;
                 let number = estimate.remove("number")?.as_u64()?;
                 let located = estimate.remove("located")?;
+                // Stands beside the record, as on the stream.
+                estimate.remove("covariance_mm2");
                 let located = located.as_array()?.iter().map(Value::as_f64).collect::<Option<_>>()?;
                 Some(Recorded::Estimate { number, unix_ns, located, estimate })
             }

@@ -5,6 +5,7 @@ use super::head::{LOCATOR, METADATA, Subject};
 use super::schemas::{EstimateMessage, ReadingMessage, TOPICS};
 use super::tail::Tail;
 use crate::input::{Command, Input};
+use crate::sample::covariance_mm2;
 use crate::session::Output;
 use crate::sink::{Batch, Sink};
 use mcap::records::MessageHeader;
@@ -252,8 +253,12 @@ impl<'a> Recording<'a> {
                 self.names = names;
                 written?;
                 let record = EstimateRecord::new(&sample.estimate, self.subject.extent);
-                let message =
-                    EstimateMessage { number: sample.number, estimate: record, located: &sample.tared };
+                let message = EstimateMessage {
+                    number: sample.number,
+                    estimate: record,
+                    covariance_mm2: covariance_mm2(&sample.estimate, self.subject.extent),
+                    located: &sample.tared,
+                };
                 self.message(estimate, sample.unix_ns, &message)?;
                 let (first, _) = self.times_ns.unwrap_or((sample.unix_ns, 0));
                 self.times_ns = Some((first, sample.unix_ns));

@@ -25,6 +25,7 @@ const ESTIMATE_SCHEMA: &str = r#"{"title":"palpate.Estimate","type":"object","pr
 "x_mm":{"type":"number"},"y_mm":{"type":"number"},"force_n":{"type":"number"},
 "x_95_mm":{"type":"array","items":{"type":"number"}},"y_95_mm":{"type":"array","items":{"type":"number"}},
 "sd_mm":{"type":"number"},"sd_force_n":{"type":"number"},
+"covariance_mm2":{"type":"array","items":{"type":"number"},"description":"of the position on a plane: xx, xy, yy"},
 "force_95_n":{"type":"array","items":{"type":"number"}},"trade_off":{"type":"string"},
 "status":{"type":"string"},
 "modes":{"type":"array","items":{"type":"object"}},"further":{"type":"array","items":{"type":"object"}},
@@ -50,6 +51,9 @@ pub struct EstimateMessage<'a> {
     /// The estimate.
     #[serde(flatten)]
     pub estimate: EstimateRecord,
+    /// Covariance of the position on a plane: xx, xy and yy in mm².
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub covariance_mm2: Option<[f64; 3]>,
     /// The reading that was located.
     pub located: &'a [f64],
 }

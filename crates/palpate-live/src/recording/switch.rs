@@ -4,6 +4,7 @@ use super::head::Subject;
 use super::recorder::{Recorder, RecordingStatus};
 use super::{EXTENSION, Head, RecordingError};
 use crate::input::Input;
+use crate::session::Estimation;
 use crate::sink::{Batch, Sink};
 use palpate_estimators::estimator::Locator;
 use std::path::{Path, PathBuf};
@@ -19,12 +20,18 @@ pub struct RecordingSwitch {
 }
 
 impl RecordingSwitch {
-    /// A switch that is off. `source` is the URL that recordings say they are of; troubles are told to the session through `reports`.
+    /// A switch that is off, of a session of this locator and estimation. `source` is the URL that recordings say they are of; troubles are told to the session through `reports`.
     ///
     /// # Errors
     /// [`RecordingError::Encode`] for a locator whose file cannot be written.
-    pub fn new(locator: &Locator, source: &str, reports: SyncSender<Input>) -> Result<Self, RecordingError> {
-        Ok(Self { subject: Arc::new(Subject::new(locator, source)?), reports, recorder: Arc::default() })
+    pub fn new(
+        locator: &Locator,
+        estimation: Estimation,
+        source: &str,
+        reports: SyncSender<Input>,
+    ) -> Result<Self, RecordingError> {
+        let subject = Arc::new(Subject::new(locator, estimation, source)?);
+        Ok(Self { subject, reports, recorder: Arc::default() })
     }
 
     /// Head of its recordings: version, source, channels, locator.

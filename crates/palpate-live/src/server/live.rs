@@ -5,11 +5,13 @@ use super::session_info::SessionInfo;
 use super::web_sink::{Hub, WebSink};
 use crate::frame::{Channel, ColumnsError};
 use crate::input::{Command, Input};
-use crate::pipeline;
+use crate::pipeline::{self, PaceError};
 use crate::recording::{self, Excerpt, RecordingError, RecordingStatus, RecordingSummary, RecordingSwitch};
-use crate::session::{Session, SessionConfig};
+use crate::rules::Rules;
+use crate::session::{Session, SessionConfig, SessionError};
 use crate::simulated_board::BoardConfig;
-use crate::source::{Source, SourceError, SourceUrl};
+use crate::sink::{CommandSink, Sink};
+use crate::source::{SendError, Source, SourceError, SourceUrl};
 use crate::stamp::HostClock;
 use palpate_estimators::estimator::Locator;
 use palpate_rig::Rig;
@@ -28,6 +30,10 @@ pub struct Live {
     folder: PathBuf,
     /// Folder of recordings, where sessions may be recorded.
     recordings: Option<PathBuf>,
+    /// Configuration of its sessions.
+    config: SessionConfig,
+    /// Rules whose commands go to the board.
+    commands: Rules,
     clock: HostClock,
     hub: Hub,
     running: Mutex<Option<Running>>,
@@ -78,6 +84,15 @@ pub enum LiveError {
     /// There is no thread for the session.
     #[error("no thread for the session: {0}")]
     Thread(#[from] std::io::Error),
+    /// The session cannot go on as it is configured with this locator.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The readings of the source have other times than the filter or the tracker needs.
+    #[error(transparent)]
+    Pace(#[from] PaceError),
+    /// The source takes no commands, and there are rules that send some.
+    #[error("rules send commands, and {0}")]
+    OneWay(#[from] SendError),
     /// The columns of a source are not those of the locator's channels.
     #[error(transparent)]
     Columns(#[from] ColumnsError),
@@ -119,6 +134,8 @@ impl Live {
             simulated,
             folder,
             recordings: None,
+            config: SessionConfig::default(),
+            commands: Rules::default(),
             clock: HostClock::new(),
             hub: Hub::default(),
             running: Mutex::default(),
@@ -131,11 +148,25 @@ impl Live {
         Self { recordings: Some(folder), ..self }
     }
 
+    /// The same with sessions of this configuration. One that does not go with the locator is refused as a session begins.
+    #[must_use]
+    pub fn with_sessions(self, config: SessionConfig) -> Self {
+        Self { config, ..self }
+    }
+
+    /// The same with rules, whose commands go to the board of each session.
+    #[must_use]
+    pub fn with_commands(self, commands: Rules) -> Self {
+        Self { commands, ..self }
+    }
+
     /// Begins a session with a source; one that runs is ended.
     ///
     /// # Errors
-    /// [`LiveError`] for a source that cannot be opened, or whose columns lack a channel; the session that ran goes on then.
+    /// [`LiveError`] for a source that cannot be opened, or whose columns lack a channel, and for a locator that does not go with the configuration of
+    /// sessions; the session that ran goes on then.
     pub fn begin(&self, url: &SourceUrl) -> Result<(), LiveError> {
+        pipeline::check_pace(&self.config.estimation, url)?;
         self.begin_with(url.to_string(), url.columns(), |clock, to| {
             Source::open(url, &self.folder, clock, to)
         })
@@ -158,9 +189,14 @@ impl Live {
     ) -> Result<(), LiveError> {
         let (inputs, received) = sync_channel(pipeline::WAITING);
         let locator = self.subject().locator.clone().ok_or(LiveError::NoLocator)?;
-        Session::new(&locator, &SessionConfig::default()).set_columns(columns)?;
-        let switch = RecordingSwitch::new(&locator, &url, inputs.clone())?;
+        let config = self.config.clone();
+        Session::new(&locator, &config)?.set_columns(columns)?;
+        let switch = RecordingSwitch::new(&locator, config.estimation, &url, inputs.clone())?;
         let source = open(self.clock, inputs.clone())?;
+        let commands = match self.commands.as_slice() {
+            [] => None,
+            _ => Some(CommandSink::new(self.commands.clone(), source.commander()?, inputs.clone())),
+        };
         let mut running = self.lock();
         if let Some(running) = running.take() {
             running.end();
@@ -168,11 +204,13 @@ impl Live {
         let (clock, hub) = (self.clock, self.hub.clone());
         let (columns, records) = (columns.to_vec(), switch.clone());
         let run = move || {
-            let mut session = Session::new(&locator, &SessionConfig::default());
-            // Refused above, where it would be.
+            // What is refused was refused above.
+            let Ok(mut session) = Session::new(&locator, &config) else { return };
             let _ = session.set_columns(&columns);
             let sink = WebSink::new(hub, session.channels(), session.extent());
-            pipeline::run(&mut session, clock, &received, &mut [Box::new(sink), Box::new(records)]);
+            let mut sinks: Vec<Box<dyn Sink>> = vec![Box::new(sink), Box::new(records)];
+            sinks.extend(commands.map(|commands| Box::new(commands) as Box<dyn Sink>));
+            pipeline::run(&mut session, clock, &received, &mut sinks);
         };
         let thread = std::thread::Builder::new().name("session".to_owned()).spawn(run)?;
         *running = Some(Running { url, inputs, thread, switch, _source: source });
@@ -324,6 +362,7 @@ impl Live {
             .info
             .clone()
             .with_source(self.source())
+            .with_estimation(self.config.estimation)
             .with_recording(recording)
             .with_calibration(self.calibrator.as_ref())
     }

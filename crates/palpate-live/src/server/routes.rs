@@ -146,9 +146,10 @@ fn refusal(error: &LiveError) -> Refusal {
         LiveError::NoSession => (StatusCode::CONFLICT, "choose a source first"),
         LiveError::Behind => (StatusCode::SERVICE_UNAVAILABLE, "try it again"),
         LiveError::NotSimulated => (StatusCode::CONFLICT, "start `palpate serve` with a rig"),
-        LiveError::Source(_) | LiveError::Columns(_) => {
+        LiveError::Source(_) | LiveError::Columns(_) | LiveError::Pace(_) | LiveError::OneWay(_) => {
             (StatusCode::BAD_REQUEST, "start `palpate serve` with another source")
         }
+        LiveError::Session(_) => (StatusCode::CONFLICT, "start `palpate serve` without --track"),
         LiveError::Thread(_) => (StatusCode::INTERNAL_SERVER_ERROR, "start palpate again"),
         LiveError::NoFolder => (StatusCode::CONFLICT, "start `palpate serve` with --record FOLDER"),
         LiveError::Recording(RecordingError::File { error, .. })

@@ -3,6 +3,7 @@
 use super::calibration::Calibrator;
 use crate::frame::Channel;
 use crate::recording::RecordingStatus;
+use crate::session::Estimation;
 use palpate_estimators::description;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::setup::Setup;
@@ -27,6 +28,7 @@ pub struct SessionInfo {
     force: Value,
     tare: Value,
     limit: Option<Value>,
+    estimation: Estimation,
     source: Option<String>,
     recording: Option<Value>,
     has_simulated: bool,
@@ -62,6 +64,7 @@ impl SessionInfo {
             force: json!({ "known_n": known_n, "unknown": known_n.is_none() }),
             tare: json!({ "available": false, "follows": false, "why": why }),
             limit: None,
+            estimation: Estimation::default(),
             source: None,
             recording: None,
             has_simulated: false,
@@ -72,6 +75,11 @@ impl SessionInfo {
     /// The same, while a session of this source runs.
     pub fn with_source(self, source: Option<String>) -> Self {
         Self { source, ..self }
+    }
+
+    /// The same, of sessions that come to estimates in this way.
+    pub fn with_estimation(self, estimation: Estimation) -> Self {
+        Self { estimation, ..self }
     }
 
     /// The same, where there is a calibration.

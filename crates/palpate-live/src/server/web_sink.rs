@@ -129,11 +129,11 @@ pub fn with_missed(message: &Utf8Bytes, missed: u64) -> Utf8Bytes {
 }
 
 /// Version of the binary packets.
-const PACKET_VERSION: u8 = 1;
+const PACKET_VERSION: u8 = 2;
 /// Bytes before the samples of a packet.
 const HEAD_BYTES: usize = 8;
 /// Bytes of a sample before its reading.
-const SAMPLE_BYTES: usize = 44;
+const SAMPLE_BYTES: usize = 48;
 
 /// The samples of a batch as a packet, which docs/live-server.md describes; empty where there are none.
 fn packet(batch: &Batch, channels: &[Channel]) -> Vec<u8> {
@@ -160,6 +160,7 @@ fn packet(batch: &Batch, channels: &[Channel]) -> Vec<u8> {
             sd(|covariance| covariance[0]) * 1e3,
             sd(|covariance| covariance[3]) * 1e3,
             sd(|covariance| covariance[5]),
+            contact.uncertainty.map_or(f64::NAN, |uncertainty| uncertainty.covariance[1]) * 1e6,
         ];
         let readings =
             sample.reading.iter().zip(channels).map(|(value, channel)| value / channel.unit.factor());

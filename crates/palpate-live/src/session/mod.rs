@@ -1,10 +1,15 @@
 //! A session: bytes and instants in; readings, estimates and events out.
 
 mod contact;
+mod estimation;
+mod follower;
 mod health;
+mod low_pass;
 mod taring;
 mod timeline;
 
+pub use estimation::{Estimation, SessionError};
+pub use follower::Follower;
 pub use health::ChannelHealth;
 pub(crate) use health::HealthWatch;
 
@@ -14,18 +19,21 @@ use crate::input::{Arrival, Arrived, Command};
 use crate::sample::Sample;
 use crate::stamp::Stamp;
 use contact::ContactWatch;
+use estimation::EstimationState;
 use palpate_core::Status;
 use palpate_estimators::estimator::Locator;
 use palpate_mechanics::surface::Extent;
 use std::collections::BTreeMap;
 use taring::Taring;
-use timeline::Timeline;
+use timeline::{GapKind, Timeline};
 
 /// Configuration of a session.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SessionConfig {
     /// Treatment of offsets that have moved since calibration.
     pub tare: TareMode,
+    /// How it comes from tared readings to estimates.
+    pub estimation: Estimation,
 }
 
 /// Treatment of offsets that have moved since calibration.
@@ -68,6 +76,7 @@ pub struct Session<'a> {
     decoder: Decoder,
     timeline: Timeline,
     taring: Taring,
+    estimation: EstimationState,
     contact: ContactWatch,
     health: HealthWatch,
     counters: Counters,
@@ -77,21 +86,25 @@ pub struct Session<'a> {
 
 impl<'a> Session<'a> {
     /// A session that has seen nothing.
-    pub fn new(locator: &'a Locator, config: &SessionConfig) -> Self {
+    ///
+    /// # Errors
+    /// [`SessionError`] for a locator by which contacts cannot be followed, where they are to be, or a frequency out of its range.
+    pub fn new(locator: &'a Locator, config: &SessionConfig) -> Result<Self, SessionError> {
         let channels = Channel::all_of(&locator.setup);
         let extent = locator.setup.surface().extent();
-        Self {
+        Ok(Self {
             locator,
             extent,
             decoder: Decoder::new(&channels),
             timeline: Timeline::default(),
             taring: Taring::new(locator, config.tare),
+            estimation: EstimationState::new(&config.estimation, locator)?,
             contact: ContactWatch::new(extent),
             health: HealthWatch::new(locator.setup.layout()),
             counters: Counters::default(),
             was_untouched: false,
             channels,
-        }
+        })
     }
 
     /// Names the values of frames that have no names: every channel, time (`t`, `ms`, `us`), number of the frame (`n`), and others, which are left
@@ -132,10 +145,12 @@ impl<'a> Session<'a> {
         match &arrived.arrival {
             Arrival::Opened(name) => {
                 self.decoder.open();
+                self.estimation.interrupt();
                 self.tell(at, Event::SourceOpened { name: name.clone() }, out);
             }
             Arrival::Joined(name) => {
                 self.decoder.join();
+                self.estimation.interrupt();
                 self.tell(at, Event::SourceOpened { name: name.clone() }, out);
             }
             Arrival::Lost(why) => {
@@ -170,18 +185,25 @@ impl<'a> Session<'a> {
     ) {
         let mut frames = Vec::new();
         decode(&mut self.decoder, &mut |frame| frames.push(frame));
+        let mut behind = frames.iter().filter(|frame| frame.is_ok()).count();
         for frame in frames {
             match frame {
-                Ok(frame) => self.take(at, frame, out),
+                Ok(frame) => {
+                    behind -= 1;
+                    self.take(at, frame, behind, out);
+                }
                 Err(cause) => *self.counters.bad_frames.entry(cause).or_default() += 1,
             }
         }
     }
 
-    /// A reading's way: time, health, tare, estimate, events.
-    fn take(&mut self, at: Stamp, frame: Frame, out: &mut Vec<Output>) {
-        let (unix_ns, gap) = self.timeline.next(at, &frame);
+    /// A reading's way: time, health, tare, filter or none, estimate, events. `behind` more readings have arrived with it.
+    fn take(&mut self, at: Stamp, frame: Frame, behind: usize, out: &mut Vec<Output>) {
+        let (unix_ns, gap) = self.timeline.next(at, &frame, behind);
         if let Some(gap) = gap {
+            if gap.kind == GapKind::Silence {
+                self.estimation.interrupt();
+            }
             self.counters.gaps += 1;
             self.counters.lost_frames += u64::from(gap.lost_frames.unwrap_or(0));
             self.tell(at, Event::Gap { seconds: gap.seconds, lost_frames: gap.lost_frames }, out);
@@ -189,7 +211,14 @@ impl<'a> Session<'a> {
         let time_s = unix_ns as f64 * 1e-9;
         self.health.add(&frame.reading, |event| out.push(Output::Event(EventRecord { time_s, event })));
         let mut tared = frame.reading.clone();
-        let Some((estimate, tares)) = self.taring.locate(self.locator, &frame.reading, &mut tared) else {
+        // The baseline follows single readings, whatever becomes of them afterwards: a filtered reading would be late to show a contact.
+        let located =
+            self.taring.locate(self.locator, &frame.reading, &mut tared).and_then(|(single, tares)| {
+                let state = &mut self.estimation;
+                let estimate = state.estimate(self.locator, unix_ns, &frame.reading, &mut tared, single)?;
+                Some((estimate, tares, single.status == Status::NoContact))
+            });
+        let Some((estimate, tares, is_untouched)) = located else {
             // Immense values whose difference is no number.
             *self.counters.bad_frames.entry(BadFrame::NotANumber).or_default() += 1;
             return;
@@ -199,7 +228,6 @@ impl<'a> Session<'a> {
         }
         self.contact
             .add(at.elapsed, &estimate, |event| out.push(Output::Event(EventRecord { time_s, event })));
-        let is_untouched = estimate.status == Status::NoContact;
         if is_untouched && self.was_untouched {
             self.health.learn_noise();
         }

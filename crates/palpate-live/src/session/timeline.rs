@@ -13,6 +13,8 @@ pub struct Timeline {
     /// The same by the last look.
     seen_ns: i128,
     last_ns: u64,
+    /// When the last reading was taken, as far as is known.
+    last_taken: Option<Duration>,
     last_arrival: Option<Duration>,
     last_sequence: Option<u32>,
     device_clock: DeviceClock,
@@ -28,6 +30,17 @@ pub struct Gap {
     pub seconds: f64,
     /// Frames that the board sent in it, where it counts them.
     pub lost_frames: Option<u32>,
+    /// Kind of the stretch.
+    pub kind: GapKind,
+}
+
+/// Kind of a stretch without readings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GapKind {
+    /// Frames of a stream that went on were lost.
+    LostFrames,
+    /// Nothing came for longer than [`GAP_S`] and [`GAP_PERIODS`].
+    Silence,
 }
 
 /// A wall clock that is off by more was set, in ns: it is slewed by less.
@@ -55,16 +68,27 @@ impl Timeline {
         (by_ns.abs() > SET_NS).then_some(by_ns as f64 * 1e-9)
     }
 
-    /// Time of the next reading in ns since 1970, and the gap before it.
-    pub fn next(&mut self, at: Stamp, frame: &Frame) -> (u64, Option<Gap>) {
+    /// Time of the next reading in ns since 1970, later than that of the one before it, and the gap before it; `behind` more frames have arrived with it.
+    pub fn next(&mut self, at: Stamp, frame: &Frame, behind: usize) -> (u64, Option<Gap>) {
         let gap = self.gap(at.elapsed, frame.sequence);
+        let taken = match frame.device_time {
+            Some(device) => self.device_clock.host_time(device, at.elapsed),
+            None => at.elapsed.saturating_sub(self.period(at.elapsed, behind).mul_f64(behind as f64)),
+        };
         self.count(at.elapsed);
         self.last_arrival = Some(at.elapsed);
         self.last_sequence = frame.sequence;
-        let elapsed =
-            frame.device_time.map_or(at.elapsed, |device| self.device_clock.host_time(device, at.elapsed));
-        self.last_ns = self.unix_ns(Stamp { elapsed, ..at }).max(self.last_ns);
+        self.last_taken = Some(taken);
+        self.last_ns = self.unix_ns(Stamp { elapsed: taken, ..at }).max(self.last_ns + 1);
         (self.last_ns, gap)
+    }
+
+    /// Time between frames that arrived together and tell no time, this one and `behind` more, as through USB: evenly over the time since the last reading,
+    /// but no further apart than is usual.
+    fn period(&self, at: Duration, behind: usize) -> Duration {
+        let since = self.last_taken.map_or(Duration::ZERO, |last| at.saturating_sub(last));
+        let even = since.div_f64(behind as f64 + 1.0);
+        if self.rate_hz > 0.0 { even.min(Duration::from_secs_f64(1.0 / self.rate_hz)) } else { even }
     }
 
     /// Readings a second.
@@ -83,8 +107,12 @@ impl Timeline {
             .map(|step| step.saturating_sub(1));
         let longest_s =
             if self.rate_hz > 0.0 { GAP_S.max(GAP_PERIODS / self.rate_hz) } else { f64::INFINITY };
-        (seconds > longest_s || lost_frames.is_some_and(|lost| lost > 0))
-            .then_some(Gap { seconds, lost_frames })
+        let kind = if seconds > longest_s { GapKind::Silence } else { GapKind::LostFrames };
+        (kind == GapKind::Silence || lost_frames.is_some_and(|lost| lost > 0)).then_some(Gap {
+            seconds,
+            lost_frames,
+            kind,
+        })
     }
 
     fn count(&mut self, now: Duration) {
@@ -111,7 +139,39 @@ mod tests {
         let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
         timeline.look_at_clock(at);
         let device_time = Some(Duration::from_millis(device_ms));
-        timeline.next(at, &Frame { reading: vec![], sequence: Some(sequence), device_time })
+        timeline.next(at, &Frame { reading: vec![], sequence: Some(sequence), device_time }, 0)
+    }
+
+    /// The times, in ms after the start, of frames without a time that arrive in bursts: (ms of the arrival, frames in it).
+    fn burst_times_ms(bursts: impl IntoIterator<Item = (u64, usize)>) -> Vec<f64> {
+        let mut timeline = Timeline::default();
+        let mut times_ms = Vec::new();
+        for (ms, frames) in bursts {
+            let elapsed = Duration::from_millis(ms);
+            let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
+            timeline.look_at_clock(at);
+            for behind in (0..frames).rev() {
+                let frame = Frame { reading: vec![], sequence: None, device_time: None };
+                let (unix_ns, _) = timeline.next(at, &frame, behind);
+                times_ms.push((unix_ns - 1_800_000_000_000_000_000) as f64 * 1e-6);
+            }
+        }
+        times_ms
+    }
+
+    #[test]
+    fn frames_that_arrive_together_are_spread_over_the_time_before_and_never_share_one() {
+        // Four frames every 8 ms for some seconds, then a silence, then four more.
+        let bursts = (1..400).map(|burst| (8 * burst, 4)).chain([(10_000, 4)]);
+        let times_ms = burst_times_ms(bursts);
+        assert!(times_ms.windows(2).all(|pair| pair[1] > pair[0]));
+        for (i, time_ms) in times_ms[4..1596].iter().enumerate() {
+            assert!((time_ms - (8.0 + 2.0 * (i + 1) as f64)).abs() < 0.1, "{i}: {time_ms}");
+        }
+        // After a silence they are as far apart as is usual, not spread over it.
+        for (last, expected_ms) in times_ms[1596..].iter().zip([9994.0, 9996.0, 9998.0, 10_000.0]) {
+            assert!((last - expected_ms).abs() < 0.1, "{last}");
+        }
     }
 
     #[test]

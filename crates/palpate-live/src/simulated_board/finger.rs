@@ -132,6 +132,11 @@ impl Finger {
         Ok(self)
     }
 
+    /// True for a line that is meant for a finger: one that begins with `finger`, `lift` or `reset`.
+    pub fn knows(line: &str) -> bool {
+        matches!(line.split_whitespace().next(), Some("finger" | "lift" | "reset"))
+    }
+
     /// Does what a line of a stage says: `finger x y force` in mm and N holds it there, `lift` lifts it, `reset` lets it go its own way again.
     ///
     /// # Errors
@@ -252,6 +257,12 @@ mod tests {
         assert!((contact.position.x_m - 0.12).abs() < 1e-12 && contact.force_n == 2.5);
         finger.obey("lift").unwrap();
         assert_eq!(finger.contact_at(0.0), None);
+        assert!(
+            Finger::knows(" finger a")
+                && Finger::knows("lift")
+                && !Finger::knows("brake")
+                && !Finger::knows("")
+        );
         for wrong in ["finger 1 2", "finger 999 0 1", "finger 1 0 -1", "finger a b c", "dance", ""] {
             assert!(finger.obey(wrong).is_err(), "{wrong}");
         }

@@ -1,8 +1,10 @@
 //! Sinks: where the outputs of a session go.
 
+mod commands;
 mod json_lines;
 mod mqtt;
 
+pub use commands::CommandSink;
 pub use json_lines::JsonLines;
 pub use mqtt::{MqttSink, MqttUrl, MqttUrlError};
 

@@ -3,7 +3,7 @@
 use super::{Batch, Sink};
 use crate::frame::Channel;
 use crate::input::{Command, Input};
-use crate::rules::{Rule, RuleWatch, Rules};
+use crate::rules::{Action, Rule, RuleWatch, Rules};
 use crate::sample::SampleRecord;
 use crate::session::Output;
 use palpate_mechanics::surface::Extent;
@@ -120,14 +120,14 @@ impl MqttSink {
         url: &MqttUrl,
         channels: &[Channel],
         extent: Extent,
-        rules: Option<Rules>,
+        rules: Rules,
         reports: SyncSender<Input>,
     ) -> std::io::Result<Self> {
         let (to, from) = sync_channel(WAITING);
         let lost = Arc::new(AtomicU64::new(0));
         let publisher = Publisher::open(url, reports, Arc::clone(&lost))?;
         let channels = channels.to_vec();
-        let rules = rules.map(RuleWatch::new);
+        let rules = RuleWatch::new(rules);
         let work = move || publisher.run(&from, &channels, extent, rules);
         let thread = std::thread::Builder::new().name("mqtt-sink".to_owned()).spawn(work)?;
         Ok(Self { to: Some(to), lost, thread: Some(thread) })
@@ -186,13 +186,7 @@ impl Publisher {
         Ok(Self { client, topic: url.topic.clone(), online, done, lost })
     }
 
-    fn run(
-        self,
-        batches: &Receiver<Arc<Batch>>,
-        channels: &[Channel],
-        extent: Extent,
-        mut rules: Option<RuleWatch>,
-    ) {
+    fn run(self, batches: &Receiver<Arc<Batch>>, channels: &[Channel], extent: Extent, mut rules: RuleWatch) {
         loop {
             let batch = match batches.recv_timeout(AGAIN_AFTER) {
                 Ok(batch) => batch,
@@ -200,9 +194,7 @@ impl Publisher {
                 Err(RecvTimeoutError::Disconnected) => break,
             };
             for output in &batch.outputs {
-                if let Some(rules) = &mut rules {
-                    rules.add(output, |rule| self.act(rule));
-                }
+                rules.add(output, |rule| self.act(rule));
                 match output {
                     Output::Sample(sample) => {
                         self.publish("estimate", &SampleRecord::new(sample, channels, extent));
@@ -228,8 +220,8 @@ impl Publisher {
 
     /// Publishes a rule's message: even while the broker is away, for when it comes back.
     fn act(&self, rule: &Rule) {
-        let message = rule.message.as_bytes();
-        if self.client.try_publish(&rule.topic, QoS::AtLeastOnce, false, message).is_err() {
+        let Action::Publish { topic, message } = &rule.action else { return };
+        if self.client.try_publish(topic, QoS::AtLeastOnce, false, message.as_bytes()).is_err() {
             self.lost.fetch_add(1, Ordering::Relaxed);
         }
     }

@@ -10,6 +10,7 @@ mod tcp;
 mod udp;
 mod url;
 
+pub use crate::commander::{Commander, SendError};
 pub use file::line;
 pub use url::{Address, SourceUrl, SourceUrlError};
 
@@ -20,7 +21,7 @@ use palpate_rig::Rig;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -30,8 +31,6 @@ const LOOK: Duration = Duration::from_millis(10);
 const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(5)];
 /// Longest time that a host is given to take a connection.
 const CONNECT: Duration = Duration::from_secs(2);
-/// Commands that wait for a device at most.
-const COMMANDS: usize = 16;
 
 /// A source that cannot be opened at all; one that merely is not there is waited for.
 #[derive(Debug, thiserror::Error)]
@@ -55,26 +54,12 @@ pub enum SourceError {
     Thread(#[from] std::io::Error),
 }
 
-/// A command that is not sent to a device.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SendError {
-    /// The source has no way back.
-    #[error("the source takes no commands; serial ports, TCP and MQTT with a topic without `+` and `#` do")]
-    OneWay,
-    /// The device is not there.
-    #[error("the device is not there; the command was not sent")]
-    Away,
-    /// The device takes commands too slowly.
-    #[error("{COMMANDS} commands wait for the device already; the command was not sent")]
-    Full,
-}
-
 /// An open source: a thread that brings arrivals until it is dropped, within 100 ms of which it ends.
 #[derive(Debug)]
 pub struct Source {
     stop: Arc<AtomicBool>,
     open: Arc<AtomicBool>,
-    commands: Option<SyncSender<Vec<u8>>>,
+    commander: Option<Commander>,
 }
 
 impl Drop for Source {
@@ -98,7 +83,7 @@ impl Outlet {
 
     /// The source whose thread has this outlet, without a way back to the device.
     fn source(&self) -> Source {
-        Source { stop: Arc::clone(&self.stop), open: Arc::clone(&self.open), commands: None }
+        Source { stop: Arc::clone(&self.stop), open: Arc::clone(&self.open), commander: None }
     }
 
     /// Hands an arrival on, stamped now; false once nobody wants more. While the session is behind it waits, and what the device sends gathers in
@@ -148,36 +133,39 @@ impl Source {
     ) -> Result<Self, SourceError> {
         let outlet = Outlet::new(to, clock);
         let mut source = outlet.source();
-        let (commands, for_device) = sync_channel(COMMANDS);
-        let mut takes_commands = true;
+        let (commander, for_device) = Commander::new(Arc::clone(&source.open));
+        // End of a line of commands, where there is a way back.
+        let mut line_end = None;
         match url.clone() {
-            SourceUrl::Stdin => {
-                takes_commands = false;
-                stdin::open(outlet)?;
-            }
-            SourceUrl::File { path, speed } => {
-                takes_commands = false;
-                file::open(outlet, &folder.join(path), speed)?;
-            }
+            SourceUrl::Stdin => stdin::open(outlet)?,
+            SourceUrl::File { path, speed } => file::open(outlet, &folder.join(path), speed)?,
             SourceUrl::Serial { port, baud, .. } => {
+                line_end = Some("\n");
                 spawn(move || serial::run(&outlet, &for_device, &port, baud))?;
             }
-            SourceUrl::Tcp { server, .. } => spawn(move || tcp::run(&outlet, &for_device, &server))?,
-            SourceUrl::Udp { at, .. } => {
-                takes_commands = false;
-                spawn(move || udp::run(&outlet, &for_device, &at))?;
+            SourceUrl::Tcp { server, .. } => {
+                line_end = Some("\n");
+                spawn(move || tcp::run(&outlet, &for_device, &server))?;
             }
+            SourceUrl::Udp { at, .. } => spawn(move || udp::run(&outlet, &for_device, &at))?,
             SourceUrl::Mqtt { broker, topic, .. } => {
-                takes_commands = !topic.contains(['+', '#']);
+                line_end = Some("").filter(|_| !topic.contains(['+', '#']));
                 spawn(move || mqtt::run(&outlet, &for_device, &broker, &topic))?;
             }
             SourceUrl::Simulated { rig, rate_hz, seed } => {
-                takes_commands = false;
                 simulated::open(outlet, &folder.join(rig), rate_hz, seed)?;
             }
         }
-        source.commands = takes_commands.then_some(commands);
+        source.commander = line_end.map(|line_end| commander.with_line_end(line_end));
         Ok(source)
+    }
+
+    /// The way back to the device, for who sends commands beside the source.
+    ///
+    /// # Errors
+    /// [`SendError::OneWay`] where there is none.
+    pub fn commander(&self) -> Result<Commander, SendError> {
+        self.commander.clone().ok_or(SendError::OneWay)
     }
 
     /// Sends a command to the device: bytes to a serial port or a TCP server, a message to the topic of an MQTT board with `/command` behind it.
@@ -186,14 +174,7 @@ impl Source {
     /// # Errors
     /// [`SendError`] where the source has no way back, the device is away, or too many commands wait for it.
     pub fn send(&self, command: &[u8]) -> Result<(), SendError> {
-        let commands = self.commands.as_ref().ok_or(SendError::OneWay)?;
-        if !self.open.load(Ordering::Relaxed) {
-            return Err(SendError::Away);
-        }
-        commands.try_send(command.to_vec()).map_err(|error| match error {
-            TrySendError::Full(_) => SendError::Full,
-            TrySendError::Disconnected(_) => SendError::Away,
-        })
+        self.commander.as_ref().ok_or(SendError::OneWay)?.send(command)
     }
 
     /// Opens a simulated board on the bench of a rig.

@@ -130,6 +130,9 @@ fn a_broker_that_begins_anew_is_subscribed_to_again() {
         }
         bench.source.send(b"zero").unwrap();
         assert_eq!(board.next(), ("bench/values/command".to_owned(), b"zero".to_vec()));
+        // A message is a line, and needs no end.
+        bench.source.commander().unwrap().send_line("brake on").unwrap();
+        assert_eq!(board.next(), ("bench/values/command".to_owned(), b"brake on".to_vec()));
         drop(broker);
         bench.lost();
     }
@@ -171,12 +174,12 @@ fn estimates_events_status_and_rules_reach_a_broker_that_begins_anew() {
     let rig = Rig::from_toml(RIG).unwrap();
     let presses = rig.simulate(0).unwrap();
     let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &presses)).unwrap();
-    let session = Session::new(&locator, &SessionConfig::default());
+    let session = Session::new(&locator, &SessionConfig::default()).unwrap();
     let rules =
         "[[rule]]\nname = \"far\"\nx = [\"0 mm\", \"400 mm\"]\ntopic = \"bench/stop\"\nmessage = \"1\"\n";
     let (reports, told) = sync_channel(64);
     let url = format!("mqtt://127.0.0.1:{port}/bench/left").parse().unwrap();
-    let rules = Some(Rules::from_toml(rules).unwrap());
+    let rules = Rules::from_toml(rules).unwrap();
     let sink = MqttSink::new(&url, session.channels(), session.extent(), rules, reports).unwrap();
     let config = BoardConfig { rate_hz: 200.0, seed: 3, ..BoardConfig::default() };
     let board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, 3)).unwrap();

@@ -1,12 +1,17 @@
 //! Sources over real parts: a pseudo-terminal and sockets; devices that go away and come back.
 
 use crate::bench::{Bench, PATIENCE, lines};
-use palpate_live::input::Arrival;
+use palpate_live::event::{Event, EventRecord};
+use palpate_live::input::{Arrival, Command, Input};
+use palpate_live::rules::Rules;
+use palpate_live::session::Output;
+use palpate_live::sink::{Batch, CommandSink, Sink};
 use palpate_live::source::{SendError, Source};
 use palpate_live::stamp::HostClock;
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream, UdpSocket};
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
@@ -88,12 +93,49 @@ fn a_server_that_goes_away_is_connected_to_again() {
     serve(&server);
 }
 
+/// Rules that act without end, at a board that is read: what is sent is bounded, and said once for each reason.
+#[test]
+fn commands_of_rules_are_bounded_and_what_is_not_sent_is_told() {
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let bench = Bench::open(&format!("tcp://{}", server.local_addr().unwrap()));
+    let (board, _) = server.accept().unwrap();
+    bench.opened();
+    let rules = Rules::from_toml("[[rule]]\nevent = \"mark\"\ncommand = \"brake on\"\n").unwrap();
+    let (reports, told) = sync_channel(64);
+    let mut sink = CommandSink::new(rules, bench.source.commander().unwrap(), reports);
+    let event = Event::Mark { text: String::new() };
+    let mark = Arc::new(Batch { outputs: vec![Output::Event(EventRecord { time_s: 0.0, event })] });
+    for _ in 0..2000 {
+        sink.batch(&mark);
+    }
+    board.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
+    let lines: Vec<String> = BufReader::new(&board).lines().map_while(Result::ok).collect();
+    assert!((16..=50).contains(&lines.len()), "{} lines", lines.len());
+    assert!(lines.iter().all(|line| line == "brake on"), "{lines:?}");
+    let told: Vec<Input> = told.try_iter().collect();
+    assert!((1..=50).contains(&told.len()), "{told:?}");
+    let Some(Input::Command(Command::Trouble(last))) = told.last() else { panic!("{told:?}") };
+    assert!(last.contains("`brake on`") && last.contains("50 commands within 1 s"), "{last}");
+    // Away: said once.
+    drop(board);
+    drop(server);
+    bench.lost();
+    let (reports, told) = sync_channel(64);
+    let rules = Rules::from_toml("[[rule]]\nevent = \"mark\"\ncommand = \"off\"\n").unwrap();
+    let mut sink = CommandSink::new(rules, bench.source.commander().unwrap(), reports);
+    (0..10).for_each(|_| sink.batch(&mark));
+    let told: Vec<Input> = told.try_iter().collect();
+    let [Input::Command(Command::Trouble(text))] = told.as_slice() else { panic!("{told:?}") };
+    assert!(text.contains("the device is not there"), "{text}");
+}
+
 #[test]
 fn datagrams_are_messages() {
     let port = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let bench = Bench::open(&format!("udp://127.0.0.1:{port}"));
     bench.opened();
     assert_eq!(bench.source.send(b"x"), Err(SendError::OneWay));
+    assert_eq!(bench.source.commander().err(), Some(SendError::OneWay));
     let board = UdpSocket::bind("127.0.0.1:0").unwrap();
     for n in 0..1000 {
         let message = lines(n..n + 1);

@@ -1,0 +1,78 @@
+//! Commands to the board that the readings come from, by rules.
+
+use super::{Batch, Sink};
+use crate::commander::{Commander, SendError};
+use crate::input::{Command, Input};
+use crate::rules::{Action, RuleWatch, Rules};
+use crate::session::Output;
+use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+use std::time::{Duration, Instant};
+
+/// Most commands of a stretch of time, and its length: what is beyond is left out, so that a rule that flickers neither drowns a board nor fills its line.
+const MOST: u32 = 50;
+const STRETCH: Duration = Duration::from_secs(1);
+
+/// Sends the commands of rules to the board.
+pub struct CommandSink {
+    rules: RuleWatch,
+    to: Commander,
+    reports: SyncSender<Input>,
+    /// Start of the stretch that is counted, and commands in it.
+    stretch: (Instant, u32),
+    /// Why the last command was not sent, where it was not.
+    trouble: Option<Unsent>,
+}
+
+/// Why a command was not sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+enum Unsent {
+    #[error(transparent)]
+    Device(SendError),
+    #[error("rules have sent {MOST} commands within {} s, which is the most; `hold` makes them act less often", STRETCH.as_secs())]
+    TooMany,
+}
+
+impl CommandSink {
+    /// A sink of rules, of which those that publish do nothing here. What is not sent is told to the session through `reports`: once, until a
+    /// command is sent again.
+    pub fn new(rules: Rules, to: Commander, reports: SyncSender<Input>) -> Self {
+        Self { rules: RuleWatch::new(rules), to, reports, stretch: (Instant::now(), 0), trouble: None }
+    }
+
+    fn add(&mut self, output: &Output) {
+        let mut lines = Vec::new();
+        self.rules.add(output, |rule| {
+            if let Action::Command(line) = &rule.action {
+                lines.push((line.clone(), rule.name.clone()));
+            }
+        });
+        for (line, rule) in lines {
+            let unsent = self.send(&line).err();
+            if let Some(unsent) = unsent.filter(|unsent| self.trouble != Some(*unsent)) {
+                let text = format!("command `{line}` of rule `{rule}`: {unsent}");
+                // A session that is too busy to hear of it has other troubles.
+                let _ = self.reports.try_send(Input::Command(Command::Trouble(text)));
+            }
+            self.trouble = unsent;
+        }
+    }
+
+    fn send(&mut self, line: &str) -> Result<(), Unsent> {
+        let (start, count) = &mut self.stretch;
+        if start.elapsed() >= STRETCH {
+            (*start, *count) = (Instant::now(), 0);
+        }
+        if *count >= MOST {
+            return Err(Unsent::TooMany);
+        }
+        *count += 1;
+        self.to.send_line(line).map_err(Unsent::Device)
+    }
+}
+
+impl Sink for CommandSink {
+    fn batch(&mut self, batch: &Arc<Batch>) {
+        batch.outputs.iter().for_each(|output| self.add(output));
+    }
+}
