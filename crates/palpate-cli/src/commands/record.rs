@@ -1,5 +1,6 @@
 //! `palpate record`: a session into a file.
 
+use super::outlets::Outlets;
 use crate::failure::{Complaint, Failure};
 use crate::progress::{self, interrupted};
 use crate::remark::remark;
@@ -44,6 +45,8 @@ pub struct Arguments {
     /// Publish the messages of a rule file there, too
     #[arg(long, value_name = "FILE.toml", requires = "mqtt")]
     rules: Option<PathBuf>,
+    #[command(flatten)]
+    outlets: Outlets,
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -68,6 +71,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let rules = arguments.rules.as_deref().map(read_rules).transpose()?;
         let sink = MqttSink::new(url, session.channels(), session.extent(), rules, to.clone());
         sinks.push(Box::new(sink.map_err(Complaint::new)?));
+    }
+    // Kept until the end, as Foxglove's server lives in its outlet.
+    let outlets = arguments.outlets.open()?;
+    for open in &outlets {
+        sinks.push(open(session.channels(), session.extent(), to.clone()).map_err(Complaint::new)?);
     }
     if arguments.json {
         sinks.push(Box::new(JsonLines::new(std::io::stdout(), session.channels(), session.extent())));

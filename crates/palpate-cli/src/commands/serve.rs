@@ -1,6 +1,7 @@
 //! `palpate serve`: a session that browsers follow.
 
 use super::calibrate::{about_journal, pressed_for};
+use super::outlets::Outlets;
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RigOrLocator};
 use crate::progress::{self, Observer};
@@ -65,6 +66,8 @@ pub struct Arguments {
     /// A name by which browsers may call this machine, beside its address; may be repeated
     #[arg(long, value_name = "NAME")]
     host_name: Vec<String>,
+    #[command(flatten)]
+    outlets: Outlets,
     /// Seed of fit and simulation
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -77,10 +80,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let access =
         Access::new(arguments.listen, token.clone(), arguments.host_name.clone()).map_err(refused)?;
-    let live = Arc::new(match calibration(arguments)? {
+    let sinks = arguments.outlets.open()?;
+    let live = match calibration(arguments)? {
         Some(plan) => recorded(Live::calibrating(plan, PathBuf::new()), arguments),
         None => live(arguments)?,
-    });
+    };
+    let live = Arc::new(live.with_sinks(sinks));
     let server =
         Server::start(arguments.listen, access, Arc::clone(&live)).map_err(|error| match &error {
             ServerError::Listen { .. } => {

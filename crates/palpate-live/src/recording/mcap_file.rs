@@ -2,7 +2,7 @@
 
 use super::RecordingError;
 use super::head::{Head, LOCATOR, METADATA};
-use super::schemas::TOPICS;
+use crate::schemas::TOPICS;
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::fs::File;

@@ -8,7 +8,6 @@ mod head;
 mod mcap_file;
 mod reader;
 mod recorder;
-mod schemas;
 mod switch;
 mod tail;
 

@@ -9,6 +9,7 @@ use crate::pipeline;
 use crate::recording::{self, Excerpt, RecordingError, RecordingStatus, RecordingSummary, RecordingSwitch};
 use crate::session::{Session, SessionConfig};
 use crate::simulated_board::BoardConfig;
+use crate::sink::{OpenSink, Sink};
 use crate::source::{Source, SourceError, SourceUrl};
 use crate::stamp::HostClock;
 use palpate_estimators::estimator::Locator;
@@ -28,6 +29,8 @@ pub struct Live {
     folder: PathBuf,
     /// Folder of recordings, where sessions may be recorded.
     recordings: Option<PathBuf>,
+    /// Sinks of each session beside browsers and recordings.
+    sinks: Vec<OpenSink>,
     clock: HostClock,
     hub: Hub,
     running: Mutex<Option<Running>>,
@@ -119,6 +122,7 @@ impl Live {
             simulated,
             folder,
             recordings: None,
+            sinks: Vec::new(),
             clock: HostClock::new(),
             hub: Hub::default(),
             running: Mutex::default(),
@@ -129,6 +133,12 @@ impl Live {
     #[must_use]
     pub fn with_recordings(self, folder: PathBuf) -> Self {
         Self { recordings: Some(folder), ..self }
+    }
+
+    /// The same with sinks for each session, beside browsers and recordings.
+    #[must_use]
+    pub fn with_sinks(self, sinks: Vec<OpenSink>) -> Self {
+        Self { sinks, ..self }
     }
 
     /// Begins a session with a source; one that runs is ended.
@@ -165,14 +175,18 @@ impl Live {
         if let Some(running) = running.take() {
             running.end();
         }
-        let (clock, hub) = (self.clock, self.hub.clone());
-        let (columns, records) = (columns.to_vec(), switch.clone());
+        let (clock, columns) = (self.clock, columns.to_vec());
+        let (channels, extent) = (Channel::all_of(&locator.setup), locator.setup.surface().extent());
+        let mut sinks: Vec<Box<dyn Sink>> =
+            vec![Box::new(WebSink::new(self.hub.clone(), &channels, extent)), Box::new(switch.clone())];
+        for open in &self.sinks {
+            sinks.push(open(&channels, extent, inputs.clone())?);
+        }
         let run = move || {
             let mut session = Session::new(&locator, &SessionConfig::default());
             // Refused above, where it would be.
             let _ = session.set_columns(&columns);
-            let sink = WebSink::new(hub, session.channels(), session.extent());
-            pipeline::run(&mut session, clock, &received, &mut [Box::new(sink), Box::new(records)]);
+            pipeline::run(&mut session, clock, &received, &mut sinks);
         };
         let thread = std::thread::Builder::new().name("session".to_owned()).spawn(run)?;
         *running = Some(Running { url, inputs, thread, switch, _source: source });
