@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, PATIENCE, fitted, trouble};
 use palpate_live::sink::ros::{RosMessage, RosSink, RosUrl, TOPICS, Topic, messages};
-use palpate_live::sink::{Batch, Sink};
+use palpate_live::sink::Batch;
 use std::net::TcpListener;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
