@@ -1,8 +1,9 @@
-//! The project's chores: `cargo xtask test | web | wheel | tidy | rig-keys | bench | fuzz`.
+//! The project's chores: `cargo xtask test | wire | web | wheel | tidy | rig-keys | bench | fuzz`.
 #![forbid(unsafe_code)]
 
 mod counts;
 mod dashboard;
+mod features;
 mod fuzz;
 mod needs;
 mod python;
@@ -11,6 +12,7 @@ mod run;
 mod skipped;
 mod test;
 mod tidy;
+mod wire;
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -34,6 +36,8 @@ enum Chore {
         #[arg(long)]
         strict: bool,
     },
+    /// Build the sinks for ROS 2 and Foxglove, which take minutes to compile, and run their tests, clippy and docs
+    Wire,
     /// Build the dashboard of `palpate serve` into web/dist, from which compiling takes it; needs Node
     Web,
     /// Build the wheel of the Python package, and run its tests on it with the oldest and the newest of what it supports
@@ -67,6 +71,7 @@ fn main() -> ExitCode {
         Chore::Test { strict } => {
             test::run(&root, if strict { skipped::Skips::Fail } else { skipped::Skips::Pass })
         }
+        Chore::Wire => wire::run(&root),
         Chore::Web => dashboard::build(&root),
         Chore::Wheel => python::wheel(&root),
         Chore::RigKeys => rig_keys::run(&root),

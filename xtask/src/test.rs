@@ -9,16 +9,15 @@ use anyhow::Result;
 
 use crate::counts::Counts;
 use crate::dashboard;
+use crate::features;
 use crate::needs::{self, NEXTEST, Without};
 use crate::python;
 use crate::run;
 use crate::skipped::{self, STRICT, Skipped, Skips};
 use crate::tidy;
 
-/// Arguments for all that is checked: every crate, with the features that are off by default.
-const EVERYTHING: [&str; 2] = ["--workspace", "--all-features"];
-/// Arguments for what tests need: of [`EVERYTHING`], lest another choice of features compiles it all again for the Python package.
-const TESTED: [&str; 5] = ["--workspace", "--all-features", "--lib", "--tests", "--bin=palpate"];
+/// Targets that tests need, with the features of all that is checked, lest another choice of them compiles it all again for the Python package.
+const TARGETS: [&str; 3] = ["--lib", "--tests", "--bin=palpate"];
 
 /// Result of one step.
 struct Step {
@@ -32,6 +31,9 @@ struct Step {
 pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     let skipped = Skipped::begin(root)?;
     let mut missing = Vec::new();
+    let [workspace, with, features] = features::all_but_slow(root)?;
+    let everything = [workspace.as_str(), &with, &features];
+    let tested = [&everything[..], &TARGETS].concat();
     let prerequisites = step("prerequisites", || prerequisites(root, skips, &mut missing))?;
     // Python's environment and the dashboard are made while the compiler waits for one crate or another; the server holds the dashboard.
     let environment = python::make_environment(root);
@@ -43,20 +45,20 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
             shown(root, &["fetch", "--quiet", "--locked", "--manifest-path", "fuzz/Cargo.toml"])
         })?,
         step("clippy", || {
-            shown(root, &[&["clippy", "--all-targets"], &EVERYTHING[..], &["--", "-D", "warnings"]].concat())
+            shown(root, &[&["clippy", "--all-targets"], &everything[..], &["--", "-D", "warnings"]].concat())
         })?,
         step("build", || {
             let has_dashboard = dashboard::wait(dashboard)?;
-            let (succeeded, counts) = shown(root, &[&["build"], &TESTED[..]].concat())?;
+            let (succeeded, counts) = shown(root, &[&["build"], &tested[..]].concat())?;
             Ok((has_dashboard && succeeded, counts))
         })?,
-        step("tests", || tests(root, skips, &skipped))?,
-        step("doc tests", || watched(cargo(root, &[&["test", "--doc"], &EVERYTHING[..]].concat())))?,
+        step("tests", || tests(root, skips, &skipped, &everything))?,
+        step("doc tests", || watched(cargo(root, &[&["test", "--doc"], &everything[..]].concat())))?,
         step("docs", || {
-            let mut docs = cargo(root, &[&["doc", "--no-deps"], &EVERYTHING[..]].concat());
+            let mut docs = cargo(root, &[&["doc", "--no-deps"], &everything[..]].concat());
             Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
         })?,
-        step("Python tests", || python::test(root, skips, environment, &TESTED))?,
+        step("Python tests", || python::test(root, skips, environment, &tested))?,
         step("dashboard", || dashboard::test(root, skips, &skipped))?,
         step("tidy", || Ok((tidy::run(root)?, None)))?,
     ];
@@ -88,14 +90,14 @@ fn prerequisites(root: &Path, skips: Skips, missing: &mut Vec<String>) -> Outcom
     Ok((succeeded, None))
 }
 
-fn tests(root: &Path, skips: Skips, skipped: &Skipped) -> Outcome {
+fn tests(root: &Path, skips: Skips, skipped: &Skipped, everything: &[&str]) -> Outcome {
     let mut command = if NEXTEST.is_there(root) {
         // One more than there are cores: many a test waits for a board or a server.
         let threads =
             format!("--test-threads={}", thread::available_parallelism().map_or(2, |cores| cores.get() + 1));
-        cargo(root, &[&["nextest", "run", "--no-fail-fast", &threads], &EVERYTHING[..]].concat())
+        cargo(root, &[&["nextest", "run", "--no-fail-fast", &threads], everything].concat())
     } else {
-        cargo(root, &[&["test", "--lib", "--bins", "--tests", "--no-fail-fast"], &EVERYTHING[..]].concat())
+        cargo(root, &[&["test", "--lib", "--bins", "--tests", "--no-fail-fast"], everything].concat())
     };
     command.env(skipped::VARIABLE, &skipped.file);
     match skips {

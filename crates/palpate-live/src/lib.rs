@@ -13,6 +13,7 @@ pub mod pipeline;
 pub mod recording;
 pub mod rules;
 pub mod sample;
+mod schemas;
 pub mod server;
 pub mod session;
 pub mod simulated_board;

@@ -1,5 +1,6 @@
 //! `palpate record`: a session into a file.
 
+use super::outlets::Outlets;
 use crate::failure::{Complaint, Failure};
 use crate::progress::{self, interrupted};
 use crate::remark::remark;
@@ -46,6 +47,8 @@ pub struct Arguments {
     /// Publish the messages of a rule file there, and send its commands to the board
     #[arg(long, value_name = "FILE.toml")]
     rules: Option<PathBuf>,
+    #[command(flatten)]
+    outlets: Outlets,
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -77,6 +80,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(url) = &arguments.mqtt {
         let sink = MqttSink::new(url, session.channels(), session.extent(), publishing, to.clone());
         sinks.push(Box::new(sink.map_err(Complaint::new)?));
+    }
+    // Kept until the end, as Foxglove's server lives in its outlet.
+    let outlets = arguments.outlets.open()?;
+    for open in &outlets {
+        sinks.push(open(session.channels(), session.extent(), to.clone()).map_err(Complaint::new)?);
     }
     if arguments.json {
         sinks.push(Box::new(JsonLines::new(std::io::stdout(), session.channels(), session.extent())));

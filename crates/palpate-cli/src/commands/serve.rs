@@ -1,6 +1,7 @@
 //! `palpate serve`: a session that browsers follow.
 
 use super::calibrate::{about_journal, pressed_for};
+use super::outlets::Outlets;
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RigOrLocator};
 use crate::progress::{self, Observer};
@@ -72,6 +73,8 @@ pub struct Arguments {
     /// A name by which browsers may call this machine, beside its address; may be repeated
     #[arg(long, value_name = "NAME")]
     host_name: Vec<String>,
+    #[command(flatten)]
+    outlets: Outlets,
     /// Seed of fit and simulation
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -91,11 +94,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let access =
         Access::new(arguments.listen, token.clone(), arguments.host_name.clone()).map_err(refused)?;
+    let sinks = arguments.outlets.open()?;
     let live = match calibration(arguments)? {
         Some(plan) => configured(Live::calibrating(plan, PathBuf::new()), arguments),
         None => live(arguments)?,
     };
-    let live = Arc::new(live.with_commands(commanding));
+    let live = Arc::new(live.with_commands(commanding).with_sinks(sinks));
     let server =
         Server::start(arguments.listen, access, Arc::clone(&live)).map_err(|error| match &error {
             ServerError::Listen { .. } => {

@@ -120,3 +120,29 @@ fn bad_input_is_refused_with_its_place() {
     assert!(told.contains("no.mcap"), "{told}");
     assert!(!folder.path().join("never.mcap").exists());
 }
+
+#[test]
+fn outlets_are_refused_with_what_is_wrong_or_how_to_build_them() {
+    let folder = bench();
+    let record = ["record", "locator.json", "--from", BOARD, "--out", "never.mcap"];
+    let refused = |option: &[&str]| complained(&run(folder.path(), &[&record[..], option].concat()), 2);
+    for (option, value, what) in [
+        ("--ros", "robot:7447", "tcp/"),
+        ("--ros", "tcp/robot:99999", "1 to 65535"),
+        ("--ros", "tcp/robot?domain=233", "0 to 232"),
+        ("--ros", "tcp/robot?topic=a", "domain, name and frame"),
+        ("--foxglove", "8765", "8765"),
+        ("--foxglove", "localhost:8765", "localhost:8765"),
+    ] {
+        let told = refused(&[option, value]);
+        assert!(told.contains(option) && told.contains(what), "{value}: {told}");
+    }
+    #[cfg(not(feature = "ros"))]
+    assert!(refused(&["--ros", "tcp/robot"]).contains("--features ros"));
+    #[cfg(not(feature = "foxglove"))]
+    for verb in [&record[..], &["serve", "locator.json"]] {
+        let told = complained(&run(folder.path(), &[verb, &["--foxglove", "127.0.0.1:0"]].concat()), 2);
+        assert!(told.contains("--features foxglove"), "{told}");
+    }
+    assert!(!folder.path().join("never.mcap").exists());
+}

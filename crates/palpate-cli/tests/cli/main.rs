@@ -29,3 +29,5 @@ mod supported_beams;
 mod tare;
 mod track;
 mod verbs;
+#[cfg(all(feature = "foxglove", feature = "ros"))]
+mod wire;

@@ -2,7 +2,8 @@
 
 use super::RecordingError;
 use super::head::{Head, LOCATOR, METADATA};
-use super::schemas::TOPICS;
+use super::whole_record::parse;
+use crate::schemas::TOPICS;
 use crate::session::Estimation;
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -174,7 +175,7 @@ impl McapFile {
     pub fn messages(&mut self, chunk: &ChunkPlace) -> Result<Vec<RawMessage>, RecordingError> {
         let mut messages = Vec::new();
         let Some(body) = self.body(chunk.at, chunk.length)? else { return Ok(messages) };
-        let Ok(Record::Chunk { header, data }) = mcap::parse_record(op::CHUNK, &body) else {
+        let Some(Record::Chunk { header, data }) = parse(op::CHUNK, &body) else {
             return Ok(messages);
         };
         if header.uncompressed_size > MOST {
@@ -200,10 +201,9 @@ impl McapFile {
                     records.notify_read(next.len());
                     rest = later;
                 }
-                Ok(LinearReadEvent::Record { data, opcode }) => match mcap::parse_record(opcode, data) {
-                    Ok(record) => self.take(record, &mut messages),
-                    Err(_) => break,
-                },
+                Ok(LinearReadEvent::Record { data, opcode }) => {
+                    parse(opcode, data).into_iter().for_each(|record| self.take(record, &mut messages));
+                }
                 Err(_) => break,
             }
         }
@@ -229,19 +229,8 @@ impl McapFile {
 
     fn locator(&mut self, place: &RecordPlace) -> Result<Option<String>, RecordingError> {
         let Some(body) = self.body(place.at, place.length)? else { return Ok(None) };
-        // Times, then name and media type with their lengths, the length of the content, the content, a checksum. MCAP's own parser takes for granted that
-        // so much is there.
-        let text = |at: usize| -> Option<usize> {
-            let length = u32::from_le_bytes(body.get(at..at.checked_add(4)?)?.try_into().ok()?);
-            at.checked_add(4)?.checked_add(length as usize)
-        };
-        let fits =
-            text(16).and_then(text).and_then(|at| at.checked_add(8 + 4)).is_some_and(|end| end <= body.len());
-        if !fits {
-            return Ok(None);
-        }
-        match mcap::parse_record(op::ATTACHMENT, &body) {
-            Ok(Record::Attachment { header, data, .. }) if header.name == LOCATOR => {
+        match parse(op::ATTACHMENT, &body) {
+            Some(Record::Attachment { header, data, .. }) if header.name == LOCATOR => {
                 Ok(String::from_utf8(data.into_owned()).ok())
             }
             _ => Ok(None),
@@ -250,7 +239,7 @@ impl McapFile {
 
     fn record(&mut self, place: &RecordPlace) -> Result<Option<Record<'static>>, RecordingError> {
         let Some(body) = self.body(place.at, place.length)? else { return Ok(None) };
-        Ok(mcap::parse_record(place.op, &body).ok().map(Record::into_owned))
+        Ok(parse(place.op, &body).map(Record::into_owned))
     }
 
     /// The next record that is whole; the file is at its content then.

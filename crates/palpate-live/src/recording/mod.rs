@@ -8,9 +8,9 @@ mod head;
 mod mcap_file;
 mod reader;
 mod recorder;
-mod schemas;
 mod switch;
 mod tail;
+mod whole_record;
 
 pub use head::{Head, RecordedChannel};
 pub use reader::{Excerpt, Playback, Recorded, RecordingSummary, list, read, summary};

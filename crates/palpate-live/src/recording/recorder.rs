@@ -2,10 +2,10 @@
 
 use super::RecordingError;
 use super::head::{LOCATOR, METADATA, Subject};
-use super::schemas::{EstimateMessage, ReadingMessage, TOPICS};
 use super::tail::Tail;
 use crate::input::{Command, Input};
 use crate::sample::covariance_mm2;
+use crate::schemas::{EstimateMessage, ReadingMessage, TOPICS};
 use crate::session::Output;
 use crate::sink::{Batch, Sink};
 use mcap::records::MessageHeader;

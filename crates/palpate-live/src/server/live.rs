@@ -10,7 +10,7 @@ use crate::recording::{self, Excerpt, RecordingError, RecordingStatus, Recording
 use crate::rules::Rules;
 use crate::session::{Session, SessionConfig, SessionError};
 use crate::simulated_board::BoardConfig;
-use crate::sink::{CommandSink, Sink};
+use crate::sink::{CommandSink, OpenSink, Sink};
 use crate::source::{SendError, Source, SourceError, SourceUrl};
 use crate::stamp::HostClock;
 use palpate_estimators::estimator::Locator;
@@ -34,6 +34,8 @@ pub struct Live {
     config: SessionConfig,
     /// Rules whose commands go to the board.
     commands: Rules,
+    /// Sinks of each session beside browsers and recordings.
+    sinks: Vec<OpenSink>,
     clock: HostClock,
     hub: Hub,
     running: Mutex<Option<Running>>,
@@ -136,6 +138,7 @@ impl Live {
             recordings: None,
             config: SessionConfig::default(),
             commands: Rules::default(),
+            sinks: Vec::new(),
             clock: HostClock::new(),
             hub: Hub::default(),
             running: Mutex::default(),
@@ -158,6 +161,12 @@ impl Live {
     #[must_use]
     pub fn with_commands(self, commands: Rules) -> Self {
         Self { commands, ..self }
+    }
+
+    /// The same with sinks for each session, beside browsers and recordings.
+    #[must_use]
+    pub fn with_sinks(self, sinks: Vec<OpenSink>) -> Self {
+        Self { sinks, ..self }
     }
 
     /// Begins a session with a source; one that runs is ended.
@@ -201,15 +210,18 @@ impl Live {
         if let Some(running) = running.take() {
             running.end();
         }
-        let (clock, hub) = (self.clock, self.hub.clone());
-        let (columns, records) = (columns.to_vec(), switch.clone());
+        let (clock, columns) = (self.clock, columns.to_vec());
+        let (channels, extent) = (Channel::all_of(&locator.setup), locator.setup.surface().extent());
+        let mut sinks: Vec<Box<dyn Sink>> =
+            vec![Box::new(WebSink::new(self.hub.clone(), &channels, extent)), Box::new(switch.clone())];
+        for open in &self.sinks {
+            sinks.push(open(&channels, extent, inputs.clone())?);
+        }
+        sinks.extend(commands.map(|commands| Box::new(commands) as Box<dyn Sink>));
         let run = move || {
             // What is refused was refused above.
             let Ok(mut session) = Session::new(&locator, &config) else { return };
             let _ = session.set_columns(&columns);
-            let sink = WebSink::new(hub, session.channels(), session.extent());
-            let mut sinks: Vec<Box<dyn Sink>> = vec![Box::new(sink), Box::new(records)];
-            sinks.extend(commands.map(|commands| Box::new(commands) as Box<dyn Sink>));
             pipeline::run(&mut session, clock, &received, &mut sinks);
         };
         let thread = std::thread::Builder::new().name("session".to_owned()).spawn(run)?;

@@ -1,18 +1,25 @@
 //! Sinks: where the outputs of a session go.
 
 mod commands;
+#[cfg(feature = "foxglove")]
+pub mod foxglove;
 mod json_lines;
 mod mqtt;
+pub mod ros;
 
 pub use commands::CommandSink;
 pub use json_lines::JsonLines;
 pub use mqtt::{MqttSink, MqttUrl, MqttUrlError};
 
 use crate::event::{ChannelState, EventRecord};
+use crate::frame::Channel;
+use crate::input::Input;
 use crate::sample::Sample;
 use crate::session::{Counters, Output};
+use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
 
 /// Outputs that follow from one arrival, in their order; shared by all sinks.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -75,3 +82,10 @@ pub trait Sink: Send {
         let _ = state;
     }
 }
+
+/// Opens a sink for each session that begins: of samples of these channels on a surface of this extent; troubles are told to the session.
+///
+/// # Errors
+/// No thread for it.
+pub type OpenSink =
+    Box<dyn Fn(&[Channel], Extent, SyncSender<Input>) -> std::io::Result<Box<dyn Sink>> + Send + Sync>;

@@ -1,4 +1,4 @@
-//! Topics of a recording, their JSON schemas, and their messages.
+//! Topics of recordings and of Foxglove, their JSON schemas, and their messages.
 
 use crate::sample::Sample;
 use palpate_estimators::estimate_record::EstimateRecord;
@@ -20,7 +20,8 @@ pub const EVENT: &str = "/event";
 const READING_SCHEMA: &str = r#"{"title":"palpate.Reading","type":"object","properties":{
 "number":{"type":"integer","description":"which reading of the session, from 0"},
 "values":{"type":"object","additionalProperties":{"type":"number"},"description":"what the board sent, one number a channel, in the units of the metadata"}}}"#;
-const ESTIMATE_SCHEMA: &str = r#"{"title":"palpate.Estimate","type":"object","properties":{
+/// Schema of estimates.
+pub const ESTIMATE_SCHEMA: &str = r#"{"title":"palpate.Estimate","type":"object","properties":{
 "number":{"type":"integer","description":"the reading that it is of"},
 "x_mm":{"type":"number"},"y_mm":{"type":"number"},"force_n":{"type":"number"},
 "x_95_mm":{"type":"array","items":{"type":"number"}},"y_95_mm":{"type":"array","items":{"type":"number"}},
@@ -30,7 +31,8 @@ const ESTIMATE_SCHEMA: &str = r#"{"title":"palpate.Estimate","type":"object","pr
 "status":{"type":"string"},
 "modes":{"type":"array","items":{"type":"object"}},"further":{"type":"array","items":{"type":"object"}},
 "located":{"type":"array","items":{"type":"number"},"description":"the tared reading that was located, in SI units or raw"}}}"#;
-const EVENT_SCHEMA: &str = r#"{"title":"palpate.Event","type":"object","properties":{
+/// Schema of events.
+pub const EVENT_SCHEMA: &str = r#"{"title":"palpate.Event","type":"object","properties":{
 "time_s":{"type":"number","description":"seconds since 1970-01-01 00:00 UTC"},
 "event":{"type":"string"},"text":{"type":"string"},"name":{"type":"string"},"state":{"type":"string"},"why":{"type":"string"},
 "seconds":{"type":"number"},"x_mm":{"type":"number"},"y_mm":{"type":"number"},"force_n":{"type":"number"}}}"#;

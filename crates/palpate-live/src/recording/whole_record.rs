@@ -1,0 +1,91 @@
+//! Records whose texts and lists lie within them.
+//!
+//! MCAP's own parser allocates what a length says before it looks for so much: four gigabytes for a record of a hundred bytes.
+
+use mcap::records::{Record, op};
+
+/// A part of a record.
+#[derive(Clone, Copy)]
+enum Part {
+    /// So many bytes.
+    Bytes(usize),
+    /// A length of four bytes, and so many bytes.
+    Text,
+    /// The same of eight bytes.
+    Long,
+    /// A length of four bytes, and pairs of texts in so many bytes.
+    Map,
+}
+
+use Part::{Bytes, Long, Map, Text};
+
+/// The parts of the kinds of records that a recording is read from.
+fn parts(kind: u8) -> Option<&'static [Part]> {
+    match kind {
+        op::CHANNEL => Some(&[Bytes(2 + 2), Text, Text, Map]),
+        op::MESSAGE => Some(&[Bytes(2 + 4 + 8 + 8)]),
+        op::CHUNK => Some(&[Bytes(8 + 8 + 8 + 4), Text, Long]),
+        op::MESSAGE_INDEX => Some(&[Bytes(2), Text]),
+        op::ATTACHMENT => Some(&[Bytes(8 + 8), Text, Text, Long, Bytes(4)]),
+        op::METADATA => Some(&[Text, Map]),
+        _ => None,
+    }
+}
+
+/// A record of a kind that a recording is read from; `None` of any other, and of one whose parts are not within it.
+pub(super) fn parse(kind: u8, body: &[u8]) -> Option<Record<'_>> {
+    let mut rest = body;
+    for part in parts(kind)? {
+        rest = after(*part, rest)?;
+    }
+    mcap::parse_record(kind, body).ok()
+}
+
+/// What comes after a part.
+fn after(part: Part, bytes: &[u8]) -> Option<&[u8]> {
+    let past = |head: usize, length: u64| bytes.get(head..)?.get(usize::try_from(length).ok()?..);
+    let short = || bytes.first_chunk().copied().map(u32::from_le_bytes);
+    match part {
+        Bytes(count) => bytes.get(count..),
+        Text => past(4, short()?.into()),
+        Long => past(8, bytes.first_chunk().copied().map(u64::from_le_bytes)?),
+        Map => {
+            let after_map = past(4, short()?.into())?;
+            let mut pairs = &bytes[4..bytes.len() - after_map.len()];
+            while !pairs.is_empty() {
+                pairs = after(Text, pairs)?;
+            }
+            Some(after_map)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(text: &str) -> Vec<u8> {
+        [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat()
+    }
+
+    #[test]
+    fn metadata_are_read_and_lengths_beyond_the_record_are_not_believed() {
+        let pairs = [text("key"), text("value")].concat();
+        let map = [&(pairs.len() as u32).to_le_bytes()[..], &pairs].concat();
+        let whole = [text("palpate"), map].concat();
+        let Some(Record::Metadata(found)) = parse(op::METADATA, &whole) else { panic!("it is whole") };
+        assert_eq!((found.name.as_str(), found.metadata["key"].as_str()), ("palpate", "value"));
+        for at in [0, 11, 15, 22] {
+            let mut wrong = whole.clone();
+            wrong[at..at + 4].fill(0xFF);
+            assert!(parse(op::METADATA, &wrong).is_none(), "{at}");
+        }
+        (0..whole.len())
+            .for_each(|length| assert!(parse(op::METADATA, &whole[..length]).is_none(), "{length}"));
+    }
+
+    #[test]
+    fn other_kinds_are_none() {
+        assert!(parse(op::STATISTICS, &[0; 64]).is_none());
+    }
+}

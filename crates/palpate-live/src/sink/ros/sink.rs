@@ -1,0 +1,239 @@
+//! The sink over a Zenoh session.
+
+use super::keys::{Keys, TOPICS};
+use super::messages::messages;
+use super::url::RosUrl;
+use crate::frame::Channel;
+use crate::input::{Command, Input};
+use crate::session::Output;
+use crate::sink::{Batch, Sink};
+use palpate_mechanics::surface::Extent;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::CongestionControl;
+use zenoh::{Config, Session, Wait};
+
+/// Batches that wait for the router at most; those beyond are counted as lost.
+const WAITING: usize = 1024;
+/// Time before it is tried again to reach a router.
+const AGAIN_AFTER: Duration = Duration::from_millis(500);
+/// Time between two looks whether the router is there.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+/// Longest wait at the end for the router to hear of it.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Publishes points, wrenches, estimates and events to the nodes of ROS 2 behind a Zenoh router.
+///
+/// While the router is away, samples and events are counted as lost; it is tried again until it is there.
+pub struct RosSink {
+    to: Option<SyncSender<Arc<Batch>>>,
+    lost: Arc<AtomicU64>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl RosSink {
+    /// A node of ROS on a router, which need not be there yet; troubles are told to the session through `reports`.
+    ///
+    /// # Errors
+    /// No thread for it.
+    pub fn new(
+        url: &RosUrl,
+        channels: &[Channel],
+        extent: Extent,
+        reports: SyncSender<Input>,
+    ) -> std::io::Result<Self> {
+        let (to, from) = sync_channel(WAITING);
+        let lost = Arc::new(AtomicU64::new(0));
+        let worker = Worker {
+            url: url.clone(),
+            channels: channels.to_vec(),
+            extent,
+            reports,
+            lost: Arc::clone(&lost),
+            was_there: None,
+        };
+        let thread =
+            std::thread::Builder::new().name("ros-sink".to_owned()).spawn(move || worker.run(&from))?;
+        Ok(Self { to: Some(to), lost, thread: Some(thread) })
+    }
+
+    /// Samples and events that no router took.
+    pub fn lost(&self) -> u64 {
+        self.lost.load(Ordering::Relaxed)
+    }
+}
+
+impl Sink for RosSink {
+    fn batch(&mut self, batch: &Arc<Batch>) {
+        let Some(to) = &self.to else { return };
+        if to.try_send(Arc::clone(batch)).is_err() {
+            self.lost.fetch_add(batch.outputs.len() as u64, Ordering::Relaxed);
+        }
+    }
+}
+
+impl Drop for RosSink {
+    fn drop(&mut self) {
+        drop(self.to.take());
+        let Some(thread) = self.thread.take() else { return };
+        let until = Instant::now() + PATIENCE;
+        while !thread.is_finished() && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        // A thread that waits for a host that does not answer ends by itself, seconds later.
+        if thread.is_finished() {
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Worker {
+    url: RosUrl,
+    channels: Vec<Channel>,
+    extent: Extent,
+    reports: SyncSender<Input>,
+    lost: Arc<AtomicU64>,
+    /// Whether the router was there at the last look; `None` before the first.
+    was_there: Option<bool>,
+}
+
+/// The session has ended.
+struct Ended;
+
+impl Worker {
+    fn run(mut self, batches: &Receiver<Arc<Batch>>) {
+        let Ok(session) = self.connect(batches) else { return };
+        let url = self.url.clone();
+        match Node::new(&session, &url) {
+            Ok(mut node) => self.publish(batches, &session, &mut node),
+            Err(_) => self.report("refuses the topics; nothing is published"),
+        }
+        // Nodes of ROS hear at once that this one has gone.
+        let _ = session.close().wait();
+    }
+
+    /// Opens a session with the router, as soon as it is there.
+    fn connect(&mut self, batches: &Receiver<Arc<Batch>>) -> Result<Session, Ended> {
+        loop {
+            let opened = config(&self.url.router).and_then(|config| zenoh::open(config).wait());
+            // What came meanwhile is of the past.
+            while let Ok(batch) = batches.try_recv() {
+                self.lose(&batch);
+            }
+            match opened {
+                Ok(session) => {
+                    self.look(true);
+                    return Ok(session);
+                }
+                Err(_) => self.look(false),
+            }
+            let again_at = Instant::now() + AGAIN_AFTER;
+            while let Some(left) = again_at.checked_duration_since(Instant::now()) {
+                match batches.recv_timeout(left) {
+                    Ok(batch) => self.lose(&batch),
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => return Err(Ended),
+                }
+            }
+        }
+    }
+
+    fn publish(&mut self, batches: &Receiver<Arc<Batch>>, session: &Session, node: &mut Node<'_>) {
+        let mut look_at = Instant::now();
+        loop {
+            let next = batches.recv_timeout(LOOK_EVERY);
+            if Instant::now() >= look_at {
+                self.look(has_router(session));
+                look_at = Instant::now() + LOOK_EVERY;
+            }
+            match next {
+                Ok(batch) if self.was_there == Some(true) => {
+                    for output in &batch.outputs {
+                        if node.publish(output, &self.channels, self.extent).is_err() {
+                            self.lost.fetch_add(1, Ordering::Relaxed);
+                        }
+                    }
+                }
+                Ok(batch) => self.lose(&batch),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+        }
+    }
+
+    fn lose(&self, batch: &Batch) {
+        self.lost.fetch_add(batch.outputs.len() as u64, Ordering::Relaxed);
+    }
+
+    /// Tells where it has changed that the router is there.
+    fn look(&mut self, is_there: bool) {
+        match (self.was_there, is_there) {
+            (Some(false), true) => self.report("is there again"),
+            (None | Some(true), false) => self.report("cannot be reached; it is tried again"),
+            _ => {}
+        }
+        self.was_there = Some(is_there);
+    }
+
+    fn report(&self, what: &str) {
+        let text = format!("the Zenoh router {} {what}", self.url.router);
+        let _ = self.reports.try_send(Input::Command(Command::Trouble(text)));
+    }
+}
+
+/// A client of one router, which looks for no others.
+fn config(router: &str) -> zenoh::Result<Config> {
+    let mut config = Config::default();
+    config.insert_json5("mode", "\"client\"")?;
+    config.insert_json5("connect/endpoints", &format!("[\"{router}\"]"))?;
+    config.insert_json5("connect/retry", "{ period_init_ms: 500, period_max_ms: 500 }")?;
+    config.insert_json5("scouting/multicast/enabled", "false")?;
+    Ok(config)
+}
+
+/// True while a router is there, or another session that takes clients.
+fn has_router(session: &Session) -> bool {
+    let info = session.info();
+    info.routers_zid().wait().next().is_some() || info.peers_zid().wait().next().is_some()
+}
+
+/// A node of ROS with a publisher a topic.
+struct Node<'a> {
+    keys: Keys<'a>,
+    publishers: Vec<Publisher<'static>>,
+    /// Number of the last message of each publisher.
+    numbers: [i64; TOPICS.len()],
+    /// Tell the graph of ROS of node and publishers, as long as they are there.
+    _tokens: Vec<LivelinessToken>,
+}
+
+impl<'a> Node<'a> {
+    fn new(session: &Session, url: &'a RosUrl) -> zenoh::Result<Self> {
+        let identity = session.zid();
+        let keys = Keys { url, session: (identity.to_string(), identity.to_le_bytes()) };
+        let mut tokens = vec![session.liveliness().declare_token(keys.node_token()).wait()?];
+        let mut publishers = Vec::with_capacity(TOPICS.len());
+        for topic in TOPICS {
+            let publisher = session.declare_publisher(keys.data(topic));
+            // A network that is too slow loses messages instead of holding up the others.
+            publishers.push(publisher.congestion_control(CongestionControl::Drop).wait()?);
+            tokens.push(session.liveliness().declare_token(keys.publisher_token(topic)).wait()?);
+        }
+        Ok(Self { keys, publishers, numbers: [0; TOPICS.len()], _tokens: tokens })
+    }
+
+    fn publish(&mut self, output: &Output, channels: &[Channel], extent: Extent) -> zenoh::Result<()> {
+        for message in messages(output, &self.keys.url.frame, channels, extent) {
+            let place = message.topic as usize;
+            self.numbers[place] += 1;
+            let attachment = self.keys.attachment(message.topic, self.numbers[place], message.unix_ns);
+            self.publishers[place].put(message.cdr).attachment(attachment.to_vec()).wait()?;
+        }
+        Ok(())
+    }
+}
