@@ -1,7 +1,8 @@
 //! Topics of recordings and of Foxglove, their JSON schemas, and their messages.
 
-use crate::sample::Sample;
+use crate::sample::{Sample, covariance_mm2};
 use palpate_estimators::estimate_record::EstimateRecord;
+use palpate_mechanics::surface::Extent;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 /// Topics, in the order of their channels in the file.
@@ -58,6 +59,18 @@ pub struct EstimateMessage<'a> {
     pub covariance_mm2: Option<[f64; 3]>,
     /// The reading that was located.
     pub located: &'a [f64],
+}
+
+impl<'a> EstimateMessage<'a> {
+    /// That of a sample.
+    pub fn new(sample: &'a Sample, extent: Extent) -> Self {
+        Self {
+            number: sample.number,
+            estimate: EstimateRecord::new(&sample.estimate, extent),
+            covariance_mm2: covariance_mm2(&sample.estimate, extent),
+            located: &sample.tared,
+        }
+    }
 }
 
 impl Serialize for ReadingMessage<'_> {

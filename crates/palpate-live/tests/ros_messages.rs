@@ -57,8 +57,10 @@ fn vector(x: f64, y: f64, z: f64) -> Value {
     json!({ "x": x, "y": y, "z": z })
 }
 
-/// A session's outputs, the frame, and the topics and fields that follow.
-fn cases() -> Vec<(Output, &'static str, Vec<(Topic, Value)>)> {
+/// A session's output, the frame, and the topics and fields that follow.
+type Case = (Output, &'static str, Vec<(Topic, Value)>);
+
+fn cases() -> Vec<Case> {
     let point =
         |header: &Value, x, y| (Topic::Contact, json!({ "header": header, "point": vector(x, y, 0.0) }));
     let wrench = |header: &Value, force: Value, torque: Value| {

@@ -4,14 +4,12 @@ use super::RecordingError;
 use super::head::{LOCATOR, METADATA, Subject};
 use super::tail::Tail;
 use crate::input::{Command, Input};
-use crate::sample::covariance_mm2;
 use crate::schemas::{EstimateMessage, ReadingMessage, TOPICS};
 use crate::session::Output;
 use crate::sink::{Batch, Sink};
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
-use palpate_estimators::estimate_record::EstimateRecord;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
@@ -252,13 +250,7 @@ impl<'a> Recording<'a> {
                     self.message(reading, sample.unix_ns, &ReadingMessage { sample, channels: &names });
                 self.names = names;
                 written?;
-                let record = EstimateRecord::new(&sample.estimate, self.subject.extent);
-                let message = EstimateMessage {
-                    number: sample.number,
-                    estimate: record,
-                    covariance_mm2: covariance_mm2(&sample.estimate, self.subject.extent),
-                    located: &sample.tared,
-                };
+                let message = EstimateMessage::new(sample, self.subject.extent);
                 self.message(estimate, sample.unix_ns, &message)?;
                 let (first, _) = self.times_ns.unwrap_or((sample.unix_ns, 0));
                 self.times_ns = Some((first, sample.unix_ns));

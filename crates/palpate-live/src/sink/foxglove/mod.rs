@@ -15,7 +15,6 @@ use foxglove::{
     ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema, WebSocketServer,
     WebSocketServerHandle,
 };
-use palpate_estimators::estimate_record::EstimateRecord;
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -140,11 +139,7 @@ impl FoxgloveSink {
     fn sample(&self, sample: &Sample) {
         let at_ns = sample.unix_ns;
         log(&self.reading, at_ns, || ReadingMessage { sample, channels: &self.channels });
-        log(&self.estimate, at_ns, || EstimateMessage {
-            number: sample.number,
-            estimate: EstimateRecord::new(&sample.estimate, self.extent),
-            located: &sample.tared,
-        });
+        log(&self.estimate, at_ns, || EstimateMessage::new(sample, self.extent));
         if self.contact.has_sinks() {
             self.contact.log_with_time(&self.scene.update(&sample.estimate, at_ns), at_ns);
         }
