@@ -3,8 +3,9 @@
 use super::Finding;
 use super::project::{File, Project};
 
-/// The first folders of paths that every Unix machine has, and of the live server's requests. Any other absolute path is somebody's own.
-const EVERYWHERE: [&str; 5] = ["api", "dev", "etc", "proc", "usr"];
+/// The first folders of paths that every Unix machine has, and the first parts of the live server's requests and of its topics in ROS. Any other absolute
+/// path is somebody's own.
+const EVERYWHERE: [&str; 6] = ["api", "dev", "etc", "palpate", "proc", "usr"];
 
 /// Hosts that readers are sent to, or that name a format. Packages are named, not the registries that hold them.
 const HOSTS: [&str; 5] = ["127.0.0.1", "doi.org", "example.org", "www.apache.org", "www.w3.org"];

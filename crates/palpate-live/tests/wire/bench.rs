@@ -37,7 +37,7 @@ impl<'a> Bench<'a> {
         let config = BoardConfig { rate_hz: 200.0, seed: 3, ..BoardConfig::default() };
         Self {
             board: SimulatedBoard::new(&rig.setup, &config, Finger::random(rig, 3)).unwrap(),
-            session: Session::new(locator, &SessionConfig::default()),
+            session: Session::new(locator, &SessionConfig::default()).unwrap(),
             clock: HostClock::new(),
         }
     }
