@@ -1,4 +1,4 @@
-//! Load of the live server over real sockets: latency, losses, CPU seconds, memory.
+//! Load of the live server over real sockets, with a recording beside it: latency, losses, CPU seconds, memory.
 //!
 //! ```console
 //! $ cargo run --release -p palpate-live --example load [SECONDS]
@@ -23,23 +23,25 @@ const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
 /// Browsers at 60 Hz, in the case of many.
 const MANY: usize = 200;
 
-/// A case: readings a second, browsers that follow at 60 Hz, and those that never read.
+/// A case: readings a second, browsers that follow at 60 Hz, those that never read, and whether the session is recorded.
 struct Case {
     rate_hz: f64,
     browsers: usize,
     asleep: usize,
+    records: bool,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let seconds: f64 = std::env::args().nth(1).map_or(Ok(10.0), |text| text.parse())?;
     println!(
-        "readings/s  browsers  asleep  samples  lost  median ms  p99 ms  worst ms  CPU %  memory MB: before, after  messages at 60 Hz"
+        "readings/s  browsers  asleep  samples  lost  recorded  lost  median ms  p99 ms  worst ms  CPU %  memory MB: before, after  messages at 60 Hz"
     );
     for case in [
-        Case { rate_hz: 1_000.0, browsers: 1, asleep: 0 },
-        Case { rate_hz: 20_000.0, browsers: 1, asleep: 0 },
-        Case { rate_hz: 1_000.0, browsers: MANY, asleep: 0 },
-        Case { rate_hz: 1_000.0, browsers: 1, asleep: 3 },
+        Case { rate_hz: 1_000.0, browsers: 1, asleep: 0, records: false },
+        Case { rate_hz: 20_000.0, browsers: 1, asleep: 0, records: false },
+        Case { rate_hz: 20_000.0, browsers: 1, asleep: 0, records: true },
+        Case { rate_hz: 1_000.0, browsers: MANY, asleep: 0, records: false },
+        Case { rate_hz: 1_000.0, browsers: 1, asleep: 3, records: false },
     ] {
         run(&case, Duration::from_secs_f64(seconds))?;
     }
@@ -51,7 +53,9 @@ fn run(case: &Case, length: Duration) -> Result<(), Box<dyn Error>> {
     let recording = rig.simulate(0)?;
     let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording))?;
     let config = BoardConfig { rate_hz: case.rate_hz, seed: 1, ..BoardConfig::default() };
-    let live = Arc::new(Live::new(locator, "load", Some((rig, config)), PathBuf::new()));
+    let folder = tempfile::tempdir()?;
+    let live = Live::new(locator, "load", Some((rig, config)), PathBuf::new());
+    let live = Arc::new(live.with_recordings(folder.path().to_owned()));
     let address: SocketAddr = "127.0.0.1:0".parse()?;
     let server = Server::start(address, Access::new(address, None, Vec::new())?, Arc::clone(&live))?;
     let address = server.address();
@@ -67,12 +71,16 @@ fn run(case: &Case, length: Duration) -> Result<(), Box<dyn Error>> {
         .collect::<Result<_, Box<dyn Error>>>()?;
     let _asleep = (0..case.asleep).map(|_| follow(address, "?rate=all")).collect::<Result<Vec<_>, _>>()?;
     live.begin_simulated()?;
+    if case.records {
+        live.begin_recording(None)?;
+    }
     // What is allocated once is allocated by then.
     std::thread::sleep(Duration::from_secs(1));
     let (before_mb, cpu, start) = (memory_mb(), ProcessTime::now(), Instant::now());
     std::thread::sleep(length);
     let share = cpu.elapsed().as_secs_f64() / start.elapsed().as_secs_f64();
     let after_mb = memory_mb();
+    let recorded = live.end_recording()?.map(|status| (status.readings, status.lost));
     live.end();
     // What is on its way arrives before the connections end.
     std::thread::sleep(Duration::from_millis(200));
@@ -88,12 +96,14 @@ fn run(case: &Case, length: Duration) -> Result<(), Box<dyn Error>> {
     }
     let (least, most) = (messages.iter().min().unwrap_or(&0), messages.iter().max().unwrap_or(&0));
     println!(
-        "{:>10} {:>9} {:>7} {:>8} {:>5} {:>10.2} {:>7.2} {:>9.1} {:>6.0} {:>17.1}, {:.1} {:>12}–{}",
+        "{:>10} {:>9} {:>7} {:>8} {:>5} {:>9} {:>5} {:>10.2} {:>7.2} {:>9.1} {:>6.0} {:>17.1}, {:.1} {:>12}–{}",
         case.rate_hz,
         case.browsers,
         case.asleep,
         latencies_ms.len(),
         lost,
+        recorded.map_or_else(|| "–".to_owned(), |(readings, _)| readings.to_string()),
+        recorded.map_or_else(|| "–".to_owned(), |(_, lost)| lost.to_string()),
         at(0.5),
         at(0.99),
         at(1.0),
