@@ -61,7 +61,7 @@ fn run(case: &Case, length: Duration) -> Result<(), Box<dyn Error>> {
     let address = server.address();
     let all = std::thread::spawn({
         let mut socket = follow(address, "?form=binary&rate=all")?;
-        move || samples(&mut socket)
+        move || packets(&mut socket)
     });
     let browsers: Vec<JoinHandle<usize>> = (0..case.browsers)
         .map(|_| {
@@ -85,7 +85,7 @@ fn run(case: &Case, length: Duration) -> Result<(), Box<dyn Error>> {
     // What is on its way arrives before the connections end.
     std::thread::sleep(Duration::from_millis(200));
     drop(server);
-    let (mut latencies_ms, lost) = all.join().map_err(|_| "a reader has panicked")?;
+    let Packets { mut latencies_ms, sent, lost } = all.join().map_err(|_| "a reader has panicked")?;
     latencies_ms.sort_by(f64::total_cmp);
     let at = |share: f64| {
         latencies_ms.get((share * (latencies_ms.len() - 1) as f64) as usize).copied().unwrap_or(f64::NAN)
@@ -100,7 +100,7 @@ fn run(case: &Case, length: Duration) -> Result<(), Box<dyn Error>> {
         case.rate_hz,
         case.browsers,
         case.asleep,
-        latencies_ms.len(),
+        sent,
         lost,
         recorded.map_or_else(|| "–".to_owned(), |(readings, _)| readings.to_string()),
         recorded.map_or_else(|| "–".to_owned(), |(_, lost)| lost.to_string()),
@@ -123,8 +123,17 @@ fn follow(address: SocketAddr, query: &str) -> Result<WebSocket<TcpStream>, Box<
     Ok(socket)
 }
 
-/// Milliseconds from the last byte of each arrival to its packet, and readings that did not come.
-fn samples(socket: &mut WebSocket<TcpStream>) -> (Vec<f64>, u64) {
+/// What a client of all packets has seen.
+struct Packets {
+    /// From the last byte of each arrival to its packet.
+    latencies_ms: Vec<f64>,
+    /// Samples, with those that did not come.
+    sent: u64,
+    /// Samples that did not come.
+    lost: u64,
+}
+
+fn packets(socket: &mut WebSocket<TcpStream>) -> Packets {
     let (mut latencies_ms, mut lost, mut expected) = (Vec::new(), 0, 0);
     while let Ok(message) = socket.read() {
         let now_ns = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
@@ -140,7 +149,7 @@ fn samples(socket: &mut WebSocket<TcpStream>) -> (Vec<f64>, u64) {
         // Of the readings that arrived together, the last one has the time of its last byte.
         latencies_ms.push(now_ns.saturating_sub(last_ns) as f64 * 1e-6);
     }
-    (latencies_ms, lost)
+    Packets { latencies_ms, sent: expected, lost }
 }
 
 /// Resident memory, where /proc tells it.
