@@ -169,6 +169,16 @@ pub(crate) fn pad_recording() -> Option<(Setup, Recording)> {
     Some((setup, recording))
 }
 
+/// A soft sheet over two channels, with the rise time and the pressure at the end of each, and its recording, from the same folder.
+pub(crate) fn sheet_recording() -> Option<(Setup, Recording)> {
+    let path = data::recording("tactile-fsi/2d-sheet-part.csv")?;
+    let channels = ["Tl", "Tr", "Pl", "Pr"];
+    let setup = Setup::measured_plane(mm(60.0), mm(60.0), &channels).unwrap();
+    let setup = setup.recorded_as(Columns::plane("X", "Y", channels).force("F"));
+    let recording = setup.read_recording("sheet", File::open(path).unwrap()).unwrap();
+    Some((setup, recording))
+}
+
 /// The 95 % interval of an estimated contact's force: its own, or that of a normal distribution.
 pub(crate) fn force_95_n(contact: &ContactEstimate) -> (f64, f64) {
     let uncertainty = contact.uncertainty.unwrap();

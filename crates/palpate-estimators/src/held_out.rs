@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::fit::LocatorFault;
 use palpate_core::Uncertainty;
 use palpate_mechanics::contact::Position;
-use palpate_numerics::root_mean_square;
+use palpate_numerics::{conformal_95, root_mean_square};
 
 /// Errors of a method at positions that it was not fitted to: an uncertainty for methods without a noise model.
 ///
@@ -21,21 +21,13 @@ pub struct HeldOutErrors {
 }
 
 impl HeldOutErrors {
-    /// Fewest errors of which number ⌈0.95·(n + 1)⌉ exists.
-    pub const FEWEST: usize = 19;
-
-    /// The spread of errors (x, y) in metres; `None` of fewer than [`HeldOutErrors::FEWEST`], which bound no 95 % interval.
+    /// The spread of errors (x, y) in metres; `None` of fewer than [`FEWEST_FOR_95`](palpate_numerics::FEWEST_FOR_95), which bound no 95 % interval.
     pub fn from_errors(errors_m: &[[f64; 2]]) -> Option<Self> {
-        if errors_m.len() < Self::FEWEST {
-            return None;
-        }
         let axis = |axis: usize| {
-            let mut sizes: Vec<f64> = errors_m.iter().map(|error| error[axis].abs()).collect();
-            sizes.sort_by(f64::total_cmp);
-            let number = (0.95 * (sizes.len() + 1) as f64).ceil() as usize;
-            (root_mean_square(&sizes), sizes[number.min(sizes.len()) - 1])
+            let sizes: Vec<f64> = errors_m.iter().map(|error| error[axis].abs()).collect();
+            Some((root_mean_square(&sizes), conformal_95(sizes)?))
         };
-        let ((rms_x, half_x), (rms_y, half_y)) = (axis(0), axis(1));
+        let ((rms_x, half_x), (rms_y, half_y)) = (axis(0)?, axis(1)?);
         Some(Self { rms_m: [rms_x, rms_y], half_95_m: [half_x, half_y] })
     }
 

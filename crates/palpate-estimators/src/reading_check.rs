@@ -9,6 +9,8 @@
 //! - the position stays, but for one beyond an edge of the surface where a contact on it explains the reading: it is moved to that edge;
 //! - the 95 % interval is the least that holds the check's and the position. What a learnt method says of its own errors is of contacts like
 //!   those of its presses: how errors change with force and place, the forward way knows better.
+//! - Where it does not, as of surfaces whose readings influence functions do not explain well, a method that knows its errors at positions held out has
+//!   the shorter intervals. Those stand at contacts like its presses: of the forces that were pressed.
 
 use serde::{Deserialize, Serialize};
 
@@ -25,14 +27,65 @@ use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_numerics::watch::Cancelled;
 use std::borrow::Cow;
 
-/// Influence functions, or the equations of a bending finger, by which the estimates of a learnt method are checked; see [the module](self).
+/// A check of the estimates of a learnt method; see [the module](self).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ReadingCheck {
-    /// Influence functions.
+#[serde(into = "CheckData", try_from = "CheckData")]
+pub struct ReadingCheck {
+    by: Forward,
+    own_intervals: Option<OwnIntervals>,
+}
+
+/// What a contact reads: influence functions, or the equations of a bending finger.
+#[derive(Clone, Debug, PartialEq)]
+enum Forward {
     Influence(InfluenceLocator),
-    /// A finger's equations.
     Digit(DigitLocator),
+}
+
+/// Own intervals stand where they are shorter than this share of others.
+const OWN_SHARE: f64 = 0.9;
+
+/// The method's own intervals stand, at contacts like its presses.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OwnIntervals {
+    /// Least and greatest force of the presses, in newtons, where they were recorded.
+    force_n: Option<(f64, f64)>,
+}
+
+/// A check as files have it.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CheckData {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    influence: Option<InfluenceLocator>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    digit: Option<DigitLocator>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    own_intervals: Option<OwnIntervals>,
+}
+
+impl From<ReadingCheck> for CheckData {
+    fn from(ReadingCheck { by, own_intervals }: ReadingCheck) -> Self {
+        let (influence, digit) = match by {
+            Forward::Influence(influence) => (Some(influence), None),
+            Forward::Digit(digit) => (None, Some(digit)),
+        };
+        Self { influence, digit, own_intervals }
+    }
+}
+
+impl TryFrom<CheckData> for ReadingCheck {
+    type Error = &'static str;
+
+    fn try_from(CheckData { influence, digit, own_intervals }: CheckData) -> Result<Self, Self::Error> {
+        let by = match (influence, digit) {
+            (Some(influence), None) => Forward::Influence(influence),
+            (None, Some(digit)) => Forward::Digit(digit),
+            _ => return Err("a check has either `influence` or `digit`"),
+        };
+        Ok(Self { by, own_intervals })
+    }
 }
 
 impl ReadingCheck {
@@ -47,7 +100,8 @@ impl ReadingCheck {
         let recording = Self::thinned(task.recording);
         let task = FitTask { recording: &recording, ..task };
         if let SurfaceSpec::Digit(_) = task.setup.surface() {
-            return Ok(DigitEstimator::default().fit_method(task).ok().map(Self::Digit));
+            let digit = DigitEstimator::default().fit_method(task).ok();
+            return Ok(digit.map(|digit| Self { by: Forward::Digit(digit), own_intervals: None }));
         }
         let mut methods = vec![Influence::default()];
         if task.setup.surface().model().is_some() {
@@ -56,12 +110,46 @@ impl ReadingCheck {
         }
         for method in methods {
             match method.fit_method(task) {
-                Ok(fitted) => return Ok(Some(Self::Influence(fitted))),
+                Ok(fitted) => return Ok(Some(Self { by: Forward::Influence(fitted), own_intervals: None })),
                 Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
                 Err(_) => {}
             }
         }
         Ok(None)
+    }
+
+    /// The same check, by which a method's own intervals stand where in the mean, at the presses of a recording, they are a tenth shorter than those that it
+    /// widens. By less there is little to gain: the check's follow forces that were not pressed.
+    ///
+    /// Of a force that is said to be known they never stand: nothing tells that a contact has another.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the watch stopped it.
+    pub(crate) fn keeping_intervals(
+        mut self,
+        task: FitTask,
+        locate: impl Fn(&[f64]) -> Estimate,
+    ) -> Result<Self, Cancelled> {
+        let extent = task.setup.surface().extent();
+        let (mut own_m, mut widened_m) = (0.0, 0.0);
+        for row in Self::thinned(task.recording).rows.iter().filter(|row| row.touches()) {
+            task.watch.round()?;
+            let estimate = locate(&row.reading);
+            let checked = self.checked(&row.reading, estimate, extent);
+            if checked.status == Status::Located {
+                own_m += interval_m(&estimate, extent);
+                widened_m += interval_m(&checked, extent);
+            }
+        }
+        if task.setup.force_n().is_none() && own_m < OWN_SHARE * widened_m {
+            let forces_n = task.recording.rows.iter().filter(|row| row.touches()).map(|row| row.force_n);
+            let span = |(least, most): (f64, f64), force_n: f64| (least.min(force_n), most.max(force_n));
+            let force_n = forces_n
+                .collect::<Option<Vec<f64>>>()
+                .and_then(|forces_n| forces_n.into_iter().map(|n| (n, n)).reduce(|all, (n, _)| span(all, n)));
+            self.own_intervals = Some(OwnIntervals { force_n });
+        }
+        Ok(self)
     }
 
     /// The rows that a check is learnt from: [`ReadingCheck::MOST_ROWS`] at most, picked evenly.
@@ -76,70 +164,97 @@ impl ReadingCheck {
 
     /// Share of untouched readings that may be taken for a contact; `None` of one that tells no untouched reading.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
-        match self {
-            Self::Influence(influence) => influence.false_alarm_rate(),
-            Self::Digit(digit) => Some(digit.false_alarm_rate),
+        match &self.by {
+            Forward::Influence(influence) => influence.false_alarm_rate(),
+            Forward::Digit(digit) => Some(digit.false_alarm_rate),
         }
     }
 
     /// Offset of each channel, in its SI unit; `None` where it was not learnt.
     pub fn offsets(&self) -> Option<Vec<f64>> {
-        match self {
-            Self::Influence(influence) => influence.offsets(),
-            Self::Digit(digit) => digit.offsets(),
+        match &self.by {
+            Forward::Influence(influence) => influence.offsets(),
+            Forward::Digit(digit) => digit.offsets(),
         }
+    }
+
+    /// Whether the method's own intervals stand at contacts like its presses.
+    pub fn keeps_intervals(&self) -> bool {
+        self.own_intervals.is_some()
     }
 
     /// Its means, in words.
     pub fn in_words(&self) -> &'static str {
-        match self {
-            Self::Influence(_) => "influence functions of the same recording",
-            Self::Digit(_) => "the equations of a bending finger",
+        match &self.by {
+            Forward::Influence(_) => "influence functions of the same recording",
+            Forward::Digit(_) => "the equations of a bending finger",
         }
     }
 }
 
 impl CheckEstimate for ReadingCheck {
     fn checked(&self, reading: &[f64], estimate: Estimate, extent: Extent) -> Estimate {
-        let explained = match self {
-            Self::Influence(influence) => influence.locate(reading),
-            Self::Digit(digit) => digit.locate(reading),
+        let explained = match &self.by {
+            Forward::Influence(influence) => influence.locate(reading),
+            Forward::Digit(digit) => digit.locate(reading),
         };
-        by(explained, estimate, extent)
+        self.left_by(explained, estimate, extent)
     }
 
     fn check_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate], extent: Extent) {
         let mut explained = vec![NO_CONTACT; estimates.len()];
-        match self {
-            Self::Influence(influence) => influence.locate_batch(readings, channels, &mut explained),
-            Self::Digit(digit) => digit.locate_batch(readings, channels, &mut explained),
+        match &self.by {
+            Forward::Influence(influence) => influence.locate_batch(readings, channels, &mut explained),
+            Forward::Digit(digit) => digit.locate_batch(readings, channels, &mut explained),
         }
         for (estimate, explained) in estimates.iter_mut().zip(explained) {
-            *estimate = by(explained, *estimate, extent);
+            *estimate = self.left_by(explained, *estimate, extent);
         }
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        match self {
-            Self::Influence(influence) => influence.check(setup),
-            Self::Digit(digit) => digit.check(setup),
+        match &self.by {
+            Forward::Influence(influence) => influence.check(setup),
+            Forward::Digit(digit) => digit.check(setup),
         }
     }
 }
 
-/// The estimate of a learnt method, as that of the forward way leaves it: `explained`.
-fn by(explained: Estimate, estimate: Estimate, extent: Extent) -> Estimate {
-    let widened = || {
-        let position = nearest_on(extent, estimate.contact.position);
-        let contact = ContactEstimate { position, ..estimate.contact };
-        ContactEstimate { uncertainty: uncertainty_with(&contact, &explained.contact), ..contact }
-    };
-    match explained.status {
-        Status::NoContact => explained,
-        Status::OutsideModel => Estimate { status: Status::OutsideModel, ..estimate },
-        Status::Ambiguous => Estimate { contact: widened(), ..explained },
-        Status::Located | Status::OutsideSurface => Estimate { contact: widened(), ..explained },
+impl ReadingCheck {
+    /// The estimate of a learnt method, as that of the forward way leaves it: `explained`.
+    fn left_by(&self, explained: Estimate, estimate: Estimate, extent: Extent) -> Estimate {
+        let is_like_presses = self.own_intervals.is_some_and(|OwnIntervals { force_n }| {
+            let told = force_n.zip(explained.contact.force_n);
+            told.is_none_or(|((least, most), force_n)| (least..=most).contains(&force_n))
+        });
+        let moved = || {
+            let position = nearest_on(extent, estimate.contact.position);
+            ContactEstimate { position, ..estimate.contact }
+        };
+        let widened = || {
+            let contact = moved();
+            ContactEstimate { uncertainty: uncertainty_with(&contact, &explained.contact), ..contact }
+        };
+        match explained.status {
+            Status::NoContact => explained,
+            Status::OutsideModel => Estimate { status: Status::OutsideModel, ..estimate },
+            Status::Ambiguous => Estimate { contact: widened(), ..explained },
+            Status::Located | Status::OutsideSurface if is_like_presses => {
+                let contact = moved();
+                let uncertainty = uncertainty_with(&contact, &estimate.contact);
+                Estimate { contact: ContactEstimate { uncertainty, ..contact }, ..explained }
+            }
+            Status::Located | Status::OutsideSurface => Estimate { contact: widened(), ..explained },
+        }
     }
+}
+
+/// Length of the 95 % intervals on a surface, both together on a plane; infinite of an estimate without one.
+fn interval_m(estimate: &Estimate, extent: Extent) -> f64 {
+    let Some(told) = estimate.contact.uncertainty else { return f64::INFINITY };
+    let length_m = |(low, high): (f64, f64), side_m: f64| high.min(side_m) - low.max(0.0);
+    let y_m = extent.width_m().map_or(0.0, |width_m| length_m(told.y_95_m, width_m));
+    length_m(told.x_95_m, extent.length_m()) + y_m
 }
 
 /// The point of a surface that is nearest to a position.

@@ -41,4 +41,7 @@ pub use elliptic::{Jacobi, carlson_rd, carlson_rf};
 pub use out_of_range::OutOfRange;
 pub use random_order::random_order;
 pub use sparse_cholesky::{SparseCholesky, SparseCholeskyError, SparseSymmetric};
-pub use statistics::{mean, mean_and_variance, median, percentile, root_mean_square, standard_error};
+pub use statistics::{
+    FEWEST_FOR_95, conformal_95, mean, mean_and_variance, median, percentile, root_mean_square,
+    standard_error,
+};

@@ -38,9 +38,29 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
     percentile(&values, 50.0)
 }
 
+/// Fewest errors that bound a 95 % interval: of fewer, [`conformal_95`] has none.
+pub const FEWEST_FOR_95: usize = 19;
+
+/// Number ⌈0.95·(n + 1)⌉ of n sizes of errors in rising order, which a further one like them does not exceed with probability at least 0.95; `None` of
+/// fewer than [`FEWEST_FOR_95`]. Vovk, Gammerman and Shafer, *Algorithmic Learning in a Random World* (2005).
+pub fn conformal_95(mut sizes: Vec<f64>) -> Option<f64> {
+    sizes.sort_by(f64::total_cmp);
+    let number = (0.95 * (sizes.len() + 1) as f64).ceil() as usize;
+    sizes.get(number.checked_sub(1)?).copied()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nineteen_errors_in_twenty_are_within_the_conformal_bound() {
+        let sizes = |count: u32| (1..=count).rev().map(f64::from).collect();
+        assert_eq!(conformal_95(sizes(99)), Some(95.0));
+        assert_eq!(conformal_95(sizes(FEWEST_FOR_95 as u32)), Some(19.0));
+        assert_eq!(conformal_95(sizes(FEWEST_FOR_95 as u32 - 1)), None);
+        assert_eq!(conformal_95(Vec::new()), None);
+    }
 
     #[test]
     fn percentiles_lie_between_the_values() {

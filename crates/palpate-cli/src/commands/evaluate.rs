@@ -135,6 +135,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         "length_mm": evaluation.extent.length_m() * 1e3,
         "tolerance_mm": arguments.tolerance * 1e3,
         "effective_percent": evaluation.effective_percent(arguments.tolerance),
+        "coverage_95": evaluation.coverage_percent(),
+        "interval_score_mm": evaluation.interval_score_m().map(|score_m| score_m * 1e3),
         "errors": errors,
     })
 }
@@ -281,6 +283,14 @@ fn print(
         Extent::Plane { .. } => "effective area",
     };
     output::say(format!("\n{what}: {share:.1} % of the contacts within {tolerance} mm"))?;
+    if let (Some(percent), Some(score_m)) =
+        (answers.evaluation.coverage_percent(), answers.evaluation.interval_score_m())
+    {
+        let score = format_length_mm(score_m);
+        output::say(format!(
+            "95 % intervals: {percent:.1} % of the contacts in them, interval score {score}"
+        ))?;
+    }
     output::say_report("", arguments.out.as_deref())
 }
 

@@ -20,7 +20,14 @@ pub fn locator(locator: &Locator) -> Vec<String> {
     lines.extend(super::setup(&locator.setup));
     lines.extend(method(locator));
     if let Some(check) = &locator.check {
-        lines.push(format!("status and interval of an estimate: by {}", check.in_words()));
+        lines.push(if check.keeps_intervals() {
+            format!(
+                "status of an estimate: by {}; its interval: by errors at positions that were held out",
+                check.in_words()
+            )
+        } else {
+            format!("status and interval of an estimate: by {}", check.in_words())
+        });
     }
     lines.push(match locator.false_alarm_rate() {
         Some(rate) => format!("untouched readings taken for a contact: {rate}, by the noise of the channels"),

@@ -5,6 +5,7 @@
 
 use super::{CHOICE_FOLDS, Estimator, is_learnt};
 use crate::features::FeatureKind;
+use crate::gaussian_process::folds_taken;
 use crate::influence::measured::{MeasuredInfluence, most_nodes, most_nuisance_nodes};
 use crate::influence::{Influence, Structure, force_linear, learning, sizes_over_a_model};
 use crate::network::LevenbergMarquardt;
@@ -58,10 +59,15 @@ impl Estimator {
         let sizes = Sizes::new(setup, recording);
         let own = match self {
             Self::GaussianProcess(process) => {
-                let cost = sizes.process(sizes.rows, sizes.channels + 1.0, 2.0, process.search_points);
+                let coordinates = sizes.channels + 1.0;
+                let cost = sizes.process(sizes.rows, coordinates, 2.0, process.search_points);
                 let kinds =
                     process.features.map_or_else(|| FeatureKind::contenders(setup, recording).len(), |_| 1);
-                FitCost { seconds: kinds as f64 * cost.seconds, ..cost }
+                // Widths take a search of their own, and the posteriors of what folds leave.
+                let searched = sizes.rows.min(process.search_points as f64);
+                let widths = sizes.process(searched, coordinates, 2.0, process.search_points).seconds
+                    + folds_taken(recording.rows.len()) as f64 * conditioning_seconds(sizes.rows);
+                FitCost { seconds: kinds as f64 * cost.seconds + widths, ..cost }
             }
             Self::Influence(influence) => sizes.influence(influence, setup, recording),
             Self::Neighbours(_) => FitCost {
@@ -113,6 +119,15 @@ fn check_cost(setup: &Setup, recording: &Recording) -> FitCost {
     }
 }
 
+/// Seconds that the posterior of so many points takes, of known hyperparameters.
+fn conditioning_seconds(points: f64) -> f64 {
+    if points <= MOST_EXACT as f64 {
+        return points.powi(3) / 3.0 / PRODUCTS + points * points * 4e-9;
+    }
+    let kept = INDUCING as f64;
+    points * (kept * kept / PRODUCTS + kept * 4e-9) + kept * kept * 2e-6
+}
+
 impl Sizes {
     fn new(setup: &Setup, recording: &Recording) -> Self {
         let presses: HashSet<Vec<u64>> = recording
@@ -162,13 +177,13 @@ impl Sizes {
         if points <= MOST_EXACT as f64 {
             return FitCost {
                 memory_bytes: rows + NUMBER * of_search.max(1.1 * points * points),
-                seconds: search + points.powi(3) / 3.0 / PRODUCTS + points * points * 4e-9,
+                seconds: search + conditioning_seconds(points),
             };
         }
         let kept = INDUCING as f64;
         FitCost {
             memory_bytes: rows + NUMBER * of_search.max(2.0 * kept * kept + 512.0 * kept),
-            seconds: search + points * (kept * kept / PRODUCTS + kept * 4e-9) + kept * kept * 2e-6,
+            seconds: search + conditioning_seconds(points),
         }
     }
 

@@ -122,8 +122,11 @@ macro_rules! estimators {
             fn fit_task(&self, task: FitTask) -> Result<Locator, FitError> {
                 task.check_channels()?;
                 let method = self.fit_method(task)?;
-                let check = if is_learnt(method.kind()) { ReadingCheck::fit(task)?.map(Box::new) } else { None };
-                Ok(Fitted { check, ..Fitted::new(task, method) })
+                let mut check = if is_learnt(method.kind()) { ReadingCheck::fit(task)? } else { None };
+                if method.knows_its_errors() && let Some(by) = check {
+                    check = Some(by.keeping_intervals(task, |reading| method.locate(reading))?);
+                }
+                Ok(Fitted { check: check.map(Box::new), ..Fitted::new(task, method) })
             }
 
             fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Locator>) -> Result<(), FitError> {
@@ -184,6 +187,13 @@ estimators! {
 /// True of kinds that go from a reading to a position and do not know what a contact reads: these have a [`ReadingCheck`].
 pub(crate) fn is_learnt(kind: &str) -> bool {
     matches!(kind, "network" | "network-lm" | "gaussian-process" | "neighbours" | "centroid")
+}
+
+impl Method {
+    /// Whether its intervals are by errors at positions that were held out, and follow the reading.
+    fn knows_its_errors(&self) -> bool {
+        matches!(self, Self::GaussianProcess(locator) if locator.widths.is_some())
+    }
 }
 
 impl Estimator {

@@ -1,12 +1,15 @@
 //! Gaussian-process regression of the contact's position on what a reading says of it.
 //!
 //! The inverse way: position = f(features) + error, with f a Gaussian process and the error, whose variance is fitted,
-//! standing for what the sensors' noise does to the position. It asks nothing of the surface but smoothness, and one
-//! error for the whole surface is its limit: where the sensors see little, the truth is wider than it says.
+//! standing for what the sensors' noise does to the position. It asks nothing of the surface but smoothness. One error for the whole
+//! surface is too little where the sensors see little, and too much elsewhere: [`Widths`] mend the intervals by errors at positions held out.
 
 mod selection;
+mod widths;
 
 use selection::{Candidate, Points, Selection};
+pub use widths::Widths;
+pub(crate) use widths::folds_taken;
 
 use crate::features::{FeatureKind, Features, NoFeatures};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
@@ -94,7 +97,8 @@ impl Fit for GaussianProcessEstimator {
                 regression.condition(points.samples(), &hyperparameters, watch)?
             }
         };
-        Ok(GaussianProcessLocator { features, process, extent, force_n: setup.force_n() })
+        let widths = Widths::held_out(task, regression, &features, process.hyperparameters())?;
+        Ok(GaussianProcessLocator { features, process, extent, force_n: setup.force_n(), widths })
     }
 }
 
@@ -141,25 +145,31 @@ pub struct GaussianProcessLocator {
     pub extent: Extent,
     /// The contact's force in newtons, where it is known.
     pub force_n: Option<f64>,
+    /// Widths of the intervals, where enough positions could be held out.
+    pub widths: Option<Widths>,
 }
 
 impl Locate for GaussianProcessLocator {
     type Check = NoCheck;
 
-    /// The posterior mean, with the variance of the contact's position: that of the function, and the fitted error of
-    /// a single row besides.
+    /// The posterior mean, with the variance of the contact's position: that of the function and the fitted error of a single row, times the square of
+    /// what positions held out have shown.
     fn locate(&self, reading: &[f64]) -> Estimate {
-        let (means_m, variances_m2) = self.process.predict(&self.features.apply(reading));
+        let features = self.features.apply(reading);
+        let (means_m, variances_m2) = self.process.predict(&features);
+        let widths = self.widths.as_ref().map(|widths| widths.at(&features));
         let coordinate = |j: usize| -> Option<(f64, f64)> {
             let error_m2 = self.process.noise_variance(j).unwrap_or(0.0);
-            Some((*means_m.get(j)?, variances_m2.get(j)? + error_m2))
+            let width = widths.as_ref().map_or(1.0, |widths| widths[j]);
+            Some((*means_m.get(j)?, width * (variances_m2.get(j)? + error_m2).sqrt()))
         };
-        let (x_m, x_m2) = coordinate(0).unwrap_or_default();
-        let (y_m, y_m2) = if self.process.outputs() > 1 { coordinate(1) } else { None }.unwrap_or_default();
+        let (x_m, x_sd_m) = coordinate(0).unwrap_or_default();
+        let (y_m, y_sd_m) = if self.process.outputs() > 1 { coordinate(1) } else { None }.unwrap_or_default();
+        let ellipse = self.widths.as_ref().map_or(1.0, |widths| widths.ellipse);
         let uncertainty = Uncertainty {
-            covariance: [x_m2, 0.0, 0.0, y_m2, 0.0, 0.0],
-            x_95_m: normal_interval_95(x_m, x_m2.sqrt()),
-            y_95_m: normal_interval_95(y_m, y_m2.sqrt()),
+            covariance: [ellipse * x_sd_m.powi(2), 0.0, 0.0, ellipse * y_sd_m.powi(2), 0.0, 0.0],
+            x_95_m: normal_interval_95(x_m, x_sd_m),
+            y_95_m: normal_interval_95(y_m, y_sd_m),
             force_95_n: None,
         };
         let position = Position { x_m, y_m };
@@ -173,6 +183,7 @@ impl Locate for GaussianProcessLocator {
         LocatorFault::check_count("coordinates of its Gaussian process", self.features.len(), coordinates)?;
         let outputs = setup.surface().extent().dimensions();
         LocatorFault::check_count("outputs", outputs, self.process.outputs())?;
+        self.widths.as_ref().map_or(Ok(()), |widths| widths.check(self.features.len(), outputs))?;
         LocatorFault::check_numbers(
             "extent",
             self.extent.sides_m(),

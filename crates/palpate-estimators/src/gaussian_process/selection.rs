@@ -63,6 +63,7 @@ impl Selection<'_> {
         /// Rows that errors are told from; more would cost time and change little.
         const MOST: usize = 500;
         const MARGIN: f64 = 1.25;
+        const FOLDS: usize = 5;
         if candidates.len() == 1 {
             return Ok(candidates.remove(0));
         }
@@ -72,7 +73,7 @@ impl Selection<'_> {
         candidates.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
         let few: Vec<usize> = thinned(self.recording.rows.len(), MOST).collect();
         let recording = self.recording.subset(&few);
-        let folds = folds_between(&recording);
+        let folds = folds_between(&recording, FOLDS);
         let mut best = (f64::INFINITY, 0);
         for (i, candidate) in candidates.iter().enumerate() {
             let margin = if i == 0 { 1.0 } else { MARGIN };
@@ -107,10 +108,9 @@ impl Selection<'_> {
     }
 }
 
-/// Folds by position; positions beyond all that are left in a fold are not held out of it, as few contacts lie beyond all presses.
-fn folds_between(recording: &Recording) -> Vec<Fold> {
-    const FOLDS: usize = 5;
-    let mut folds = recording.folds(recording.distinct_positions().len().min(FOLDS)).unwrap_or_default();
+/// Folds by position, so many where there are as many positions; positions beyond all that are left in a fold are not held out of it, as few contacts lie beyond all presses.
+pub(super) fn folds_between(recording: &Recording, most: usize) -> Vec<Fold> {
+    let mut folds = recording.folds(recording.distinct_positions().len().min(most)).unwrap_or_default();
     for Fold { training, held_out } in &mut folds {
         let range = |along: fn(Position) -> f64| {
             let left = training.iter().map(|i| along(recording.rows[*i].position));

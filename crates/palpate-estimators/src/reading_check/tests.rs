@@ -2,6 +2,7 @@ use super::*;
 use crate::arrangement::Training;
 use crate::estimator::{Estimator, Locator, contenders};
 use crate::evaluation::{Calibration, Evaluation, limit_ratio};
+use crate::gaussian_process::GaussianProcessEstimator;
 use crate::simulate::{CleanSensors, simulate_contacts};
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::sensing::SensorKind::Deflection;
@@ -176,4 +177,43 @@ fn a_gaussian_process_is_as_good_at_other_forces() {
     let judged = simulate_contacts(&beam(Some(3.0)), &contacts, 1, 3).unwrap();
     let ratio = limit_ratio(&setup, &Evaluation::new(&locator, &judged).unwrap()).unwrap();
     assert!((0.9..1.4).contains(&ratio), "{ratio} × the limit");
+}
+
+/// A soft sheet that influence functions explain less well than a function of its features does.
+#[test]
+fn own_intervals_stand_where_they_are_shorter() {
+    let Some((setup, recording)) = crate::fixtures::sheet_recording() else { return };
+    let task = FitTask::new(&setup, &recording);
+    let locator = Estimator::GaussianProcess(GaussianProcessEstimator::default()).fit_task(task).unwrap();
+    let check = locator.check.as_ref().unwrap();
+    assert!(check.keeps_intervals());
+    let text = serde_json::to_string(check).unwrap();
+    assert_eq!(&serde_json::from_str::<Box<ReadingCheck>>(&text).unwrap(), check);
+    let neither = serde_json::from_str::<ReadingCheck>("{}").unwrap_err();
+    assert!(neither.to_string().contains("either `influence` or `digit`"), "{neither}");
+    // Of the forces that were pressed, and beyond them.
+    let widened = ReadingCheck { own_intervals: None, ..(**check).clone() };
+    let extent = setup.surface().extent();
+    let (mut kept, mut beyond) = (0, 0);
+    for row in recording.rows.iter().step_by(10) {
+        let own = locator.method.locate(&row.reading);
+        let harder = ReadingCheck {
+            own_intervals: Some(OwnIntervals { force_n: Some((1e3, 2e3)) }),
+            ..widened.clone()
+        };
+        let [checked, other, alone] =
+            [&**check, &harder, &widened].map(|check| check.checked(&row.reading, own, extent));
+        assert_eq!(other, alone);
+        kept += usize::from(checked != alone);
+        beyond += usize::from(checked == alone);
+    }
+    assert!(kept > beyond, "{kept}, {beyond}");
+}
+
+#[test]
+fn a_force_that_is_said_to_be_known_leaves_intervals_to_the_check() {
+    let setup = beam(Some(newtons(3.0)));
+    let locator =
+        Estimator::GaussianProcess(GaussianProcessEstimator::default()).fit(&setup, &presses()).unwrap();
+    assert!(!locator.check.unwrap().keeps_intervals());
 }
