@@ -269,6 +269,16 @@ struct Place<'a> {
 }
 
 impl ForceLinearLocator {
+    /// The locator of the same recording with ln of the likelihood of readings divided by a factor more.
+    pub(super) fn with_likelihood_divided_by(self, factor: f64, recording: &Recording) -> Self {
+        let channels_as_one = factor * self.stored.channels_as_one;
+        let open =
+            Stored { channels_as_one, residual_limit: f64::INFINITY, spread_limit: None, ..self.stored };
+        let mut locator = open.into_locator();
+        locator.limit_residuals(recording);
+        locator
+    }
+
     /// The same, whose noise is taken for a contact at another rate.
     pub(crate) fn with_false_alarm_rate(mut self, rate: FalseAlarmRate) -> Self {
         self.stored.false_alarm_rate = rate;

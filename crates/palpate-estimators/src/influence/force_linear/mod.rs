@@ -8,6 +8,7 @@ mod drift;
 mod drift_fit;
 mod evidence;
 mod learning;
+mod left_out;
 mod locator;
 mod outliers;
 mod place_noise;
@@ -57,7 +58,11 @@ const HARDEST: f64 = 3.0;
 /// Learns the influence functions and offsets of a surface without a model; `None` where the presses do not tell them apart, as
 /// they have no forces or all the same one, and unless the structure is force-linear by demand, where they speak against it.
 pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLinearLocator>, MeasuredError> {
-    fit_condensed(task, structure, MOST_PRESSES)
+    let Some(locator) = fit_condensed(task, structure, MOST_PRESSES)? else { return Ok(None) };
+    Ok(Some(match left_out::factor(task, structure)? {
+        Some(factor) => locator.with_likelihood_divided_by(factor, task.recording),
+        None => locator,
+    }))
 }
 
 /// [`fit`], more presses than `most` condensed to so many.
@@ -113,12 +118,12 @@ fn fit_condensed(
 
 /// Number of channels whose errors count as those of one: what few presses leave open of influence functions depends on where they are, which
 /// is the same for all channels, and on hyperparameters that all channels share and that few presses hardly tell. The number is that with
-/// which intervals of strips from 5 to 12 presses hold their touches. Of 5 and 6 the variance of the process is widened
-/// already, as its size is hardly told.
+/// which intervals of strips from 5 to 24 presses hold their touches, multiplied by what presses left out of 7 or more show ([`left_out`]). Of 5 and 6 the
+/// variance of the process is widened already, as its size is hardly told.
 fn channels_as_one(presses: &Presses) -> f64 {
     const FEWEST: f64 = 4.0;
-    const MOST: f64 = 2.2;
-    1.0 + presses.fewness() * ((presses.len() as f64 / FEWEST).clamp(1.0, MOST) - 1.0)
+    const MOST: f64 = 1.8;
+    1.0 + left_out::weight(presses.len()) * ((presses.len() as f64 / FEWEST).clamp(1.0, MOST) - 1.0)
 }
 
 /// Offsets at the rows of `asked`, told by the presses of a recording; `None` where its rows have no times, tell no drift, or read no

@@ -1,0 +1,67 @@
+//! Intervals of few presses, by presses that are left out.
+//!
+//! What few presses leave open of hyperparameters, such as the places of point sensors, is not in the posterior, which takes them for known. So each press
+//! is left out in turn, everything is learnt anew, and the press is located by its reading. With x the press, x̂ the estimate and h the part of its 95 % interval on
+//! the side of x, z = 1.96·(x − x̂)/h is a standard normal variable where intervals are as they should be. ln of the likelihood is divided by the mean of z²,
+//! as that of χ² over its degrees of freedom tells an overdispersion (McCullagh and Nelder, *Generalized Linear Models*, 1989).
+
+use super::{ForceLinearLocator, MOST_PRESSES, fit_condensed};
+use crate::fit::{FitTask, Locate};
+use crate::influence::config::Structure;
+use crate::influence::measured::MeasuredError;
+use crate::recording::Row;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::{NORMAL_95, mean};
+
+/// Presses from which on intervals need no widening.
+const MANY: f64 = 25.0;
+/// Fewer than these by so many have all of it.
+const FEWER: f64 = 10.0;
+/// Presses of which one can be left out: of fewer the rest tells next to nothing.
+const LEAST: usize = 7;
+/// One press does not count for more, as it may be wrong.
+const MOST_SQUARE: f64 = 25.0;
+
+/// Weight of the widening: 1 of few presses, 0 of many.
+pub(super) fn weight(presses: usize) -> f64 {
+    ((MANY - presses as f64) / FEWER).clamp(0.0, 1.0)
+}
+
+/// The factor by which ln of the likelihood is to be divided further; `None` where that cannot be told, or there are many presses.
+pub(super) fn factor(task: FitTask, structure: Structure) -> Result<Option<f64>, MeasuredError> {
+    let FitTask { setup, recording, watch, .. } = task;
+    let weight = weight(recording.rows.len());
+    let presses: Vec<usize> = (0..recording.rows.len()).filter(|i| recording.rows[*i].touches()).collect();
+    if weight == 0.0 || presses.len() < LEAST {
+        return Ok(None);
+    }
+    let mut squares = Vec::new();
+    for (done, left_out) in presses.iter().enumerate() {
+        watch.counted("leaving presses out", "presses", done, presses.len())?;
+        let others: Vec<usize> = (0..recording.rows.len()).filter(|i| i != left_out).collect();
+        let rest = recording.subset(&others);
+        if rest.distinct_positions().len() < super::LEAST_POSITIONS {
+            continue;
+        }
+        let task = FitTask { recording: &rest, ..task };
+        let Some(locator) = fit_condensed(task, structure, MOST_PRESSES)? else { continue };
+        squares.extend(square(&locator, &recording.rows[*left_out], setup.surface().extent()));
+    }
+    Ok((!squares.is_empty()).then(|| 1.0 + weight * (mean(squares) - 1.0).max(0.0)))
+}
+
+/// z² of a press, the mean of both coordinates on a plane; `None` where its reading has no interval, or one of no length.
+fn square(locator: &ForceLinearLocator, row: &Row, extent: Extent) -> Option<f64> {
+    let contact = locator.locate(&row.reading).contact;
+    let told = contact.uncertainty?;
+    let (at, true_at) = (contact.position, row.position);
+    let square = |at_m: f64, true_m: f64, (low_m, high_m): (f64, f64)| {
+        let half_m = if true_m < at_m { at_m - low_m } else { high_m - at_m };
+        (half_m > 0.0).then(|| (NORMAL_95 * (true_m - at_m) / half_m).powi(2).min(MOST_SQUARE))
+    };
+    let x = square(at.x_m, true_at.x_m, told.x_95_m)?;
+    match extent {
+        Extent::Line { .. } => Some(x),
+        Extent::Plane { .. } => Some(0.5 * (x + square(at.y_m, true_at.y_m, told.y_95_m)?)),
+    }
+}
