@@ -311,6 +311,18 @@ impl Live {
         self.calibrator.as_ref().ok_or(LiveError::NotCalibrating)
     }
 
+    /// Notes that somebody watches, who could stop a machine.
+    pub(super) fn attend(&self) {
+        if let Some(calibrator) = &self.calibrator {
+            calibrator.attendance().note();
+        }
+    }
+
+    /// True while a machine needs somebody who watches it.
+    pub(super) fn needs_attendance(&self) -> bool {
+        self.calibrator.as_ref().is_some_and(|calibrator| calibrator.attendance().is_needed())
+    }
+
     /// Begins the calibration, or goes on with one that was ended early.
     ///
     /// # Errors

@@ -1,0 +1,6 @@
+//! The web server over real sockets.
+#![forbid(unsafe_code)]
+
+mod client;
+mod machine;
+mod routes;
