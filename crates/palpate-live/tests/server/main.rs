@@ -4,3 +4,4 @@
 mod client;
 mod machine;
 mod routes;
+mod sinks;
