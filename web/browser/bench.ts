@@ -1,10 +1,11 @@
 // A simulated board whose finger a test moves, by the machine that stands beside it.
 
-import { type ChildProcess, spawn } from "node:child_process";
+import type { ChildProcess } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { connect, type Socket } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
+import { leave, start } from "./children";
 import { BINARY, freePort, ROOT } from "./server";
 
 const STAGE = `
@@ -24,13 +25,10 @@ export class Bench {
 
   /** A board on the bench of a rig of the examples, of which parts are replaced. */
   static async start(example: string, replaced: [string, string][]): Promise<Bench> {
-    const folder = mkdtempSync(join(tmpdir(), "palpate-bench-"));
-    let text = readFileSync(`${ROOT}/examples/${example}`, "utf8");
-    for (const [what, by] of replaced) text = text.replace(what, by);
-    writeFileSync(join(folder, "rig.toml"), text + STAGE);
+    const folder = written(example, replaced, STAGE);
     const [board, stage] = [await freePort(), await freePort()];
     const args = ["simulated-board", "rig.toml", "--rate", "200 Hz", "--to", `tcp://:${board}`, "--stage", `tcp://:${stage}`];
-    const child = spawn(BINARY, args, { cwd: folder, stdio: "ignore" });
+    const child = start(BINARY, args, { cwd: folder, stdio: "ignore" });
     const machine = await connected(stage);
     machine.write("G28\n");
     return new Bench(child, machine, folder, `tcp://127.0.0.1:${board}`);
@@ -52,8 +50,48 @@ export class Bench {
   stop(): void {
     this.machine.destroy();
     this.child.kill("SIGKILL");
-    rmSync(this.folder, { recursive: true });
   }
+}
+
+/** A board, a load cell and a machine that nobody but the server moves. */
+export class MachineBench {
+  private constructor(
+    private machine_port: number,
+    readonly folder: string,
+    readonly from: string,
+    public stage: string,
+  ) {}
+
+  /** A bench of a rig of the examples, of which parts are replaced. */
+  static async start(example: string, replaced: [string, string][]): Promise<MachineBench> {
+    const folder = written(example, replaced, "");
+    const [board, stage] = [await freePort(), await freePort()];
+    const args = ["simulated-board", "rig.toml", "--rate", "200 Hz", "--load-cell", "2 mN", "--to", `tcp://:${board}`, "--stage", `tcp://:${stage}`];
+    start(BINARY, args, { cwd: folder, stdio: "ignore" });
+    (await connected(stage)).destroy();
+    return new MachineBench(stage, folder, `tcp://127.0.0.1:${board}`, `gcode:tcp://127.0.0.1:${stage}`);
+  }
+
+  path(name: string): string {
+    return join(this.folder, name);
+  }
+
+  /** Presses 1 N at a place of the strip, once the server has let the machine go. */
+  async press(x_mm: number): Promise<void> {
+    const machine = await connected(this.machine_port);
+    leave(() => machine.destroy());
+    machine.write(`G28\nG1 Z27\nG1 X${60 + x_mm} Y110\nG1 Z20\n`);
+  }
+}
+
+/** A folder with a rig of the examples, of which parts are replaced and to which some is added; it goes with the tests. */
+function written(example: string, replaced: [string, string][], added: string): string {
+  const folder = mkdtempSync(join(tmpdir(), "palpate-bench-"));
+  leave(() => rmSync(folder, { recursive: true, force: true }));
+  let text = readFileSync(`${ROOT}/examples/${example}`, "utf8");
+  for (const [what, by] of replaced) text = text.replace(what, by);
+  writeFileSync(join(folder, "rig.toml"), text + added);
+  return folder;
 }
 
 async function connected(port: number): Promise<Socket> {

@@ -2,8 +2,9 @@
 
 import { existsSync, readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
-import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
 import { Bench } from "./bench";
+import { endAll } from "./children";
 import { hasChromium, launch, open, picture } from "./chromium";
 import { Server } from "./server";
 
@@ -73,6 +74,7 @@ describe.skipIf(!hasChromium())("calibration", () => {
   beforeAll(async () => {
     browser = await launch();
   });
+  afterEach(endAll);
   afterAll(() => browser?.close());
 
   test("goes from nothing to a live dot by clicks", async () => {

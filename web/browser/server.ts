@@ -1,8 +1,9 @@
 // A `palpate serve` of a test.
 
-import { type ChildProcess, spawn } from "node:child_process";
+import type { ChildProcess } from "node:child_process";
 import { createServer } from "node:net";
 import { fileURLToPath } from "node:url";
+import { start } from "./children";
 
 /** The folder that holds the workspace. */
 export const ROOT = fileURLToPath(new URL("../..", import.meta.url));
@@ -20,7 +21,7 @@ export class Server {
   /** Starts a server and waits for its first answer. */
   static async start(args: string[], port?: number): Promise<Server> {
     const listen = `127.0.0.1:${port ?? (await freePort())}`;
-    const child = spawn(BINARY, ["serve", ...args, "--listen", listen], { cwd: ROOT, stdio: ["ignore", "pipe", "pipe"] });
+    const child = start(BINARY, ["serve", ...args, "--listen", listen], { cwd: ROOT, stdio: ["ignore", "pipe", "pipe"] });
     const said: string[] = [];
     child.stdout!.on("data", (bytes: Buffer) => said.push(bytes.toString()));
     child.stderr!.on("data", (bytes: Buffer) => said.push(bytes.toString()));

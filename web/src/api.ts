@@ -47,6 +47,7 @@ export const api = {
   record: async (on: boolean) => void (await post("record", { on })),
   calibration: () => get<CalibrationRecord>("calibration"),
   calibrate: async (step: CalibrationStep) => (await (await post("calibration", { step })).json()) as CalibrationRecord,
+  emergencyStop: async () => void (await post("emergency-stop", {})),
   simulate: async () => void (await post("source", { url: "simulated" })),
   recordingFile: (name: string) => withToken(`api/recordings/${encodeURIComponent(name)}/file`),
   stream: () => {

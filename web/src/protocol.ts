@@ -155,7 +155,40 @@ export interface CalibrationRecord {
   bad_frames: number;
   presses: string;
   problem: string | null;
+  machine: MachineRecord | null;
   outcome: CalibrationOutcome | null;
+}
+
+export type Motion = "blind" | "homing" | "pressing" | "lifting" | "up" | "down";
+
+/** A machine that presses. */
+export interface MachineRecord {
+  url: string;
+  firmware: string | null;
+  /** True from its greeting until its finger is lifted for good. */
+  runs: boolean;
+  motion: Motion | null;
+  /** Place on the surface that it was sent to. */
+  x_mm: number | null;
+  y_mm: number | null;
+  depth_mm: number | null;
+  /** Force at the load cell. */
+  force_n: number | null;
+  left_s: number | null;
+  moves: MovesRecord;
+}
+
+/** Where a machine moves, by its own axes, and how fast. */
+export interface MovesRecord {
+  x_mm: [number, number];
+  y_mm: [number, number];
+  travel_z_mm: number;
+  touch_z_mm: number;
+  depths_mm: number[];
+  travel_mm_per_s: number;
+  press_mm_per_s: number;
+  load_cell: string | null;
+  force_limit_n: number | null;
 }
 
 /** Outcome of a calibration. */

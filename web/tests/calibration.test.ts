@@ -1,9 +1,11 @@
 import { describe, expect, test, vi } from "vitest";
-import type { CalibrationRecord } from "../src/protocol";
+import type { CalibrationRecord, MachineRecord } from "../src/protocol";
 
 // The panel's module looks at the page's address as it is loaded.
 vi.stubGlobal("location", { search: "", href: "http://127.0.0.1/" });
 const { stepWords } = await import("../src/panel/calibration");
+
+const { movesWords } = await import("../src/panel/machine");
 
 const PRESSING: CalibrationRecord = {
   phase: "pressing",
@@ -19,6 +21,7 @@ const PRESSING: CalibrationRecord = {
   bad_frames: 0,
   presses: "presses.csv",
   problem: null,
+  machine: null,
   outcome: null,
 };
 
@@ -37,6 +40,40 @@ describe("words of a calibration", () => {
     expect(stepWords({ ...PRESSING, phase: "ready" })).toBe("Ready to calibrate");
     expect(stepWords({ ...PRESSING, phase: "ready", taken: 3 })).toBe("Ready to go on");
     expect(stepWords({ ...PRESSING, phase: "ready", taken: 12, left: 0 })).toBe("All presses are taken");
+  });
+
+  test("say what a machine will move and how far before it does, and what it does then", () => {
+    const moves = {
+      x_mm: [60, 260] as [number, number],
+      y_mm: [110, 110] as [number, number],
+      travel_z_mm: 27,
+      touch_z_mm: 22,
+      depths_mm: [1, 2],
+      travel_mm_per_s: 50,
+      press_mm_per_s: 2,
+      load_cell: "F",
+      force_limit_n: 3,
+    };
+    const words = movesWords(moves, 54).join(" ");
+    expect(words).toContain("over x 60 to 260 mm and y 110 mm of its own axes, at z 27 mm with 50 mm/s");
+    expect(words).toContain("presses 54 times, down to z 21 and 20 mm (1 and 2 mm below the untouched surface) with 2 mm/s");
+    expect(words).toContain("more than 3.0 N at the load cell F");
+    const machine: MachineRecord = {
+      url: "gcode:tcp://printer:23",
+      firmware: "Marlin",
+      runs: true,
+      motion: "homing",
+      x_mm: null,
+      y_mm: null,
+      depth_mm: null,
+      force_n: null,
+      left_s: null,
+      moves,
+    };
+    expect(stepWords({ ...PRESSING, machine })).toBe("The machine looks for its end stops");
+    const down: MachineRecord = { ...machine, motion: "down", x_mm: 40, depth_mm: 2 };
+    expect(stepWords({ ...PRESSING, machine: down })).toBe("Pressing at 40.0 mm, 2 mm deep");
+    expect(stepWords({ ...PRESSING, machine: { ...machine, motion: null } })).toBe("Greeting the machine…");
   });
 
   test("end with the error at positions held out", () => {

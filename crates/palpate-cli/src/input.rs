@@ -200,3 +200,20 @@ pub fn csv_complaint(error: &CsvError) -> Complaint {
         None => Complaint::new(error),
     }
 }
+
+/// A number from 0 to 1.
+pub fn share(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err(format!("`{text}` must be a number from 0 to 1")),
+    }
+}
+
+/// A time in seconds, greater than 0.
+pub fn time(text: &str) -> Result<f64, String> {
+    match Quantity::parse_as(text, Dimension::Time) {
+        Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(seconds),
+        Ok(_) => Err(format!("`{text}` must be greater than 0, and at most 1e9 s")),
+        Err(error) => Err(error.to_string()),
+    }
+}

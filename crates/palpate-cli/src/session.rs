@@ -4,7 +4,7 @@ use crate::failure::{Complaint, Failure};
 use crate::input;
 use palpate_estimators::estimator::Locator;
 use palpate_live::pipeline;
-use palpate_live::session::{Estimation, Session, SessionConfig};
+use palpate_live::session::{CreepConfig, Estimation, Session, SessionConfig};
 use palpate_live::source::SourceUrl;
 use std::path::Path;
 
@@ -20,6 +20,12 @@ pub struct SessionOptions {
     /// The first natural frequency of a beam on two simple supports: the tracker reckons with its inertia, and 1 % of the critical damping
     #[arg(long, value_name = "FREQUENCY", value_parser = input::frequency, requires = "track")]
     frequency: Option<f64>,
+    /// The creep of a soft surface, which the tracker takes off: how much a reading that is held for long grows, as a share of a fresh press
+    #[arg(long, value_name = "SHARE", value_parser = input::share, requires_all = ["track", "creep_time"])]
+    creep: Option<f64>,
+    /// The time in which all but an e-th of the creep has come, as in `--creep-time "30 s"`
+    #[arg(long, value_name = "TIME", value_parser = input::time, requires = "creep")]
+    creep_time: Option<f64>,
 }
 
 impl SessionOptions {
@@ -27,7 +33,11 @@ impl SessionOptions {
     pub fn config(&self) -> SessionConfig {
         let estimation = match (self.low_pass, self.track) {
             (Some(cutoff_hz), _) => Estimation::LowPass { cutoff_hz },
-            (None, true) => Estimation::Track { frequency_hz: self.frequency },
+            (None, true) => {
+                let creep =
+                    self.creep.zip(self.creep_time).map(|(share, time_s)| CreepConfig { share, time_s });
+                Estimation::Track { frequency_hz: self.frequency, creep }
+            }
             (None, false) => Estimation::Single,
         };
         SessionConfig { estimation, ..SessionConfig::default() }
@@ -37,7 +47,7 @@ impl SessionOptions {
     pub fn session<'a>(&self, locator: &'a Locator, path: &Path) -> Result<Session<'a>, Failure> {
         Session::new(locator, &self.config()).map_err(|error| {
             Complaint::about(path, error)
-                .help("leave --track or --frequency out, or fit another estimator")
+                .help("leave --track, --frequency or --creep out, or fit another estimator")
                 .into()
         })
     }

@@ -30,6 +30,8 @@ pub struct Tare<B> {
     /// Readings that the baseline is the mean of, at most the time constant; 0 while it is what calibration learnt.
     weight: u32,
     time_constant: u32,
+    /// Readings in a row that look let go.
+    let_go: u32,
 }
 
 /// A reading that does not go with a tare.
@@ -72,13 +74,22 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// Readings over which a followed baseline forgets: ten seconds at 100 readings a second.
     pub const TIME_CONSTANT: u32 = 1000;
 
+    /// Readings in a row by which a surface is known to have been let go: three of a thousand readings of noise alone are outside the model.
+    pub const LET_GO: u32 = 5;
+
     /// A tare whose baseline is `learnt`, what calibration learnt that each channel reads untouched.
     ///
     /// # Errors
     /// [`TareError::NotFinite`] for a value that is no number.
     pub fn new(learnt: B) -> Result<Self, TareError> {
         check(learnt.as_ref(), learnt.as_ref().len())?;
-        Ok(Self { baseline: learnt.clone(), learnt, weight: 0, time_constant: Self::TIME_CONSTANT })
+        Ok(Self {
+            baseline: learnt.clone(),
+            learnt,
+            weight: 0,
+            time_constant: Self::TIME_CONSTANT,
+            let_go: 0,
+        })
     }
 
     /// The same, whose followed baseline forgets over so many readings; at least [`Tare::SETTLED`].
@@ -134,8 +145,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     ///   made up for;
     /// - `outside_model`, which no contact explains: while the baseline is not yet the mean of [`Tare::SETTLED`] readings the surface has
     ///   moved since its calibration, and the reading is the new baseline. Later the baseline stays, as a palm is no contact of
-    ///   the model either, unless the opposite of the reading is a contact: then the surface was touched when it was tared, has
-    ///   been let go, and the reading is the new baseline.
+    ///   the model either, unless the opposite of the reading, and of the [`Tare::LET_GO`] − 1 before it, is a contact: then the
+    ///   surface was touched when it was tared, has been let go, and the reading is the new baseline.
     ///
     /// So a board that is touched while it starts is right from the moment it is let go. Contacts lighter than those that are told from
     /// noise go into the baseline. A drift of d a reading is d times the time constant ahead of the baseline, which has to be less than
@@ -151,6 +162,10 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     ) -> Result<Estimate, TareError> {
         self.apply(reading, tared)?;
         let estimate = locate(tared);
+        let is_settled = self.weight >= Self::SETTLED;
+        let looks_let_go =
+            estimate.status == Status::OutsideModel && is_settled && self.is_let_go(tared, &mut locate);
+        self.let_go = if looks_let_go { self.let_go + 1 } else { 0 };
         match estimate.status {
             Status::NoContact => {
                 if self.weight == 0 {
@@ -160,7 +175,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
                 self.weight = (self.weight + 1).min(self.time_constant);
                 self.step(reading, 1.0 / f64::from(self.weight));
             }
-            Status::OutsideModel if self.weight < Self::SETTLED || self.is_let_go(tared, &mut locate) => {
+            Status::OutsideModel if !is_settled || self.let_go >= Self::LET_GO => {
+                self.let_go = 0;
                 self.weight = 1;
                 self.step(reading, 1.0);
             }
@@ -296,6 +312,20 @@ mod tests {
         follow_many(&mut tare, 0..300, (2.0, 0.4));
         assert!(!is_right(&tare, MOVED));
         follow_many(&mut tare, 0..60, (0.0, 0.0));
+        assert!(is_right(&tare, MOVED), "{:?}", tare.baseline());
+    }
+
+    #[test]
+    fn one_loud_reading_is_not_taken_for_a_surface_that_was_let_go() {
+        let mut tare = Tare::new(LEARNT).unwrap();
+        follow_many(&mut tare, 0..2000, (0.0, 0.0));
+        // The opposite of a contact.
+        for _ in 0..Tare::<[f64; 4]>::LET_GO - 1 {
+            assert_eq!(follow(&mut tare, reading(7, MOVED, -0.4, 0.4)).status, Status::OutsideModel);
+        }
+        assert!(is_right(&tare, MOVED), "{:?}", tare.baseline());
+        follow_many(&mut tare, 0..1, (0.0, 0.0));
+        follow(&mut tare, reading(7, MOVED, -0.4, 0.4));
         assert!(is_right(&tare, MOVED), "{:?}", tare.baseline());
     }
 

@@ -23,6 +23,9 @@ pub trait Likelihood: Send + Sync {
     /// away; on a line xx alone.
     fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2];
 
+    /// Whitened reading of contacts in balance, with its derivatives and the variance that calibration leaves.
+    fn linearised(&self, contacts: &[Contact]) -> Linearisation;
+
     /// Estimate from one reading alone, without those before it: the best contacts, and the other modes.
     fn single_estimate(&self, reading: &[f64]) -> Estimate;
 
@@ -34,6 +37,17 @@ pub trait Likelihood: Send + Sync {
 
     /// The most contacts that may touch at once.
     fn most_contacts(&self) -> usize;
+}
+
+/// Whitened reading of contacts in balance, expanded about their places and forces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Linearisation {
+    /// Σ W·f of each channel.
+    pub reading: Vec<f64>,
+    /// Derivatives of that by x, y and W of each contact in turn; zeros by y on a line, and by a force that is known.
+    pub derivatives: Vec<Vec<f64>>,
+    /// Variance of each channel from calibration.
+    pub variance: Vec<f64>,
 }
 
 /// Geometry of the contacts, on a line or on a plane, with the fits that go with that.

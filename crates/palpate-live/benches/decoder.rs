@@ -1,6 +1,7 @@
 //! Frames of 8 channels that the decoder reads in a second of one core: cargo bench -p palpate-live --bench decoder
 //!
-//! CPU time, the median of nine runs.
+//! CPU time, the median of nine runs. Beside it the least that a program does with such bytes: lines found and nothing else, by the search for a byte that the standard library
+//! has (`str::lines`), frames of COBS by their zeros; and for plain values the lines split at commas and their numbers read, without names, checks and time.
 
 use cpu_time::ProcessTime;
 use palpate_live::frame::{Channel, Decoder, encode_into};
@@ -32,10 +33,45 @@ fn main() {
         ("binary", &binary),
     ];
     for (form, bytes) in streams {
-        let mut seconds: Vec<f64> = (0..9).map(|_| decode(&channels, bytes)).collect();
-        seconds.sort_by(f64::total_cmp);
-        println!("{form:>8}: {:.2} million frames/s", f64::from(FRAMES) / seconds[seconds.len() / 2] * 1e-6);
+        let rate = million_a_second(|| decode(&channels, bytes));
+        let found = million_a_second(|| find(bytes, form == "binary"));
+        println!(
+            "{form:>8}: {rate:.2} million frames/s; found only {found:.2}, {:.1} times as many",
+            found / rate
+        );
     }
+    let (rate, read) =
+        (million_a_second(|| decode(&channels, plain.as_bytes())), million_a_second(|| read_plainly(&plain)));
+    println!("  values: read plainly {read:.2} million lines/s, {:.2} times as many", read / rate);
+}
+
+/// Median rate of nine runs of all frames, in millions a second; `run` gives its CPU seconds.
+fn million_a_second(run: impl Fn() -> f64) -> f64 {
+    let mut seconds: Vec<f64> = (0..9).map(|_| run()).collect();
+    seconds.sort_by(f64::total_cmp);
+    f64::from(FRAMES) / seconds[seconds.len() / 2] * 1e-6
+}
+
+/// CPU seconds of finding the ends of all frames.
+fn find(bytes: &[u8], is_binary: bool) -> f64 {
+    let start = ProcessTime::now();
+    let count = match (is_binary, std::str::from_utf8(bytes)) {
+        (false, Ok(text)) => text.lines().count(),
+        _ => bytes.iter().filter(|byte| **byte == 0).count(),
+    };
+    let seconds = start.elapsed().as_secs_f64();
+    assert!(std::hint::black_box(count) >= FRAMES as usize);
+    seconds
+}
+
+/// CPU seconds of splitting all lines at their commas, and of reading the numbers.
+fn read_plainly(text: &str) -> f64 {
+    let start = ProcessTime::now();
+    let sum: f64 =
+        text.lines().flat_map(|line| line.split(',')).filter_map(|cell| cell.parse::<f64>().ok()).sum();
+    let seconds = start.elapsed().as_secs_f64();
+    assert!(std::hint::black_box(sum).is_finite());
+    seconds
 }
 
 /// CPU seconds of decoding all frames in chunks as a source brings them.

@@ -6,8 +6,8 @@ use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::event::Event;
 use palpate_live::input::{Arrival, Arrived};
 use palpate_live::sample::Sample;
-use palpate_live::session::{Estimation, Output, Session, SessionConfig};
-use palpate_live::simulated_board::{BoardConfig, Finger, FrameForm, SimulatedBoard};
+use palpate_live::session::{CreepConfig, Estimation, Output, Session, SessionConfig};
+use palpate_live::simulated_board::{BoardConfig, FaultConfig, Finger, FrameForm, SimulatedBoard};
 use palpate_live::stamp::Stamp;
 use palpate_rig::Rig;
 use std::time::Duration;
@@ -186,17 +186,56 @@ fn a_tracked_contact_is_closer_than_single_readings_and_its_intervals_hold_it() 
         (mean_m, held as f64 / errors_m.len() as f64, downs)
     };
     let (single_m, _, single_downs) = of(Estimation::Single);
-    let (tracked_m, held, downs) = of(Estimation::Track { frequency_hz: None });
+    let (tracked_m, held, downs) = of(Estimation::Track { frequency_hz: None, creep: None });
     assert!(tracked_m < 0.5 * single_m, "{tracked_m} {single_m}");
     assert!((0.88..=1.0).contains(&held), "{held}");
     assert_eq!(downs, single_downs);
+}
+
+/// A contact held for a minute on a surface that creeps, at a board that drifts: by the tracker's state it is where it is, within its interval; by that
+/// of a tracker that takes nothing off, what creeps is a contact that wanders, and stays when it has gone.
+#[test]
+fn drift_and_creep_are_followed_by_the_trackers_state() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    // Calibrated by fresh presses, of which a share of the reading has not come yet.
+    let mut presses = rig.simulate(0).unwrap();
+    presses.rows.iter_mut().flat_map(|row| &mut row.reading).for_each(|value| *value *= 0.95);
+    let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &presses)).unwrap();
+    let faults = FaultConfig { drift_per_s: 1e-7, creep: 0.05, creep_s: 20.0, ..FaultConfig::default() };
+    let held = |creep: Option<CreepConfig>| {
+        let mut bench = Bench::new(&rig, &locator, Estimation::Track { frequency_hz: None, creep });
+        bench.board = bench.board.with_faults(faults.clone(), 5);
+        let mut bench = bench.untouched_first();
+        bench.take(20 * 500);
+        bench.finger("finger 117 0 3");
+        let (samples, _) = bench.take(60 * 500);
+        let (mut errors_m, mut covered) = (Vec::new(), 0);
+        for sample in &samples[500..] {
+            let contact = sample.estimate.contact;
+            errors_m.push((contact.position.x_m - 0.117).abs());
+            let (low_m, high_m) = contact.uncertainty.map_or((0.0, 0.0), |uncertainty| uncertainty.x_95_m);
+            covered += usize::from((low_m..=high_m).contains(&0.117));
+        }
+        bench.finger("lift");
+        let (after, _) = bench.take(2 * 500);
+        let gone = after.iter().filter(|sample| sample.estimate.status == Status::NoContact).count();
+        let mean_m = errors_m.iter().sum::<f64>() / errors_m.len() as f64;
+        println!("{creep:?}: {:.3} mm, {covered} of {}, {gone} untouched", 1e3 * mean_m, errors_m.len());
+        (mean_m, covered as f64 / errors_m.len() as f64, gone)
+    };
+    let (without_m, _, ghosts) = held(None);
+    // 95 % of a reading are fresh, and 5 % come.
+    let (with_m, covered, gone) = held(Some(CreepConfig { share: 0.05 / 0.95, time_s: 20.0 }));
+    assert!(with_m < 2e-4 && without_m > 10.0 * with_m, "{with_m} {without_m}");
+    assert!(covered > 0.85, "{covered}");
+    assert!(gone > 900 && ghosts < 500, "{gone} {ghosts}");
 }
 
 #[test]
 fn a_tracker_is_carried_over_gaps_and_immense_readings() {
     let rig = Rig::from_toml(RIG).unwrap();
     let locator = locator(&rig);
-    let tracked = Estimation::Track { frequency_hz: None };
+    let tracked = Estimation::Track { frequency_hz: None, creep: None };
     let mut bench = Bench::new(&rig, &locator, tracked).untouched_first();
     bench.finger("finger 120 0 3");
     let sd_m = |sample: &Sample| sample.estimate.contact.uncertainty.unwrap().covariance[0].sqrt();
@@ -265,11 +304,14 @@ fn a_session_that_cannot_be_had_is_refused_with_the_reason() {
     };
     let cutoff = refused(&influence, Estimation::LowPass { cutoff_hz: f64::NAN });
     assert!(cutoff.contains("the cut-off frequency is NaN"), "{cutoff}");
-    let frequency = refused(&influence, Estimation::Track { frequency_hz: Some(-1.0) });
+    let frequency = refused(&influence, Estimation::Track { frequency_hz: Some(-1.0), creep: None });
     assert!(frequency.contains("the natural frequency is -1"), "{frequency}");
+    let creep = Some(CreepConfig { share: 1.5, time_s: 20.0 });
+    let share = refused(&influence, Estimation::Track { frequency_hz: None, creep });
+    assert!(share.contains("the share of the creep is 1.5"), "{share}");
     let recording = rig.simulate(0).unwrap();
     let centroid = palpate_estimators::estimator::Estimator::Centroid(palpate_estimators::centroid::Centroid);
     let centroid = centroid.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
-    let kind = refused(&centroid, Estimation::Track { frequency_hz: None });
+    let kind = refused(&centroid, Estimation::Track { frequency_hz: None, creep: None });
     assert!(kind.contains("influence locator"), "{kind}");
 }

@@ -4,6 +4,7 @@ import { api } from "../api";
 import { element, need, setText } from "../dom";
 import type { CalibrationOutcome, CalibrationRecord, CalibrationStep, PlaceRecord } from "../protocol";
 import { size } from "../words";
+import { machineStep, MachinePanel, motionWords } from "./machine";
 
 /** Milliseconds between two looks at a calibration that goes on, and at one that waits for a person. */
 const LOOK_MS = 150;
@@ -21,6 +22,7 @@ const BUTTONS: { id: string; step: CalibrationStep }[] = [
 export class CalibrationPanel {
   /** Its state, while it is shown. */
   state: CalibrationRecord | null = null;
+  private machine = new MachinePanel();
   private looks = false;
   private closed = false;
 
@@ -51,8 +53,12 @@ export class CalibrationPanel {
   }
 
   private act(step: CalibrationStep): void {
+    if (step === "begin" && this.state?.machine != null) this.machine.begins();
     void api.calibrate(step).then(
-      (state) => this.take(state),
+      (state) => {
+        if (step === "begin") this.machine.begun();
+        this.take(state);
+      },
       (error: unknown) => this.failed(error),
     );
   }
@@ -62,6 +68,7 @@ export class CalibrationPanel {
       this.take(await api.calibration());
     } catch {
       // The page says that the server is away; it is asked again.
+      if (this.state?.machine?.runs === true) this.writeProblem("The server does not answer: if the machine goes on, switch it off.");
     }
     const phase = this.state?.phase;
     if (this.closed || phase === "done") {
@@ -89,9 +96,8 @@ export class CalibrationPanel {
     need("calibration").hidden = false;
     setText(need("calibration-step"), stepWords(state));
     setText(need("calibration-why"), whyWords(state));
-    const problem = need("calibration-problem");
-    setText(problem, state.problem ?? "");
-    problem.hidden = state.problem === null;
+    this.writeProblem(state.problem);
+    this.machine.write(state);
     const planned = state.taken + state.left;
     setText(need("calibration-progress"), `${state.taken} of ${planned} presses, in ${state.presses}`);
     const bar = need<HTMLProgressElement>("calibration-bar");
@@ -101,15 +107,21 @@ export class CalibrationPanel {
     const waits = state.phase === "ready" || state.phase === "pressed";
     const shown: Record<CalibrationStep, boolean> = {
       begin: (state.phase === "ready" && state.left > 0) || state.phase === "pressed",
-      redo: (pressing || state.phase === "pressed") && state.taken > 0,
-      skip: pressing,
+      redo: (pressing || state.phase === "pressed") && state.taken > 0 && state.machine === null,
+      skip: pressing && state.machine === null,
       stop: pressing,
       finish: waits && state.taken > 0,
     };
     for (const { id, step } of BUTTONS) need(id).hidden = !shown[step];
-    need("calibration-begin").firstChild!.textContent = state.taken === 0 ? "Begin " : "Go on ";
+    need("calibration-begin").firstChild!.textContent = beginWords(state);
     need("calibration-close").hidden = state.phase !== "done";
     this.writePlaces(state);
+  }
+
+  private writeProblem(words: string | null): void {
+    const problem = need("calibration-problem");
+    setText(problem, words ?? "");
+    problem.hidden = words === null;
   }
 
   private writePlaces(state: CalibrationRecord): void {
@@ -127,6 +139,11 @@ export class CalibrationPanel {
   }
 }
 
+function beginWords(state: CalibrationRecord): string {
+  if (state.machine !== null) return state.taken === 0 ? "Press by machine " : "Go on by machine ";
+  return state.taken === 0 ? "Begin " : "Go on ";
+}
+
 /** Instruction for the person. */
 export function stepWords(state: CalibrationRecord): string {
   switch (state.phase) {
@@ -134,6 +151,7 @@ export function stepWords(state: CalibrationRecord): string {
       if (state.left === 0) return "All presses are taken";
       return state.taken === 0 ? "Ready to calibrate" : "Ready to go on";
     case "pressing":
+      if (state.machine?.runs === true) return machineStep(state.machine, state);
       if (state.source === null) return "Waiting for readings";
       return waitingWords(state);
     case "pressed":
@@ -165,10 +183,12 @@ function waitingWords(state: CalibrationRecord): string {
 function whyWords(state: CalibrationRecord): string {
   switch (state.phase) {
     case "ready":
+      if (state.machine !== null && state.taken === 0) return `${state.left} presses, one after the other as the surface shows them. Each is taken once its reading is at rest.`;
       return state.taken === 0
         ? `The places to press are shown on the surface, one after the other: ${state.left} presses. Each is taken by itself once its reading is at rest.`
         : `${state.taken} presses are on disk; ${state.left} are left. Go on, or fit those that there are.`;
     case "pressing":
+      if (state.machine?.runs === true) return motionWords(state.machine, state);
       if (state.waiting === "rest") return "The reading comes to rest; then it is taken by itself.";
       if (state.waiting === "untouched") return "The noise and the untouched reading are learnt.";
       if (state.last_percent === null) return state.waiting === "release" ? "The press is on disk." : "";

@@ -153,8 +153,12 @@ function drawSensors(ctx: CanvasRenderingContext2D, shown: Shown, x: (mm: number
     ctx.fill();
     ctx.stroke();
     ctx.fillStyle = quiet;
-    const fits = ctx.measureText(channel.name).width < apart - 4;
-    if (fits) ctx.fillText(channel.name, px, y + 15);
+    const wide = ctx.measureText(channel.name).width;
+    if (wide >= apart - 4) continue;
+    // Below the sign of a support, and within the picture at its ends.
+    const isHeld = shown.session.surface!.supports.some((support) => support.kind !== "free" && support.at_mm === channel.x_mm);
+    const middle = Math.min(Math.max(px, wide / 2), ctx.canvas.clientWidth - wide / 2);
+    ctx.fillText(channel.name, middle, y + (isHeld ? 34 : 15));
   }
 }
 

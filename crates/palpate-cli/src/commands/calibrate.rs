@@ -6,6 +6,7 @@ use crate::remark::remark;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
 use palpate_estimators::fit::{Fit, FitTask};
+use palpate_estimators::recording::Row;
 use palpate_live::calibration::{
     self, Assessment, Calibration, CalibrationError, DepthKnowledge, Journal, JournalError, Machine,
     MachineError, MachineNote, Note, Press, Waiting,
@@ -20,6 +21,7 @@ use palpate_mechanics::units::format_length_mm;
 use palpate_numerics::watch::Cancelled;
 use palpate_rig::{Rig, Stage};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel, sync_channel};
 use std::time::Duration;
 
@@ -63,7 +65,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = Target::new(&arguments.out, &inputs)?;
     Target::new(&arguments.presses, &inputs)?;
     let rig = input::read_rig(&arguments.rig)?;
-    let stage = stage(arguments, &rig)?;
+    let machine = arguments.stage.as_ref();
+    let stage = stage(&arguments.rig, &rig, machine, arguments.force)?;
     let journal = journal(arguments, &rig, stage.as_ref())?;
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
     let plan = calibration::plan(&rig, arguments.force, depths_m, journal.rows())
@@ -80,15 +83,20 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// The stage of the rig, where a machine presses.
-fn stage(arguments: &Arguments, rig: &Rig) -> Result<Option<Stage>, Failure> {
-    if arguments.stage.is_none() {
+pub fn stage(
+    path: &Path,
+    rig: &Rig,
+    machine: Option<&StageUrl>,
+    force_n: Option<f64>,
+) -> Result<Option<Stage>, Failure> {
+    if machine.is_none() {
         return Ok(None);
     }
     let Some(stage) = &rig.stage else {
-        let complaint = Complaint::about(&arguments.rig, "--stage needs the rig's section [stage]");
+        let complaint = Complaint::about(path, "--stage needs the rig's section [stage]");
         return Err(complaint.help("docs/live.md says how: origin, touch and depths at least").into());
     };
-    if arguments.force.is_some() && (stage.load_cell.is_some() || stage.depths_m.len() > 1) {
+    if force_n.is_some() && (stage.load_cell.is_some() || stage.depths_m.len() > 1) {
         let why = if stage.load_cell.is_some() {
             "the load cell measures the force"
         } else {
@@ -104,23 +112,28 @@ fn stage(arguments: &Arguments, rig: &Rig) -> Result<Option<Stage>, Failure> {
 /// The file of presses, empty, or with the presses that it had.
 fn journal(arguments: &Arguments, rig: &Rig, stage: Option<&Stage>) -> Result<Journal, Failure> {
     let path = &arguments.presses;
-    let depths = match stage {
-        None => DepthKnowledge::Unknown,
-        Some(stage) if stage.depths_m.len() > 1 => DepthKnowledge::Several,
-        Some(_) => DepthKnowledge::One,
-    };
-    let columns =
-        Journal::columns(&rig.setup, depths).map_err(|error| about_journal(&arguments.rig, &error))?;
-    let before = match (path.exists(), arguments.resume) {
-        (false, _) => Vec::new(),
-        (true, true) => input::read_recording_as(&rig.setup, path, &columns)?.rows,
-        (true, false) => {
-            let complaint = Complaint::new(format!("{} is there already", path.display()));
-            return Err(complaint.help("--resume goes on with its presses; another name begins anew").into());
-        }
-    };
+    let depths = DepthKnowledge::of(stage);
+    if path.exists() && !arguments.resume {
+        let complaint = Complaint::new(format!("{} is there already", path.display()));
+        return Err(complaint.help("--resume goes on with its presses; another name begins anew").into());
+    }
+    let before = pressed_before(&arguments.rig, rig, path, depths)?;
     Journal::new(&rig.setup, path, pressed_for(&arguments.rig), before, depths)
         .map_err(|error| about_journal(&arguments.rig, &error))
+}
+
+/// Rows that a file of presses has already; none where there is no file.
+pub fn pressed_before(
+    rig_path: &Path,
+    rig: &Rig,
+    path: &Path,
+    depths: DepthKnowledge,
+) -> Result<Vec<Row>, Failure> {
+    let columns = Journal::columns(&rig.setup, depths).map_err(|error| about_journal(rig_path, &error))?;
+    match path.exists() {
+        true => Ok(input::read_recording_as(&rig.setup, path, &columns)?.rows),
+        false => Ok(Vec::new()),
+    }
 }
 
 /// Comment of a file of presses.
@@ -199,7 +212,7 @@ fn press_all(
 fn machine(arguments: &Arguments, stage: Option<Stage>) -> Result<Option<Machine>, Failure> {
     let (Some(url), Some(stage)) = (&arguments.stage, stage) else { return Ok(None) };
     let limit_n = stage.force_limit_n;
-    let thread = StageThread::open(url, stage).map_err(|error| {
+    let thread = StageThread::open(url, stage, Arc::default()).map_err(|error| {
         Complaint::new(format!("--stage {url}: {error}")).help("is it on, and at this port?")
     })?;
     remark!("a machine of {} firmware at {url}; Enter stops it at once", thread.firmware().name());
@@ -227,7 +240,7 @@ fn step(
 }
 
 fn machine_ended(arguments: &Arguments, calibration: &Calibration, error: &MachineError) -> Failure {
-    let words = format!("{error}; {}", goes_on(arguments, calibration));
+    let words = format!("{error}: {}; {}", error.help(), goes_on(arguments, calibration));
     match error {
         MachineError::ByHand => Failure::Interrupted(words),
         MachineError::Stage(_) | MachineError::Silent => Failure::DataLost(words),

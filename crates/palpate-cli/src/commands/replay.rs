@@ -83,11 +83,19 @@ fn by_the_same(
     let mut follower = follower.map_err(|error| Complaint::about(&arguments.recording, error))?;
     begin(arguments, extent, out)?;
     let (mut count, mut others) = (0_u64, 0_u64);
+    let units = Channel::all_of(&locator.setup);
+    let mut reading = Vec::new();
     while let Some(recorded) = playback.next_recorded().map_err(Complaint::new)? {
+        if let Recorded::Reading { values, .. } = recorded {
+            // As the board's number times its unit: the reading to the last bit.
+            reading =
+                values.iter().zip(&units).map(|(value, channel)| value * channel.unit.factor()).collect();
+            continue;
+        }
         let Recorded::Estimate { number, unix_ns, located, estimate: before } = recorded else { continue };
         let single = locator.locate(&located).map_err(Complaint::new)?;
         let estimate = match &mut follower {
-            Some(follower) => follower.follow(unix_ns, &located, single),
+            Some(follower) => follower.follow(unix_ns, &reading, &located, single),
             None => single,
         };
         let line =

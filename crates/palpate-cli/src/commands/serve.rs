@@ -1,6 +1,6 @@
 //! `palpate serve`: a session that browsers follow.
 
-use super::calibrate::{about_journal, pressed_for};
+use super::calibrate::{about_journal, pressed_before, pressed_for, stage};
 use super::outlets::Outlets;
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RigOrLocator};
@@ -15,6 +15,7 @@ use palpate_live::calibration::{DepthKnowledge, Journal, plan};
 use palpate_live::server::{Access, AccessError, CalibrationPlan, Live, LiveError, Server, ServerError};
 use palpate_live::simulated_board::BoardConfig;
 use palpate_live::source::SourceUrl;
+use palpate_live::stage::StageUrl;
 use palpate_rig::Rig;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -56,6 +57,9 @@ pub struct Arguments {
     /// Force of every press of the calibration [default: the rig's, or unknown]
     #[arg(long, value_name = "FORCE", value_parser = input::force, requires = "calibrate")]
     force: Option<f64>,
+    /// A machine that presses in the calibration: `gcode:serial:///dev/ttyUSB0?baud=115200` or `gcode:tcp://host:port`, of Marlin or GRBL firmware
+    #[arg(long, value_name = "MACHINE", requires = "calibrate")]
+    stage: Option<StageUrl>,
     /// A folder in which browsers may record the session
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
@@ -183,11 +187,14 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     Target::new(out, &inputs)?;
     Target::new(presses, &inputs)?;
     let rig = input::read_rig(path)?;
-    let before = if presses.exists() { input::read_recording(&rig.setup, presses)?.rows } else { Vec::new() };
     // What cannot be calibrated is refused here, where the place in the file can be shown.
-    plan(&rig, arguments.force, &[], &before).map_err(|error| Complaint::about(path, error))?;
+    let stage = stage(path, &rig, arguments.stage.as_ref(), arguments.force)?;
+    let depths = DepthKnowledge::of(stage.as_ref());
+    let before = pressed_before(path, &rig, presses, depths)?;
+    let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
+    plan(&rig, arguments.force, depths_m, &before).map_err(|error| Complaint::about(path, error))?;
     let comment = pressed_for(path);
-    Journal::new(&rig.setup, presses, comment.clone(), Vec::new(), DepthKnowledge::Unknown)
+    Journal::new(&rig.setup, presses, comment.clone(), Vec::new(), depths)
         .map_err(|error| about_journal(path, &error))?;
     Ok(Some(CalibrationPlan {
         rig,
@@ -196,6 +203,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
         out: out.clone(),
         comment,
         force_n: arguments.force,
+        machine: arguments.stage.clone(),
         before,
         seed: arguments.seed,
     }))

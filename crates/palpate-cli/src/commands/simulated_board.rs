@@ -8,7 +8,7 @@ use palpate_live::simulated_board::{
     BoardConfig, FaultConfig, Finger, FrameForm, Link, LinkUrl, LoadCell, SimulatedBoard,
 };
 use palpate_live::stage::{Firmware, SimulatedMachine};
-use palpate_mechanics::units::{Dimension, Quantity, format_count};
+use palpate_mechanics::units::format_count;
 use palpate_rig::Rig;
 use std::io::{Read, Write};
 use std::path::PathBuf;
@@ -32,13 +32,13 @@ pub struct Arguments {
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Share of frames that are left out
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = input::share)]
     drop: f64,
     /// Share of frames of which a part is missing
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = input::share)]
     torn: f64,
     /// Pull the cable for a second, every so often
-    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[arg(long, value_name = "TIME", value_parser = input::time)]
     disconnect_every: Option<f64>,
     /// Drift of each channel in a second, in its SI unit or raw; upward and downward channels in turn
     #[arg(long, value_name = "NUMBER", default_value_t = 0.0, allow_negative_numbers = true)]
@@ -47,10 +47,10 @@ pub struct Arguments {
     #[arg(long, value_name = "NUMBER", default_value_t = 0.0)]
     walk: f64,
     /// Share of a reading that follows the contact slowly
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = input::share)]
     creep: f64,
     /// Time constant of the creep
-    #[arg(long, value_name = "TIME", default_value = "5 s", value_parser = time)]
+    #[arg(long, value_name = "TIME", default_value = "5 s", value_parser = input::time)]
     creep_time: f64,
     /// A script of the finger: CSV of time in s, x and y in mm, force in N [default: a random finger]
     #[arg(long, value_name = "FILE.csv")]
@@ -71,7 +71,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NUMBER", default_value_t = 0.0, allow_negative_numbers = true, value_parser = ppm)]
     clock_ppm: f64,
     /// End after so long
-    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[arg(long, value_name = "TIME", value_parser = input::time)]
     for_time: Option<f64>,
 }
 
@@ -89,25 +89,10 @@ enum FirmwareName {
     Grbl,
 }
 
-fn share(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
-        _ => Err(format!("`{text}` must be a number from 0 to 1")),
-    }
-}
-
 fn ppm(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(ppm) if (-1e5..=1e5).contains(&ppm) => Ok(ppm),
         _ => Err(format!("`{text}` must be a number from -100000 to 100000")),
-    }
-}
-
-fn time(text: &str) -> Result<f64, String> {
-    match Quantity::parse_as(text, Dimension::Time) {
-        Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(seconds),
-        Ok(_) => Err(format!("`{text}` must be greater than 0, and at most 1e9 s")),
-        Err(error) => Err(error.to_string()),
     }
 }
 

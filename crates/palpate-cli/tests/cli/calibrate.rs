@@ -174,9 +174,28 @@ fn a_machine_that_is_not_there_and_a_rig_without_a_stage_are_told_with_a_remedy(
     };
     let words = calibrate("gcode:tcp://127.0.0.1:1");
     assert!(words.contains("needs the rig's section [stage]"), "{words}");
+    let served = |more: &[&str]| {
+        let mut command = palpate(folder.path());
+        command.args([
+            "serve",
+            "rig.toml",
+            "--from",
+            "udp://127.0.0.1:9",
+            "--stage",
+            "gcode:tcp://127.0.0.1:1",
+        ]);
+        complained(&command.args(more).output().unwrap(), 2)
+    };
+    let calibrating = ["--calibrate", "--presses", "presses.csv", "--out", "locator.json"];
+    let words = served(&calibrating);
+    assert!(words.contains("needs the rig's section [stage]"), "{words}");
+    let words = served(&[]);
+    assert!(words.contains("--calibrate"), "a machine presses in a calibration only: {words}");
     std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
     let words = calibrate("gcode:tcp://127.0.0.1:1");
     assert!(words.contains("--stage gcode:tcp://127.0.0.1:1: the line to the machine is broken"), "{words}");
+    let words = served(&[&calibrating[..], &["--force", "2 N"]].concat());
+    assert!(words.contains("--force does not go with the rig's [stage]: the load cell"), "{words}");
     let words = calibrate("tcp://127.0.0.1:1");
     assert!(words.contains("gcode:serial:///dev/ttyUSB0"), "{words}");
 }

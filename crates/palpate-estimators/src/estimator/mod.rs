@@ -11,7 +11,9 @@ pub use crate::load_profile::{
     Cells, CentreOfPressure, ForceBounds, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit,
     Profiler, Resolution, patch_limits,
 };
-pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig};
+pub use crate::tracking::{
+    Across, Creep, Drift, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig,
+};
 pub use compare::{CompareOptions, Compared, Comparison, compare, contenders};
 pub use cost::FitCost;
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};

@@ -26,8 +26,10 @@ mod bank;
 mod belief;
 mod birth;
 mod gaussian;
+mod slow;
 mod tracker;
 
+pub use slow::{Creep, Drift};
 pub use tracker::{SmoothTracker, Tracker};
 
 use crate::likelihood::Likelihood;
@@ -56,6 +58,10 @@ pub struct TrackerConfig {
     pub jumps_per_s: f64,
     /// First mode of the surface, where that is known; else it is taken to be in balance.
     pub swing: Option<Swing>,
+    /// Drift of the channels, where it is followed; else there is none.
+    pub drift: Option<Drift>,
+    /// Creep of the surface, where that is known; else there is none.
+    pub creep: Option<Creep>,
 }
 
 /// The first mode of a surface that swings.
@@ -79,6 +85,8 @@ impl Default for TrackerConfig {
             changes_per_s: 1.0,
             jumps_per_s: 1e-3,
             swing: None,
+            drift: None,
+            creep: None,
         }
     }
 }

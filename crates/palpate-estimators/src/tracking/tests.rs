@@ -276,3 +276,60 @@ pub(super) fn assert_numbers_after_absurd_readings<const C: usize>(
         }
     }
 }
+
+/// The derivatives of a linearisation against differences, and its reading against the noise-free one of the fits: no misfit is left.
+pub(super) fn assert_linearised(likelihood: &dyn Likelihood, contact: Contact) {
+    let at = likelihood.linearised(&[contact]);
+    let forces = if likelihood.known_force_n().is_some() { 0.0 } else { 1.0 };
+    let moved = |[x_m, y_m, force_n]: [f64; 3]| {
+        let position = Position { x_m: contact.position.x_m + x_m, y_m: contact.position.y_m + y_m };
+        likelihood.linearised(&[Contact { position, force_n: contact.force_n + force_n }]).reading
+    };
+    let sides = if likelihood.extent().width_m().is_some() { 1.0 } else { 0.0 };
+    for (i, factor) in [1.0, sides, forces].into_iter().enumerate() {
+        let step = 1e-6;
+        let by = |sign: f64| std::array::from_fn(|j| if i == j { sign * step } else { 0.0 });
+        let (more, less) = (moved(by(1.0)), moved(by(-1.0)));
+        let size = at.derivatives[i].iter().fold(1.0, |size: f64, own| size.max(own.abs()));
+        for ((more, less), own) in more.iter().zip(&less).zip(&at.derivatives[i]) {
+            let difference = factor * (more - less) / (2.0 * step);
+            assert!((difference - own).abs() < 1e-5 * size, "{i}: {difference} {own}");
+        }
+    }
+    let signal: f64 = at.reading.iter().map(|own| own * own).sum();
+    assert!((signal / likelihood.signal(contact) - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn linearisations_are_those_of_differences() {
+    let rig = rig();
+    for force_n in [Some(3.0), None] {
+        let contact = Contact { position: Position::along(0.1234), force_n: 3.0 };
+        assert_linearised(&likelihood(&rig, force_n), contact);
+    }
+}
+
+/// Where the baseline goes, the drift goes the other way, and what is followed stays.
+#[test]
+fn a_baseline_that_moves_moves_no_contact() {
+    let rig = rig();
+    let config = TrackerConfig { drift: Some(Drift::default()), ..TrackerConfig::default() };
+    let likelihood: Arc<dyn Likelihood> = Arc::new(likelihood(&rig, Some(3.0)));
+    let (mut still, mut moving) =
+        (Tracker::new(Arc::clone(&likelihood), config), Tracker::new(Arc::clone(&likelihood), config));
+    let noise = rig.setup.layout().sensors()[0].channel.noise_sd;
+    let mut moved = vec![0.0; rig.setup.layout().sensors().len()];
+    for (i, (time_s, _, reading)) in readings(&rig, along_the_beam(), 2).iter().take(600).enumerate() {
+        let by: Vec<f64> = (0..moved.len()).map(|c| 1e-3 * noise * ((i * (c + 1)) % 7) as f64).collect();
+        moved.iter_mut().zip(&by).for_each(|(moved, by)| *moved += by);
+        moving.move_baseline(&by);
+        let tared: Vec<f64> = reading.iter().zip(&moved).map(|(reading, moved)| reading - moved).collect();
+        let (still, moving) =
+            (still.follow(*time_s, reading).unwrap(), moving.follow(*time_s, &tared).unwrap());
+        assert_eq!(still.contacts.len(), moving.contacts.len(), "{i}");
+        for (still, moving) in still.contacts.iter().zip(&moving.contacts) {
+            assert!((still.x_m - moving.x_m).abs() < 1e-7, "{i}: {} {}", still.x_m, moving.x_m);
+            assert!((still.sd[0] - moving.sd[0]).abs() < 1e-7, "{i}");
+        }
+    }
+}

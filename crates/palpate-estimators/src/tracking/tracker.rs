@@ -3,6 +3,7 @@
 use super::bank::Step;
 use super::belief::{Belief, Moments, Observation};
 use super::birth::BirthModel;
+use super::slow::SlowState;
 use super::{Track, TrackError, Tracked, TrackerConfig};
 use crate::likelihood::{Geometry, Likelihood};
 use palpate_core::Estimate;
@@ -46,6 +47,8 @@ pub struct Tracker {
     time_s: Option<f64>,
     next_id: u64,
     whitened: Vec<f64>,
+    /// Drift and creep, where they are followed; made with the first reading.
+    slow: Option<SlowState>,
 }
 
 /// Hypothesis: a surface with some contacts that came at some time and have moved since.
@@ -74,7 +77,15 @@ struct LogBirthProbabilities {
 impl Tracker {
     /// A tracker that has seen nothing.
     pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
-        Self { likelihood, config, hypotheses: Vec::new(), time_s: None, next_id: 0, whitened: Vec::new() }
+        Self {
+            likelihood,
+            config,
+            hypotheses: Vec::new(),
+            time_s: None,
+            next_id: 0,
+            whitened: Vec::new(),
+            slow: None,
+        }
     }
 
     /// Takes the next reading: one finite value a channel, at `time_s` seconds.
@@ -90,7 +101,14 @@ impl Tracker {
         let likelihood = Arc::clone(&self.likelihood);
         let mut whitened = std::mem::take(&mut self.whitened);
         likelihood.whiten(reading, &mut whitened);
-        let single = likelihood.single_estimate(reading);
+        let single = match self.slow(reading.len()) {
+            None => likelihood.single_estimate(reading),
+            Some(slow) => {
+                let mut reading = reading.to_vec();
+                slow.take_off(time_s, duration_s, &mut whitened, &mut reading);
+                likelihood.single_estimate(&reading)
+            }
+        };
         let log_births = self.predict(duration_s);
         let observation = Observation {
             likelihood: &*likelihood,
@@ -101,9 +119,35 @@ impl Tracker {
         self.update(observation);
         born.into_iter().for_each(|(weight, belief)| self.add(weight, belief));
         let moments = self.prune();
+        let mut track = self.track(time_s, single, moments);
+        if let Some(slow) = &mut self.slow {
+            let probability = track.numbers[track.contacts.len()];
+            // What swings is no drift.
+            if self.config.swing.is_none() || track.contacts.is_empty() {
+                slow.learn(&*likelihood, &whitened, &track.contacts, probability);
+            }
+            slow.widen(&*likelihood, &mut track.contacts);
+        }
         self.whitened = whitened;
         self.time_s = Some(time_s);
-        Ok(self.track(time_s, single, moments))
+        Ok(track)
+    }
+
+    /// Says that readings are brought to a baseline that has moved by so much in each channel, as by a tare: what has drifted since is counted from there. A
+    /// baseline that has moved by more than the noise is another one, from which all begins anew.
+    pub fn move_baseline(&mut self, by: &[f64]) {
+        if let Some(slow) = self.slow(by.len()) {
+            slow.move_baseline(by);
+        }
+    }
+
+    /// Drift and creep, where they are followed.
+    fn slow(&mut self, channels: usize) -> Option<&mut SlowState> {
+        let TrackerConfig { drift, creep, .. } = self.config;
+        if self.slow.is_none() && (drift.is_some() || creep.is_some()) {
+            self.slow = Some(SlowState::new(&*self.likelihood, channels, drift, creep));
+        }
+        self.slow.as_mut()
     }
 
     fn step(&self, duration_s: f64) -> Step {

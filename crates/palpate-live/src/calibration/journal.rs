@@ -4,6 +4,7 @@ use crate::whole_file;
 use palpate_estimators::recording::{self, Column, Columns, Recording, Row};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::units::{Dimension, Unit};
+use palpate_rig::Stage;
 use std::path::{Path, PathBuf};
 
 /// Presses so far, and the file that has them.
@@ -169,4 +170,15 @@ pub enum DepthKnowledge {
     One,
     /// A machine presses to several depths.
     Several,
+}
+
+impl DepthKnowledge {
+    /// That of presses by this machine, or by hand without one.
+    pub fn of(stage: Option<&Stage>) -> Self {
+        match stage {
+            None => Self::Unknown,
+            Some(stage) if stage.depths_m.len() > 1 => Self::Several,
+            Some(_) => Self::One,
+        }
+    }
 }

@@ -1,8 +1,9 @@
 //! A machine that presses where the guide of a calibration asks for it.
 
-use super::guide::Waiting;
+use super::guide::{Press, Waiting};
 use super::run::{Calibration, Note};
 use crate::stage::{Done, Order, StageError, StageThread};
+use serde::Serialize;
 use std::time::{Duration, Instant};
 
 /// Readings that stay away for so long stop the machine: nobody sees what it does.
@@ -43,6 +44,12 @@ pub enum MachineError {
     /// Somebody stopped it.
     #[error("the machine was stopped by hand")]
     ByHand,
+    /// Nobody who could stop it.
+    #[error("nobody has watched the machine for {seconds} s: its finger was lifted")]
+    Unwatched {
+        /// Seconds that somebody was waited for.
+        seconds: u64,
+    },
     /// Presses that nobody sees.
     #[error(
         "the readings have not shown the last {MOST_UNSEEN} presses: `touch` or `depths` of [stage] are wrong"
@@ -51,6 +58,29 @@ pub enum MachineError {
     /// A surface that never rests.
     #[error("the untouched readings have not come to rest within {} s", RELEASED_WITHIN.as_secs())]
     NoRest,
+}
+
+impl MachineError {
+    /// The remedy.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::Stage(StageError::Line(_)) => "see that it is on, and at this port",
+            Self::Stage(StageError::Refused { .. } | StageError::Silent { .. }) => {
+                "see what its own display says, and that its way is free; then reset it"
+            }
+            Self::Stage(StageError::Unknown { .. }) => "give the baud rate of its firmware",
+            Self::Stage(StageError::OutOfRange(_)) => "mend [stage] of the rig",
+            Self::Stage(StageError::Stopped) | Self::ByHand => {
+                "reset it, as by its button, before it goes on"
+            }
+            Self::Saturated { .. } => "reset it, and press less deep: `depths` of [stage]",
+            Self::Overload { .. } => "reset it, and press less deep, or raise `force_limit` of [stage]",
+            Self::Silent => "see to the board that sends the readings; then reset the machine",
+            Self::Unwatched { .. } => "keep a page open while it presses",
+            Self::Unseen => "jog the finger to the untouched surface, and write its z as `touch`",
+            Self::NoRest => "see that nothing else touches or shakes the surface",
+        }
+    }
 }
 
 /// Step of a machine that people are told of.
@@ -64,13 +94,21 @@ pub enum MachineNote {
     NoRest,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
+/// Motion of a machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Motion {
     /// It waits for the first reading: nothing moves unseen.
     Blind,
-    /// It moves.
-    Moving,
+    /// It looks for its end stops.
+    Homing,
+    /// It travels to a place, and presses there.
+    Pressing,
+    /// It lifts its finger.
+    Lifting,
+    /// Its finger is lifted, and it rests.
     Up,
+    /// Its finger presses, and it rests.
     Down,
 }
 
@@ -79,7 +117,9 @@ enum State {
 pub struct Machine {
     thread: StageThread,
     force_limit_n: f64,
-    state: State,
+    motion: Motion,
+    /// The press that it was sent to last.
+    press: Option<Press>,
     since: Instant,
     readings: u64,
     read_at: Instant,
@@ -93,12 +133,23 @@ impl Machine {
         Self {
             thread,
             force_limit_n: force_limit_n.unwrap_or(f64::INFINITY),
-            state: State::Blind,
+            motion: Motion::Blind,
+            press: None,
             since: now,
             readings: 0,
             read_at: now,
             unseen: 0,
         }
+    }
+
+    /// Its motion.
+    pub fn motion(&self) -> Motion {
+        self.motion
+    }
+
+    /// The press that it was sent to last; `None` before the first.
+    pub fn press(&self) -> Option<Press> {
+        self.press
     }
 
     /// Stops it at once, where what the calibration noted asks for that.
@@ -132,34 +183,35 @@ impl Machine {
         if calibration.readings() > self.readings {
             (self.readings, self.read_at) = (calibration.readings(), Instant::now());
         }
-        if self.state != State::Blind && self.read_at.elapsed() > SILENT {
+        if self.motion != Motion::Blind && self.read_at.elapsed() > SILENT {
             return self.fail(MachineError::Silent);
         }
         match self.thread.done() {
-            Some(Ok(Done::Up)) => self.enter(State::Up, calibration),
-            Some(Ok(Done::Down)) => self.enter(State::Down, calibration),
+            Some(Ok(Done::Up)) => self.enter(Motion::Up, calibration),
+            Some(Ok(Done::Down)) => self.enter(Motion::Down, calibration),
             Some(Err(error)) => return Err(error.into()),
             None => {}
         }
-        match (self.state, calibration.guide().waiting()) {
-            (State::Blind, _) if self.readings > 0 => {
+        match (self.motion, calibration.guide().waiting()) {
+            (Motion::Blind, _) if self.readings > 0 => {
                 self.order(Order::Home, calibration);
                 return Ok(Some(MachineNote::Homing));
             }
-            (State::Up, Waiting::Press) => {
+            (Motion::Up, Waiting::Press) => {
                 if let Some((_, press)) = calibration.guide().next_press() {
                     let depth_m = press.depth_m.unwrap_or_default();
+                    self.press = Some(press);
                     self.order(Order::Press { position: press.position, depth_m }, calibration);
                 }
             }
-            (State::Up, Waiting::Untouched | Waiting::Release) if self.since.elapsed() > RELEASED_WITHIN => {
+            (Motion::Up, Waiting::Untouched | Waiting::Release) if self.since.elapsed() > RELEASED_WITHIN => {
                 return Err(MachineError::NoRest);
             }
-            (State::Down, Waiting::Release | Waiting::Nothing) => {
+            (Motion::Down, Waiting::Release | Waiting::Nothing) => {
                 self.unseen = 0;
                 self.order(Order::Lift, calibration);
             }
-            (State::Down, Waiting::Press) if self.since.elapsed() > SEEN_WITHIN => {
+            (Motion::Down, Waiting::Press) if self.since.elapsed() > SEEN_WITHIN => {
                 self.leave_out(calibration);
                 self.unseen += 1;
                 if self.unseen == MOST_UNSEEN {
@@ -167,7 +219,7 @@ impl Machine {
                 }
                 return Ok(Some(MachineNote::Unseen));
             }
-            (State::Down, Waiting::Rest) if self.since.elapsed() > AT_REST_WITHIN => {
+            (Motion::Down, Waiting::Rest) if self.since.elapsed() > AT_REST_WITHIN => {
                 self.leave_out(calibration);
                 return Ok(Some(MachineNote::NoRest));
             }
@@ -189,14 +241,19 @@ impl Machine {
         calibration.skip();
     }
 
-    fn enter(&mut self, state: State, calibration: &mut Calibration) {
-        (self.state, self.since) = (state, Instant::now());
+    fn enter(&mut self, motion: Motion, calibration: &mut Calibration) {
+        (self.motion, self.since) = (motion, Instant::now());
         calibration.set_guided(true);
     }
 
     fn order(&mut self, order: Order, calibration: &mut Calibration) {
         calibration.set_guided(false);
-        (self.state, self.since) = (State::Moving, Instant::now());
+        let motion = match order {
+            Order::Home => Motion::Homing,
+            Order::Press { .. } => Motion::Pressing,
+            Order::Lift => Motion::Lifting,
+        };
+        (self.motion, self.since) = (motion, Instant::now());
         self.thread.order(order);
     }
 

@@ -16,7 +16,7 @@ mod settling;
 pub use assessment::{Assessment, Gain, HeldOut};
 pub use guide::{Guide, Press, Progress, Waiting};
 pub use journal::{DepthKnowledge, Journal, JournalError};
-pub use machine::{Machine, MachineError, MachineNote};
+pub use machine::{Machine, MachineError, MachineNote, Motion};
 pub use plan::{PlanError, plan};
 pub use repeats::{Place, last_deviation_percent, places};
 pub use run::{Calibration, CalibrationError, Note};

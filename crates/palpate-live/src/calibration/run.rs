@@ -55,6 +55,8 @@ pub enum Note {
 struct LoadCell {
     name: String,
     limit_n: Option<f64>,
+    /// Its last reading.
+    now_n: Option<f64>,
     /// Its reading when nothing touched last.
     untouched_n: Option<f64>,
 }
@@ -89,7 +91,7 @@ impl Calibration {
         let mut channels = Channel::all_of(setup);
         let load_cell = stage.and_then(|stage| {
             let name = stage.load_cell.clone()?;
-            Some(LoadCell { name, limit_n: stage.force_limit_n, untouched_n: None })
+            Some(LoadCell { name, limit_n: stage.force_limit_n, now_n: None, untouched_n: None })
         });
         if let Some(LoadCell { name, .. }) = &load_cell {
             channels.push(Channel {
@@ -138,6 +140,12 @@ impl Calibration {
         &self.last
     }
 
+    /// Force at the load cell, in newtons, less what it read untouched; `None` without one, or before the first reading.
+    pub fn cell_force_n(&self) -> Option<f64> {
+        let cell = self.load_cell.as_ref()?;
+        Some(cell.now_n? - cell.untouched_n.unwrap_or(0.0))
+    }
+
     /// Takes what a source brought; what follows is added to `notes`.
     ///
     /// # Errors
@@ -183,9 +191,10 @@ impl Calibration {
                 notes.push(Note::Saturated(name));
             }
         });
-        if let Some(LoadCell { limit_n: Some(limit_n), untouched_n, .. }) = &self.load_cell {
-            let force_n = reading[channels] - untouched_n.unwrap_or(0.0);
-            if force_n.abs() > *limit_n {
+        if let Some(cell) = &mut self.load_cell {
+            cell.now_n = Some(reading[channels]);
+            let force_n = reading[channels] - cell.untouched_n.unwrap_or(0.0);
+            if cell.limit_n.is_some_and(|limit_n| force_n.abs() > limit_n) {
                 notes.push(Note::Overload(force_n));
             }
         }

@@ -1,13 +1,16 @@
 //! A calibration that browsers guide a person through, and the locator that it ends with.
 
+use super::machine::{Attendance, MachineRecord, MachineState};
+use super::pressing::{MachineRun, listen};
+use super::shared::{Shared, locked};
 use crate::calibration::{
-    Assessment, Calibration, CalibrationError, DepthKnowledge, Journal, JournalError, Note, PlanError, Press,
-    Waiting, last_deviation_percent, places, plan,
+    Assessment, Calibration, DepthKnowledge, Journal, JournalError, PlanError, Press, Waiting, places, plan,
 };
 use crate::frame::{Channel, ColumnsError};
 use crate::input::Input;
 use crate::pipeline::WAITING;
 use crate::source::{Source, SourceError, SourceUrl};
+use crate::stage::StageUrl;
 use crate::stamp::HostClock;
 use crate::whole_file;
 use palpate_estimators::estimator::Locator;
@@ -16,13 +19,13 @@ use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
-use palpate_rig::Rig;
+use palpate_rig::{Rig, Stage};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 /// Plan of a calibration: rig, source of the readings, files of the outcome.
 #[derive(Debug)]
@@ -39,6 +42,8 @@ pub struct CalibrationPlan {
     pub comment: String,
     /// Force of every press, where it is not that of the rig.
     pub force_n: Option<f64>,
+    /// The machine that presses, as the rig's stage says; without one a person does.
+    pub machine: Option<StageUrl>,
     /// Rows that the file of presses has already.
     pub before: Vec<Row>,
     /// Seed of the fit.
@@ -49,6 +54,17 @@ impl CalibrationPlan {
     /// Name of the locator's file.
     pub fn out_name(&self) -> String {
         self.out.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+    }
+
+    /// The machine that presses, and the rig's stage.
+    fn machine(&self) -> Option<(&StageUrl, &Stage)> {
+        self.machine.as_ref().zip(self.rig.stage.as_ref())
+    }
+
+    /// The presses that are not among these rows.
+    fn to_come(&self, rows: &[Row]) -> Result<Vec<Press>, PlanError> {
+        let depths_m = self.machine().map_or(&[][..], |(_, stage)| &stage.depths_m);
+        plan(&self.rig, self.force_n, depths_m, rows)
     }
 }
 
@@ -61,6 +77,12 @@ pub enum CalibratorError {
     /// It does not go on.
     #[error("the calibration has not begun, or has ended")]
     NotBegun,
+    /// A machine presses, which a hand must not be led past.
+    #[error("a machine presses: it takes no press back and leaves none out by hand, and is to end first")]
+    MachinePresses,
+    /// There is no machine that could be stopped.
+    #[error("no machine runs")]
+    NoMachine,
     /// There is nothing to fit, or to take back.
     #[error("no press was taken yet")]
     NoPress,
@@ -116,6 +138,8 @@ pub struct CalibrationRecord {
     bad_frames: u64,
     presses: String,
     problem: Option<String>,
+    /// The machine, where one presses.
+    machine: Option<MachineRecord>,
     outcome: Option<OutcomeRecord>,
 }
 
@@ -150,6 +174,9 @@ pub struct Calibrator {
     plan: CalibrationPlan,
     channels: Vec<Channel>,
     state: Mutex<State>,
+    /// The stop of the machine that was started last: apart from the state, which may be waited for.
+    stop: Mutex<Arc<AtomicBool>>,
+    attendance: Arc<Attendance>,
 }
 
 struct State {
@@ -166,15 +193,9 @@ struct Running {
     shared: Arc<Mutex<Shared>>,
     inputs: SyncSender<Input>,
     thread: JoinHandle<()>,
+    by_machine: bool,
     /// Its thread ends with it.
     _source: Source,
-}
-
-struct Shared {
-    calibration: Calibration,
-    source: Option<String>,
-    last_percent: Option<f64>,
-    problem: Option<String>,
 }
 
 impl Calibrator {
@@ -182,7 +203,13 @@ impl Calibrator {
     pub fn new(mut plan: CalibrationPlan) -> Self {
         let rows = std::mem::take(&mut plan.before);
         let state = State { phase: Phase::Ready, rows, running: None, problem: None, outcome: None };
-        Self { channels: Channel::all_of(&plan.rig.setup), plan, state: Mutex::new(state) }
+        Self {
+            channels: Channel::all_of(&plan.rig.setup),
+            plan,
+            state: Mutex::new(state),
+            stop: Mutex::default(),
+            attendance: Arc::default(),
+        }
     }
 
     /// The plan.
@@ -190,7 +217,12 @@ impl Calibrator {
         &self.plan
     }
 
-    /// Begins, or goes on after it was ended early. `free_source` ends the session that has the source.
+    /// Signs of people who watch.
+    pub fn attendance(&self) -> &Attendance {
+        &self.attendance
+    }
+
+    /// Begins, or goes on after it was ended early; with a machine it greets that, which then moves. `free_source` ends the session that has the source.
     ///
     /// # Errors
     /// [`CalibratorError`] where it goes on already, the source cannot be opened, or the presses cannot be kept.
@@ -206,24 +238,59 @@ impl Calibrator {
             Phase::Pressing | Phase::Fitting | Phase::Assessing => return Err(CalibratorError::GoesOn),
         }
         state.end_running();
-        let CalibrationPlan { rig, from, presses, comment, force_n, .. } = &self.plan;
-        let to_come = plan(rig, *force_n, &[], &state.rows)?;
+        let CalibrationPlan { rig, from, presses, comment, .. } = &self.plan;
+        let to_come = self.plan.to_come(&state.rows)?;
+        let machine = self.plan.machine().filter(|_| !to_come.is_empty());
+        let stage = machine.map(|(_, stage)| stage);
         let rows = state.rows.clone();
-        let journal = Journal::new(&rig.setup, presses, comment.clone(), rows, DepthKnowledge::Unknown)?;
-        let calibration = Calibration::new(&rig.setup, None, from.columns(), to_come, journal)?;
-        let shared = Shared { calibration, source: None, last_percent: None, problem: None };
+        let journal = Journal::new(&rig.setup, presses, comment.clone(), rows, DepthKnowledge::of(stage))?;
+        let calibration = Calibration::new(&rig.setup, stage, from.columns(), to_come, journal)?;
+        let machine = machine.map(|(url, stage)| MachineRun {
+            url: url.clone(),
+            stage: stage.clone(),
+            stop: self.new_stop(),
+            attendance: Arc::clone(&self.attendance),
+        });
+        let by_machine = machine.is_some();
+        let shared = Shared {
+            calibration,
+            source: None,
+            last_percent: None,
+            problem: None,
+            machine: MachineState::default(),
+        };
         let shared = Arc::new(Mutex::new(shared));
         let (inputs, received) = sync_channel(WAITING);
         // Many sources have room for one.
         free_source();
         let source = Source::open(from, folder, clock, inputs.clone())?;
         let heard = Arc::clone(&shared);
-        let thread = std::thread::Builder::new()
-            .name("calibration".to_owned())
-            .spawn(move || listen(&received, &heard))?;
+        let run = move || match machine {
+            Some(machine) => machine.press(&received, &heard),
+            None => listen(&received, &heard),
+        };
+        let thread = std::thread::Builder::new().name("calibration".to_owned()).spawn(run)?;
         (state.phase, state.problem) = (Phase::Pressing, None);
-        state.running = Some(Running { shared, inputs, thread, _source: source });
+        state.running = Some(Running { shared, inputs, thread, by_machine, _source: source });
         Ok(())
+    }
+
+    /// Stops the machine at once, whatever it does and whatever is waited for.
+    ///
+    /// # Errors
+    /// [`CalibratorError::NoMachine`] where none is to press.
+    pub fn halt(&self) -> Result<(), CalibratorError> {
+        if self.plan.machine.is_none() {
+            return Err(CalibratorError::NoMachine);
+        }
+        locked(&self.stop).store(true, Ordering::Relaxed);
+        Ok(())
+    }
+
+    fn new_stop(&self) -> Arc<AtomicBool> {
+        let stop = Arc::<AtomicBool>::default();
+        *locked(&self.stop) = Arc::clone(&stop);
+        stop
     }
 
     /// Takes back the last press, which is asked for again.
@@ -231,7 +298,7 @@ impl Calibrator {
     /// # Errors
     /// [`CalibratorError`] where none was taken since it began.
     pub fn redo(&self) -> Result<(), CalibratorError> {
-        self.with_calibration(|calibration| match calibration.redo()? {
+        self.with_hand(|calibration| match calibration.redo()? {
             true => Ok(()),
             false => Err(CalibratorError::NoPress),
         })
@@ -240,15 +307,15 @@ impl Calibrator {
     /// Leaves out the press that is next.
     ///
     /// # Errors
-    /// [`CalibratorError::NotBegun`].
+    /// [`CalibratorError::NotBegun`], or [`CalibratorError::MachinePresses`].
     pub fn skip(&self) -> Result<(), CalibratorError> {
-        self.with_calibration(|calibration| {
+        self.with_hand(|calibration| {
             calibration.skip();
             Ok(())
         })
     }
 
-    /// Ends the presses early.
+    /// Ends the presses early; a machine lifts its finger first.
     ///
     /// # Errors
     /// [`CalibratorError::NotBegun`].
@@ -257,6 +324,17 @@ impl Calibrator {
             calibration.stop();
             Ok(())
         })
+    }
+
+    /// Acts where a person presses: a machine is on its way to the press that was next.
+    fn with_hand(
+        &self,
+        act: impl FnOnce(&mut Calibration) -> Result<(), CalibratorError>,
+    ) -> Result<(), CalibratorError> {
+        if self.lock().machine_presses() {
+            return Err(CalibratorError::MachinePresses);
+        }
+        self.with_calibration(act)
     }
 
     fn with_calibration(
@@ -276,6 +354,9 @@ impl Calibrator {
         let mut state = self.lock();
         if matches!(state.phase(), Phase::Fitting | Phase::Assessing) {
             return Err(CalibratorError::GoesOn);
+        }
+        if state.machine_presses() {
+            return Err(CalibratorError::MachinePresses);
         }
         state.end_running();
         if !state.rows.iter().any(Row::touches) {
@@ -326,8 +407,9 @@ impl Calibrator {
         })
     }
 
-    /// Ends it, where it runs; its presses are on disk.
+    /// Ends it, where it runs; its presses are on disk. A machine is stopped at once.
     pub fn end(&self) {
+        locked(&self.stop).store(true, Ordering::Relaxed);
         self.lock().end_running();
     }
 
@@ -349,16 +431,19 @@ impl Calibrator {
             bad_frames: 0,
             presses: self.plan.presses.display().to_string(),
             problem: state.problem.clone(),
+            machine: None,
             outcome: state.outcome.clone(),
         };
         match &state.running {
             Some(running) => self.tell_running(&locked(&running.shared), &mut record, extent),
             None => {
                 let to_come = match state.phase {
-                    Phase::Ready => plan(&self.plan.rig, self.plan.force_n, &[], &state.rows),
+                    Phase::Ready => self.plan.to_come(&state.rows),
                     _ => Ok(Vec::new()),
                 };
-                tell_places(&state.rows, &to_come.unwrap_or_default(), extent, &mut record);
+                let to_come = to_come.unwrap_or_default();
+                tell_places(&state.rows, &to_come, extent, &mut record);
+                record.machine = self.machine_record(&state.rows, &to_come);
             }
         }
         record
@@ -382,10 +467,25 @@ impl Calibrator {
         record.reading = values.map(|(value, channel)| value / channel.unit.factor()).collect();
         record.bad_frames = calibration.bad_frames().values().sum();
         record.problem = record.problem.take().or_else(|| shared.problem.clone());
+        record.machine = self
+            .machine_record(calibration.journal().rows(), to_come)
+            .map(|machine| machine.running(&shared.machine, calibration, extent, record.left));
     }
 
+    fn machine_record(&self, rows: &[Row], to_come: &[Press]) -> Option<MachineRecord> {
+        let (url, stage) = self.plan.machine()?;
+        let pressed = rows.iter().filter(|row| row.touches()).map(|row| row.position);
+        let places: Vec<Position> = pressed.chain(to_come.iter().map(|press| press.position)).collect();
+        Some(MachineRecord::new(url, stage, &places))
+    }
+
+    /// The state, in which a machine that has ended is no more.
     fn lock(&self) -> MutexGuard<'_, State> {
-        locked(&self.state)
+        let mut state = locked(&self.state);
+        if state.running.as_ref().is_some_and(|running| running.by_machine && running.thread.is_finished()) {
+            state.end_running();
+        }
+        state
     }
 }
 
@@ -393,6 +493,7 @@ impl State {
     /// The phase, which a calibration that runs tells.
     fn phase(&self) -> Phase {
         match &self.running {
+            Some(running) if running.by_machine => Phase::Pressing,
             Some(running) if locked(&running.shared).calibration.guide().waiting() == Waiting::Nothing => {
                 Phase::Pressed
             }
@@ -401,14 +502,22 @@ impl State {
         }
     }
 
-    /// Ends the thread and the source, and keeps the rows.
+    fn machine_presses(&self) -> bool {
+        self.running.as_ref().is_some_and(|running| running.by_machine)
+    }
+
+    /// Ends the thread and the source, and keeps the rows and what is wrong.
     fn end_running(&mut self) {
-        let Some(Running { shared, inputs, thread, _source: source }) = self.running.take() else { return };
+        let Some(Running { shared, inputs, thread, _source: source, .. }) = self.running.take() else {
+            return;
+        };
         drop(source);
         // Refused only by a thread that has ended.
         let _ = inputs.send(Input::Stop);
         let _ = thread.join();
-        self.rows = locked(&shared).calibration.journal().rows().to_vec();
+        let shared = locked(&shared);
+        self.rows = shared.calibration.journal().rows().to_vec();
+        self.problem.clone_from(&shared.problem);
         self.phase = Phase::Ready;
     }
 }
@@ -432,57 +541,4 @@ fn tell_places(rows: &[Row], to_come: &[Press], extent: Extent, record: &mut Cal
             ..PlaceRecord::of_position(place.position, extent)
         })
         .collect();
-}
-
-/// Takes what the source brings, until it is told to stop.
-fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
-    /// Longest wait for what is next.
-    const LOOK: Duration = Duration::from_millis(100);
-    loop {
-        let arrived = match inputs.recv_timeout(LOOK) {
-            Ok(Input::Arrived(arrived)) => arrived,
-            Ok(Input::Stop) | Err(RecvTimeoutError::Disconnected) => return,
-            Ok(Input::Command(_)) | Err(RecvTimeoutError::Timeout) => continue,
-        };
-        let mut shared = locked(shared);
-        let mut notes = Vec::new();
-        if let Err(error) = shared.calibration.receive(&arrived, &mut notes) {
-            shared.fail(&error);
-        }
-        for note in notes {
-            shared.take(note);
-        }
-    }
-}
-
-impl Shared {
-    fn take(&mut self, note: Note) {
-        match note {
-            Note::Opened(name) => (self.source, self.problem) = (Some(name), None),
-            Note::Lost(why) => {
-                (self.source, self.problem) = (None, Some(format!("the source went away: {why}")));
-            }
-            Note::Ended => {
-                (self.source, self.problem) = (None, Some("the source has ended".to_owned()));
-            }
-            Note::Taken => {
-                self.last_percent = last_deviation_percent(self.calibration.journal().rows());
-                self.problem = None;
-            }
-            Note::Saturated(name) => {
-                self.problem = Some(format!("channel {name} reads the end of its range: press less, redo"));
-            }
-            Note::Waits(_) | Note::Untouched | Note::Overload(_) => {}
-        }
-    }
-
-    /// A press that is not on disk: the guide must not go on from it.
-    fn fail(&mut self, error: &CalibrationError) {
-        self.calibration.stop();
-        self.problem = Some(error.to_string());
-    }
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -172,7 +172,7 @@ impl Live {
     /// Begins a session with a source; one that runs is ended.
     ///
     /// # Errors
-    /// [`LiveError`] for a source that cannot be opened, or whose columns lack a channel, and for a locator that does not go with the configuration of
+    /// [`LiveError`] for a source or a sink that cannot be opened, for columns that lack a channel, and for a locator that does not go with the configuration of
     /// sessions; the session that ran goes on then.
     pub fn begin(&self, url: &SourceUrl) -> Result<(), LiveError> {
         pipeline::check_pace(&self.config.estimation, url)?;
@@ -206,10 +206,6 @@ impl Live {
             [] => None,
             _ => Some(CommandSink::new(self.commands.clone(), source.commander()?, inputs.clone())),
         };
-        let mut running = self.lock();
-        if let Some(running) = running.take() {
-            running.end();
-        }
         let (clock, columns) = (self.clock, columns.to_vec());
         let (channels, extent) = (Channel::all_of(&locator.setup), locator.setup.surface().extent());
         let mut sinks: Vec<Box<dyn Sink>> =
@@ -218,6 +214,11 @@ impl Live {
             sinks.push(open(&channels, extent, inputs.clone())?);
         }
         sinks.extend(commands.map(|commands| Box::new(commands) as Box<dyn Sink>));
+        // All that may be refused has been opened: only now the session that runs is ended.
+        let mut running = self.lock();
+        if let Some(running) = running.take() {
+            running.end();
+        }
         let run = move || {
             // What is refused was refused above.
             let Ok(mut session) = Session::new(&locator, &config) else { return };
@@ -309,6 +310,18 @@ impl Live {
 
     pub(super) fn calibrator(&self) -> Result<&Calibrator, LiveError> {
         self.calibrator.as_ref().ok_or(LiveError::NotCalibrating)
+    }
+
+    /// Notes that somebody watches, who could stop a machine.
+    pub(super) fn attend(&self) {
+        if let Some(calibrator) = &self.calibrator {
+            calibrator.attendance().note();
+        }
+    }
+
+    /// True while a machine needs somebody who watches it.
+    pub(super) fn needs_attendance(&self) -> bool {
+        self.calibrator.as_ref().is_some_and(|calibrator| calibrator.attendance().is_needed())
     }
 
     /// Begins the calibration, or goes on with one that was ended early.

@@ -7,9 +7,12 @@ mod body;
 mod calibration;
 mod guard;
 mod live;
+mod machine;
 mod page;
+mod pressing;
 mod routes;
 mod session_info;
+mod shared;
 mod stream;
 mod web_sink;
 

@@ -1,8 +1,8 @@
 //! Routes of the server.
 
 use super::body::{JsonAnswer, JsonBody, Refusal};
-use super::calibration::CalibrationRecord;
-use super::guard::{Access, Guard, guarded};
+use super::calibration::{CalibrationRecord, CalibratorError};
+use super::guard::{Access, EMERGENCY_STOP, Guard, guarded};
 use super::live::{Live, LiveError};
 use super::session_info::SessionInfo;
 use super::{page, stream};
@@ -37,6 +37,7 @@ pub fn router(access: Access, live: Arc<Live>) -> Router {
         .route("/api/source", post(source))
         .route("/api/record", post(record))
         .route("/api/calibration", get(calibration).post(calibrate))
+        .route(EMERGENCY_STOP, post(emergency_stop))
         .route("/api/recordings", get(recordings))
         .route("/api/recordings/{name}", get(recording))
         .route("/api/recordings/{name}/file", get(recording_file))
@@ -92,7 +93,18 @@ async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBod
 }
 
 async fn calibration(State(live): State<Arc<Live>>) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
-    live.calibration().map(JsonAnswer).map_err(|error| refusal(&error))
+    // A step that goes on may have it.
+    blocking(move || {
+        live.attend();
+        live.calibration()
+    })
+    .await
+    .map(JsonAnswer)
+}
+
+/// Stops the machine of a calibration before anything else is waited for, be it the rest of the request.
+async fn emergency_stop(State(live): State<Arc<Live>>) -> Answer {
+    done(live.calibrator().and_then(|calibrator| Ok(calibrator.halt()?)))
 }
 
 /// A step of a calibration.
@@ -118,6 +130,7 @@ async fn calibrate(
 ) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
     // A source that ends is waited for, and presses are written to the disk.
     blocking(move || {
+        live.attend();
         match step {
             Step::Begin => live.begin_calibration()?,
             Step::Redo => live.calibrator()?.redo()?,
@@ -142,6 +155,12 @@ fn refusal(error: &LiveError) -> Refusal {
             StatusCode::NOT_FOUND,
             "start `palpate serve RIG --calibrate --from URL --presses FILE --out LOCATOR`",
         ),
+        LiveError::Calibrator(CalibratorError::NoMachine) => {
+            (StatusCode::CONFLICT, "start `palpate serve` with --stage MACHINE")
+        }
+        LiveError::Calibrator(CalibratorError::MachinePresses) => {
+            (StatusCode::CONFLICT, "end it early, or wait until it has ended")
+        }
         LiveError::Calibrator(_) => (StatusCode::CONFLICT, "GET /api/calibration says how far it is"),
         LiveError::NoSession => (StatusCode::CONFLICT, "choose a source first"),
         LiveError::Behind => (StatusCode::SERVICE_UNAVAILABLE, "try it again"),

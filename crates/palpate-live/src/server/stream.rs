@@ -3,8 +3,11 @@
 use super::body::Refusal;
 use super::live::Live;
 use super::web_sink::{Hub, MOST_BROWSERS, with_missed};
+use axum::body::Bytes;
 use axum::extract::rejection::QueryRejection;
-use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade, rejection::WebSocketUpgradeRejection};
+use axum::extract::ws::{
+    Message, Utf8Bytes, WebSocket, WebSocketUpgrade, rejection::WebSocketUpgradeRejection,
+};
 use axum::extract::{Query, State};
 use axum::http::StatusCode;
 use axum::response::Response;
@@ -67,33 +70,41 @@ pub async fn stream(
         .write_buffer_size(0)
         .max_write_buffer_size(MOST_WAITING);
     Ok(upgrade.on_upgrade(move |socket| async move {
-        follow(socket, &hub, &wish).await;
+        follow(socket, &hub, &wish, &live).await;
         drop(place);
     }))
 }
 
-async fn follow(mut socket: WebSocket, hub: &Hub, wish: &Wish) {
+async fn follow(mut socket: WebSocket, hub: &Hub, wish: &Wish, live: &Live) {
     match (wish.form, wish.rate) {
         (Form::Binary, _) => {
-            send_all(&mut socket, hub.binary.subscribe(), |packet, _| Message::Binary(packet.clone())).await;
+            let message = |packet: &Bytes, _| Message::Binary(packet.clone());
+            send_all(&mut socket, hub.binary.subscribe(), message, None).await;
         }
         (Form::Json, Rate::All) => {
-            send_all(&mut socket, hub.json.subscribe(), |text, _| Message::Text(text.clone())).await;
+            let message = |text: &Utf8Bytes, _| Message::Text(text.clone());
+            send_all(&mut socket, hub.json.subscribe(), message, None).await;
         }
         (Form::Json, Rate::Display) => {
             let message = |text: &_, missed| Message::Text(with_missed(text, missed));
-            send_all(&mut socket, hub.states.subscribe(), message).await;
+            send_all(&mut socket, hub.states.subscribe(), message, Some(live)).await;
         }
     }
 }
 
-/// Sends what comes, until the browser goes, sends too much, or takes nothing any more.
+/// Time between two pings to a page while a machine needs somebody who watches.
+const PING_EVERY: Duration = Duration::from_secs(1);
+
+/// Sends what comes, until the browser goes, sends too much, or takes nothing any more. A `page_of` a calibration is asked whether it is there while a machine presses.
 async fn send_all<T: Clone>(
     socket: &mut WebSocket,
     mut messages: Receiver<T>,
     message: impl Fn(&T, u64) -> Message,
+    page_of: Option<&Live>,
 ) {
     let mut missed = 0;
+    let mut pings = tokio::time::interval(PING_EVERY);
+    pings.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     loop {
         tokio::select! {
             next = messages.recv() => match next {
@@ -110,8 +121,20 @@ async fn send_all<T: Clone>(
             // Nothing that a browser sends means anything; pings are answered by the socket.
             received = socket.recv() => match received {
                 Some(Ok(Message::Close(_))) | Some(Err(_)) | None => return,
+                Some(Ok(Message::Pong(_))) => {
+                    if let Some(live) = page_of {
+                        live.attend();
+                    }
+                }
                 Some(Ok(_)) => {}
             },
+            _ = pings.tick(), if page_of.is_some() => {
+                let is_needed = page_of.is_some_and(Live::needs_attendance);
+                let ping = Message::Ping(Bytes::new());
+                if is_needed && !matches!(tokio::time::timeout(PATIENCE, socket.send(ping)).await, Ok(Ok(()))) {
+                    return;
+                }
+            }
         }
     }
 }

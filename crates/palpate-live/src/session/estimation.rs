@@ -3,7 +3,7 @@
 use super::follower::Follower;
 use super::low_pass::LowPass;
 use palpate_core::Estimate;
-use palpate_estimators::estimator::{Locator, NotTrackable, Swing};
+use palpate_estimators::estimator::{Creep, Drift, Locator, NotTrackable, Swing, TrackerConfig};
 use palpate_mechanics::surface::modal::ModalBeam;
 use palpate_numerics::OutOfRange;
 use serde::{Deserialize, Serialize};
@@ -27,7 +27,20 @@ pub enum Estimation {
         /// First natural frequency of a beam on two simple supports, in hertz, whose inertia is reckoned with at the usual damping; without it the surface
         /// is in balance at every reading.
         frequency_hz: Option<f64>,
+        /// Creep of the surface that is taken off; none unless it is said.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        creep: Option<CreepConfig>,
     },
+}
+
+/// Creep of a soft surface under a load that is held.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CreepConfig {
+    /// Growth of a reading that is held for long, as a share of that of a fresh press: 0 to 1.
+    pub share: f64,
+    /// Time in which all but an e-th of it has come, in seconds: 0.001 to 1,000,000.
+    pub time_s: f64,
 }
 
 /// A session that cannot be had.
@@ -47,13 +60,23 @@ impl Estimation {
     /// # Errors
     /// [`SessionError`] for a locator by which contacts cannot be followed, or a frequency out of its range.
     pub fn follower(&self, locator: &Locator) -> Result<Option<Follower>, SessionError> {
-        let Self::Track { frequency_hz } = self else { return Ok(None) };
+        let Self::Track { frequency_hz, creep } = self else { return Ok(None) };
         let range = "at least 0.000001 Hz and at most 1000000000 Hz";
         let numbers = frequency_hz.map(|frequency_hz| ("the natural frequency", frequency_hz));
         OutOfRange::check(range, numbers, |frequency_hz| (1e-6..=1e9).contains(&frequency_hz))?;
         let damping_ratio = ModalBeam::USUAL_DAMPING_RATIO;
         let swing = frequency_hz.map(|frequency_hz| Swing { frequency_hz, damping_ratio });
-        Ok(Some(Follower::new(locator, swing)?))
+        if let Some(CreepConfig { share, time_s }) = creep {
+            let shares = [("the share of the creep", *share)];
+            OutOfRange::check("at least 0 and at most 1", shares, |share| (0.0..=1.0).contains(&share))?;
+            let times = [("the time of the creep", *time_s)];
+            let range = "at least 0.001 s and at most 1000000 s";
+            OutOfRange::check(range, times, |time_s| (1e-3..=1e6).contains(&time_s))?;
+        }
+        let creep = creep.map(|CreepConfig { share, time_s }| Creep { share, time_s });
+        let drift = Some(Drift::default());
+        let config = TrackerConfig { swing, drift, creep, ..TrackerConfig::default() };
+        Ok(Some(Follower::new(locator, config)?))
     }
 }
 
@@ -106,7 +129,7 @@ impl EstimationState {
                 }
                 locator.locate(tared).ok()
             }
-            Self::Track(follower) => Some(follower.follow(unix_ns, tared, single)),
+            Self::Track(follower) => Some(follower.follow(unix_ns, reading, tared, single)),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_estimators::estimator::{
-    Locator, NotTrackable, Swing, Track, Tracked, Tracker, TrackerConfig, Tracking,
+    Locator, NotTrackable, Track, Tracked, Tracker, TrackerConfig, Tracking,
 };
 use palpate_estimators::status::PLACE_LEFT_OPEN;
 use palpate_mechanics::surface::Extent;
@@ -15,15 +15,16 @@ pub struct Follower {
     extent: Extent,
     /// Time of the first reading, from which the tracker's seconds count: those since 1970 leave no digits for microseconds.
     first_ns: Option<u64>,
+    /// Difference of the last reading and the tared one.
+    baseline: Vec<f64>,
 }
 
 impl Follower {
-    /// A follower that has seen nothing. Where `swing` says how the surface swings, its inertia is reckoned with.
+    /// A follower that has seen nothing.
     ///
     /// # Errors
     /// [`NotTrackable`] for a locator by which contacts cannot be followed, or a surface whose modes are not known.
-    pub fn new(locator: &Locator, swing: Option<Swing>) -> Result<Self, NotTrackable> {
-        let config = TrackerConfig { swing, ..TrackerConfig::default() };
+    pub fn new(locator: &Locator, config: TrackerConfig) -> Result<Self, NotTrackable> {
         let tracking = locator.tracking(&config)?;
         Ok(Self {
             tracker: Tracker::new(tracking.likelihood(), config),
@@ -31,17 +32,19 @@ impl Follower {
             config,
             extent: locator.setup.surface().extent(),
             first_ns: None,
+            baseline: Vec::new(),
         })
     }
 
-    /// The estimate after the next tared reading, which was taken at `unix_ns` nanoseconds since 1970; `single` is that of the reading alone.
+    /// The estimate after the next reading and what the tare made of it, which was taken at `unix_ns` nanoseconds since 1970; `single` is that of the reading alone.
     ///
     /// A reading that leaves the tracker's state without numbers, as one of 1e300 does, makes it begin anew, and its estimate is `single`; so is that of a
     /// reading that is not later than the one before.
-    pub fn follow(&mut self, unix_ns: u64, tared: &[f64], single: Estimate) -> Estimate {
+    pub fn follow(&mut self, unix_ns: u64, reading: &[f64], tared: &[f64], single: Estimate) -> Estimate {
         let time_s = unix_ns.saturating_sub(*self.first_ns.get_or_insert(unix_ns)) as f64 * 1e-9;
+        self.follow_baseline(reading, tared);
         let Ok(track) = self.tracker.follow(time_s, tared) else { return single };
-        let estimate = self.estimate(&track, single);
+        let estimate = self.estimate(&track, track.single);
         // Weights of hypotheses that are no numbers leave no probability to anything, for good.
         let has_probability = (track.numbers.iter().sum::<f64>() - 1.0).abs() < 1e-6;
         if has_probability && estimate.is_in_numbers() {
@@ -49,6 +52,18 @@ impl Follower {
         }
         self.tracker = Tracker::new(self.tracking.likelihood(), self.config);
         single
+    }
+
+    /// Tells the tracker how far the tare's baseline has moved since the last reading.
+    fn follow_baseline(&mut self, reading: &[f64], tared: &[f64]) {
+        let moved: Vec<f64> = reading.iter().zip(tared).map(|(reading, tared)| reading - tared).collect();
+        if self.baseline.len() == moved.len() {
+            let by: Vec<f64> = moved.iter().zip(&self.baseline).map(|(now, before)| now - before).collect();
+            if by.iter().any(|by| *by != 0.0) {
+                self.tracker.move_baseline(&by);
+            }
+        }
+        self.baseline = moved;
     }
 
     /// The tracker's contacts, as many as are most probable, each in its place while it is followed.

@@ -8,7 +8,7 @@ mod low_pass;
 mod taring;
 mod timeline;
 
-pub use estimation::{Estimation, SessionError};
+pub use estimation::{CreepConfig, Estimation, SessionError};
 pub use follower::Follower;
 pub use health::ChannelHealth;
 pub(crate) use health::HealthWatch;

@@ -100,6 +100,8 @@ const GREETING: Duration = Duration::from_secs(3);
 /// Time for an answer, and for one after a move or homing.
 const ANSWER: Duration = Duration::from_secs(5);
 const MOVE: Duration = Duration::from_secs(120);
+/// Time for what it says after a stop.
+const LAST_WORDS: Duration = Duration::from_millis(100);
 /// Most bytes of a line that is kept.
 const LONGEST: usize = 1024;
 
@@ -252,6 +254,24 @@ impl<L: Read + Write> GcodeStage<L> {
         }
         self.link.write_all(self.firmware.stop())?;
         self.link.flush()?;
+        self.hear_out();
         Err(StageError::Stopped)
+    }
+
+    /// Takes what the machine still says after its stop: a connection that is closed with unread bytes is reset, and the stop may be lost with it.
+    fn hear_out(&mut self) {
+        let until = Instant::now() + LAST_WORDS;
+        let mut bytes = [0; 256];
+        while Instant::now() < until {
+            match self.link.read(&mut bytes) {
+                Ok(0) => return,
+                Err(error)
+                    if !matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock) =>
+                {
+                    return;
+                }
+                Ok(_) | Err(_) => {}
+            }
+        }
     }
 }

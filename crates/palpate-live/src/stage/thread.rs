@@ -49,12 +49,11 @@ pub struct StageThread {
 }
 
 impl StageThread {
-    /// Opens the link, and greets the machine.
+    /// Opens the link, and greets the machine. Setting `stop` stops it whatever it does, as [`Self::stop`] does.
     ///
     /// # Errors
     /// [`StageError`] where it is not there, or does not answer.
-    pub fn open(url: &StageUrl, stage: Stage) -> Result<Self, StageError> {
-        let stop = Arc::new(AtomicBool::new(false));
+    pub fn open(url: &StageUrl, stage: Stage, stop: Arc<AtomicBool>) -> Result<Self, StageError> {
         let machine = GcodeStage::connect(url.open()?, stage, Arc::clone(&stop))?;
         let firmware = machine.firmware();
         let (orders, received) = channel();

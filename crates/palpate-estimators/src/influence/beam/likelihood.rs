@@ -11,7 +11,7 @@ use super::locator::BeamLocator;
 use super::multi_contact::{contact_fit, first_mode};
 use super::table::InfluenceTable;
 use crate::fit::Locate;
-use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood};
+use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood, Linearisation};
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -133,6 +133,28 @@ impl Likelihood for BeamLikelihood {
             }
         }
         left
+    }
+
+    fn linearised(&self, contacts: &[Contact]) -> Linearisation {
+        let sensors = self.table().sensors;
+        let force_is_free = self.known_force_n().is_none();
+        let mut at = Linearisation {
+            reading: vec![0.0; sensors],
+            derivatives: vec![vec![0.0; sensors]; 3 * contacts.len()],
+            variance: vec![0.0; sensors],
+        };
+        for (contact, derivatives) in contacts.iter().zip(at.derivatives.chunks_mut(3)) {
+            let cell = self.table().cell(contact.position.x_m);
+            let variances = self.table().variances_near(contact.position.x_m);
+            for s in 0..sensors {
+                let (f, slope) = self.table().value_and_slope(&cell, s);
+                at.reading[s] += contact.force_n * f;
+                at.variance[s] += self.scale(*contact) * variances[s];
+                derivatives[0][s] = contact.force_n * slope;
+                derivatives[2][s] = if force_is_free { f } else { 0.0 };
+            }
+        }
+        at
     }
 
     fn single_estimate(&self, reading: &[f64]) -> Estimate {

@@ -6,7 +6,7 @@ use super::locator::PlaneLocator;
 use super::search::Search;
 use crate::fit::Locate;
 use crate::influence::config::ForceBelief;
-use crate::likelihood::{ContactFit, Geometry, Likelihood, PlaneLikelihood};
+use crate::likelihood::{ContactFit, Geometry, Likelihood, Linearisation, PlaneLikelihood};
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -65,6 +65,26 @@ impl Likelihood for PlateLikelihood {
             }
         }
         left
+    }
+
+    fn linearised(&self, contacts: &[Contact]) -> Linearisation {
+        let channels = self.search.live.len();
+        let mut at = Linearisation {
+            reading: vec![0.0; channels],
+            derivatives: vec![vec![0.0; channels]; 3 * contacts.len()],
+            variance: vec![0.0; channels],
+        };
+        for (contact, derivatives) in contacts.iter().zip(at.derivatives.chunks_mut(3)) {
+            let own = self.search.linearised(*contact);
+            for (s, [f, along, across, variance]) in own.take(channels).enumerate() {
+                at.reading[s] += contact.force_n * f;
+                at.variance[s] += variance;
+                derivatives[0][s] = contact.force_n * along;
+                derivatives[1][s] = contact.force_n * across;
+                derivatives[2][s] = if self.known_force_n().is_none() { f } else { 0.0 };
+            }
+        }
+        at
     }
 
     fn single_estimate(&self, reading: &[f64]) -> Estimate {

@@ -289,6 +289,20 @@ impl Search {
         contact.force_n.powi(2) * squares.map(|f| f * f).sum::<f64>()
     }
 
+    /// f, its gradient and W²·v of every channel at a contact.
+    pub fn linearised(&self, contact: Contact) -> impl Iterator<Item = [f64; 4]> {
+        let Contact { position: Position { x_m, y_m }, force_n } = contact;
+        let place = self.patches.place(x_m, y_m);
+        let scale = force_n.max(self.weights_force_n).powi(2);
+        let groups = self.nearest_groups(&self.variances, [x_m, y_m]).iter().enumerate();
+        groups.flat_map(move |(group, variances)| {
+            let values = self.patches.values(&place, group);
+            std::array::from_fn::<_, LANES, _>(|lane| {
+                [values.f[lane], values.along[lane], values.across[lane], scale * variances[lane]]
+            })
+        })
+    }
+
     /// Σ w·j·jᵀ and Σ w²·v·j·jᵀ at a contact, j the derivatives of W·f by x, y and W.
     pub fn calibration(&self, contact: Contact) -> [Matrix<3>; 2] {
         let Contact { position: Position { x_m, y_m }, force_n } = contact;

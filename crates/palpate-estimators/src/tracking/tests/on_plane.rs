@@ -5,8 +5,8 @@ use crate::fixtures::{Example, moving_plate, over_the_plate};
 use crate::influence::{Influence, InfluenceLocator, InfluenceSource, PlateLikelihood};
 use crate::likelihood::{Likelihood, PlaneLikelihood};
 use crate::tracking::tests::{
-    Timed, assert_closer_than_readings, assert_numbers_after_absurd_readings, assert_scores_are_slopes,
-    timed_readings, wrongly_touching,
+    Timed, assert_closer_than_readings, assert_linearised, assert_numbers_after_absurd_readings,
+    assert_scores_are_slopes, timed_readings, wrongly_touching,
 };
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Motion;
@@ -91,4 +91,13 @@ fn absurd_readings_and_gaps_on_a_plane_leave_numbers_behind() {
         likelihood,
         [[0.0; 9], [1e9; 9], [-1e150; 9], [1e-3; 9], [-3e-4; 9]],
     );
+}
+
+#[test]
+fn linearisations_on_a_plane_are_those_of_differences() {
+    let rig = rig();
+    for force_n in [Some(5.0), None] {
+        let position = Position { x_m: 0.1234, y_m: 0.0876 };
+        assert_linearised(&likelihood(&rig, force_n), Contact { position, force_n: 5.0 });
+    }
 }

@@ -1,85 +1,38 @@
-//! The web server over real sockets: each route as it should be asked, and as it should not.
+//! Each route as it should be asked, and as it should not.
 
+use crate::client::{ask, follow, get, next, post};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::server::{Access, Live, Server};
 use palpate_live::simulated_board::BoardConfig;
+use palpate_live::sink::OpenSink;
 use palpate_rig::Rig;
 use serde_json::{Value, json};
-use std::io::{Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use tungstenite::client::IntoClientRequest;
-use tungstenite::{Message, WebSocket};
+use tungstenite::Message;
 
-const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
+const RIG: &str = include_str!("../../../../examples/noisy-beam.toml");
 const TOKEN: &str = "0123456789abcdef";
 
 /// A served simulated board of 1,000 readings a second, whose session has not begun.
 fn served(token: Option<&str>) -> (Arc<Live>, Server) {
+    served_with(token, Vec::new())
+}
+
+/// The same with these sinks beside browsers.
+pub fn served_with(token: Option<&str>, sinks: Vec<OpenSink>) -> (Arc<Live>, Server) {
     let rig = Rig::from_toml(RIG).unwrap();
     let recording = rig.simulate(0).unwrap();
     let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
     let config = BoardConfig { rate_hz: 1000.0, seed: 1, ..BoardConfig::default() };
-    let live = Arc::new(Live::new(locator, "noisy-beam.toml", Some((rig, config)), PathBuf::new()));
+    let live = Live::new(locator, "noisy-beam.toml", Some((rig, config)), PathBuf::new());
+    let live = Arc::new(live.with_sinks(sinks));
     let address: SocketAddr = "127.0.0.1:0".parse().unwrap();
     let access = Access::new(address, token.map(str::to_owned), Vec::new()).unwrap();
     let server = Server::start(address, access, Arc::clone(&live)).unwrap();
     (live, server)
-}
-
-/// Status, head and body of an answer.
-fn ask(
-    server: &Server,
-    method: &str,
-    path: &str,
-    headers: &[(&str, &str)],
-    body: &str,
-) -> (u16, String, String) {
-    let mut stream = TcpStream::connect(server.address()).unwrap();
-    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
-    let mut request =
-        format!("{method} {path} HTTP/1.1\r\nConnection: close\r\nContent-Length: {}\r\n", body.len());
-    if !headers.iter().any(|(name, _)| *name == "Host") {
-        request += &format!("Host: {}\r\n", server.address());
-    }
-    headers.iter().for_each(|(name, value)| request += &format!("{name}: {value}\r\n"));
-    // A server that refuses a body does not read it all.
-    let _ = stream.write_all(format!("{request}\r\n{body}").as_bytes());
-    let mut answer = Vec::new();
-    let _ = stream.read_to_end(&mut answer);
-    let answer = String::from_utf8_lossy(&answer).into_owned();
-    let (head, body) = answer.split_once("\r\n\r\n").unwrap_or_default();
-    (head.split(' ').nth(1).unwrap_or("0").parse().unwrap(), head.to_ascii_lowercase(), body.to_owned())
-}
-
-fn get(server: &Server, path: &str) -> (u16, Value) {
-    let (status, _, body) = ask(server, "GET", path, &[], "");
-    (status, serde_json::from_str(&body).unwrap_or_default())
-}
-
-fn post(server: &Server, path: &str, body: &str) -> (u16, Value) {
-    let (status, _, body) = ask(server, "POST", path, &[], body);
-    (status, serde_json::from_str(&body).unwrap_or_default())
-}
-
-fn follow(server: &Server, query: &str, origin: Option<&str>) -> tungstenite::Result<WebSocket<TcpStream>> {
-    let mut request = format!("ws://{}/api/stream{query}", server.address()).into_client_request()?;
-    if let Some(origin) = origin {
-        request.headers_mut().insert("Origin", origin.parse().unwrap());
-    }
-    let stream = TcpStream::connect(server.address())?;
-    stream.set_read_timeout(Some(Duration::from_secs(20)))?;
-    let (socket, _) = tungstenite::client(request, stream).map_err(|error| match error {
-        tungstenite::HandshakeError::Failure(error) => error,
-        tungstenite::HandshakeError::Interrupted(_) => tungstenite::Error::ConnectionClosed,
-    })?;
-    Ok(socket)
-}
-
-fn next(socket: &mut WebSocket<TcpStream>) -> Value {
-    serde_json::from_str(socket.read().unwrap().to_text().unwrap()).unwrap()
 }
 
 #[test]

@@ -1,0 +1,173 @@
+//! The machine of a calibration as browsers see it, and the people who watch it.
+
+use crate::calibration::{Calibration, Machine, Motion, Note};
+use crate::stage::StageUrl;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+use palpate_rig::Stage;
+use serde::Serialize;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// A machine that nobody has watched for so long lifts its finger, and ends.
+pub const UNWATCHED: Duration = Duration::from_secs(5);
+
+/// Attendance of the people who can stop a machine: the last sign of a page.
+#[derive(Debug)]
+pub struct Attendance {
+    start: Instant,
+    seen_ms: AtomicU64,
+    /// True while a machine needs somebody.
+    is_needed: AtomicBool,
+}
+
+impl Default for Attendance {
+    fn default() -> Self {
+        Self { start: Instant::now(), seen_ms: AtomicU64::new(0), is_needed: AtomicBool::new(false) }
+    }
+}
+
+impl Attendance {
+    /// Notes a sign of somebody.
+    pub fn note(&self) {
+        self.seen_ms.store(self.now_ms(), Ordering::Relaxed);
+    }
+
+    /// True while a machine needs somebody.
+    pub fn is_needed(&self) -> bool {
+        self.is_needed.load(Ordering::Relaxed)
+    }
+
+    /// Says whether a machine needs somebody from now on.
+    pub fn set_needed(&self, is_needed: bool) {
+        self.is_needed.store(is_needed, Ordering::Relaxed);
+    }
+
+    /// True once there was no sign of anybody for long.
+    pub fn is_absent(&self) -> bool {
+        self.now_ms().saturating_sub(self.seen_ms.load(Ordering::Relaxed)) > UNWATCHED.as_millis() as u64
+    }
+
+    fn now_ms(&self) -> u64 {
+        self.start.elapsed().as_millis() as u64
+    }
+}
+
+/// State of a machine as far as others see it.
+#[derive(Clone, Debug, Default)]
+pub struct MachineState {
+    pub firmware: Option<&'static str>,
+    pub motion: Option<Motion>,
+    position: Option<Position>,
+    depth_m: Option<f64>,
+    /// The instant of its first press, and the presses taken since.
+    pressing_since: Option<Instant>,
+    taken: usize,
+    pub left_out: usize,
+}
+
+impl MachineState {
+    /// Takes the machine's motion, and what came of it.
+    pub fn take(&mut self, machine: &Machine, notes: &[Note]) {
+        self.motion = Some(machine.motion());
+        self.position = machine.press().map(|press| press.position);
+        self.depth_m = machine.press().and_then(|press| press.depth_m);
+        if self.position.is_some() {
+            self.pressing_since.get_or_insert_with(Instant::now);
+        }
+        self.taken += notes.iter().filter(|note| **note == Note::Taken).count();
+    }
+}
+
+/// A machine as a record of JSON.
+#[derive(Clone, Debug, Serialize)]
+pub struct MachineRecord {
+    url: String,
+    firmware: Option<&'static str>,
+    /// True while it runs: from its greeting until its finger is lifted for good.
+    runs: bool,
+    /// `None` while it is greeted.
+    motion: Option<Motion>,
+    x_mm: Option<f64>,
+    y_mm: Option<f64>,
+    depth_mm: Option<f64>,
+    /// Force at the load cell.
+    force_n: Option<f64>,
+    left_s: Option<f64>,
+    moves: MovesRecord,
+}
+
+/// Where a machine moves, in its own coordinates, and how fast.
+#[derive(Clone, Debug, Serialize)]
+struct MovesRecord {
+    x_mm: (f64, f64),
+    y_mm: (f64, f64),
+    travel_z_mm: f64,
+    touch_z_mm: f64,
+    depths_mm: Vec<f64>,
+    travel_mm_per_s: f64,
+    press_mm_per_s: f64,
+    load_cell: Option<String>,
+    force_limit_n: Option<f64>,
+}
+
+impl MachineRecord {
+    /// A machine that does not run, over places of a surface.
+    pub fn new(url: &StageUrl, stage: &Stage, places: &[Position]) -> Self {
+        let (from_x_m, from_y_m) = stage.origin_m;
+        let span_mm = |at_m: &dyn Fn(Position) -> f64| {
+            let (low_m, high_m) = places
+                .iter()
+                .map(|place| at_m(*place))
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
+            (low_m * 1e3, high_m * 1e3)
+        };
+        Self {
+            url: url.to_string(),
+            firmware: None,
+            runs: false,
+            motion: None,
+            x_mm: None,
+            y_mm: None,
+            depth_mm: None,
+            force_n: None,
+            left_s: None,
+            moves: MovesRecord {
+                x_mm: span_mm(&|place| from_x_m + place.x_m),
+                y_mm: span_mm(&|place| from_y_m + place.y_m),
+                travel_z_mm: (stage.touch_z_m + stage.clearance_m) * 1e3,
+                touch_z_mm: stage.touch_z_m * 1e3,
+                depths_mm: stage.depths_m.iter().map(|depth_m| depth_m * 1e3).collect(),
+                travel_mm_per_s: stage.travel_m_per_s * 1e3,
+                press_mm_per_s: stage.press_m_per_s * 1e3,
+                load_cell: stage.load_cell.clone(),
+                force_limit_n: stage.force_limit_n,
+            },
+        }
+    }
+
+    /// The same, while it runs with `left` presses to come.
+    pub fn running(
+        self,
+        state: &MachineState,
+        calibration: &Calibration,
+        extent: Extent,
+        left: usize,
+    ) -> Self {
+        let left_s = state
+            .pressing_since
+            .filter(|_| state.taken > 0)
+            .map(|since| since.elapsed().as_secs_f64() / state.taken as f64 * left as f64);
+        Self {
+            firmware: state.firmware,
+            runs: true,
+            motion: state.motion,
+            x_mm: state.position.map(|position| position.x_m * 1e3),
+            y_mm: state.position.filter(|_| extent.width_m().is_some()).map(|position| position.y_m * 1e3),
+            depth_mm: state.depth_m.map(|depth_m| depth_m * 1e3),
+            force_n: calibration.cell_force_n(),
+            left_s,
+            ..self
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! A calibration that runs, between the thread that presses and the requests that look at it.
+
+use super::machine::MachineState;
+use crate::calibration::{Calibration, CalibrationError, Note, last_deviation_percent};
+use crate::input::Arrived;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// A calibration that runs, as its thread leaves it for others to see.
+pub struct Shared {
+    pub calibration: Calibration,
+    pub source: Option<String>,
+    pub last_percent: Option<f64>,
+    pub problem: Option<String>,
+    pub machine: MachineState,
+}
+
+impl Shared {
+    /// Takes what the source brought; gives what follows from it.
+    pub fn receive(&mut self, arrived: &Arrived) -> Vec<Note> {
+        let mut notes = Vec::new();
+        let received = self.calibration.receive(arrived, &mut notes);
+        notes.iter().cloned().for_each(|note| self.take(note));
+        if let Err(error) = received {
+            self.fail(&error);
+        }
+        notes
+    }
+
+    fn take(&mut self, note: Note) {
+        match note {
+            Note::Opened(name) => (self.source, self.problem) = (Some(name), None),
+            Note::Lost(why) => {
+                (self.source, self.problem) = (None, Some(format!("the source went away: {why}")));
+            }
+            Note::Ended => {
+                (self.source, self.problem) = (None, Some("the source has ended".to_owned()));
+            }
+            Note::Taken => {
+                self.last_percent = last_deviation_percent(self.calibration.journal().rows());
+                self.problem = None;
+            }
+            Note::Saturated(name) => {
+                self.problem = Some(format!("channel {name} reads the end of its range: press less, redo"));
+            }
+            Note::Waits(_) | Note::Untouched | Note::Overload(_) => {}
+        }
+    }
+
+    /// A press that is not on disk: the guide must not go on from it.
+    fn fail(&mut self, error: &CalibrationError) {
+        self.calibration.stop();
+        self.problem = Some(error.to_string());
+    }
+}
+
+/// What a mutex holds, whatever became of the thread that had it.
+pub fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,277 @@
+//! Calibrations by a machine, started and stopped by requests: a simulated board whose finger a simulated machine moves.
+
+use crate::client::{get, post};
+use palpate_live::server::{Access, CalibrationPlan, Live, Server};
+use palpate_live::simulated_board::{BoardConfig, Finger, Link, LoadCell, SimulatedBoard};
+use palpate_live::stage::{Firmware, SimulatedMachine};
+use palpate_rig::Rig;
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{SocketAddr, TcpListener};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Longest time that anything may take on a machine that has other things to do.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn rig() -> Rig {
+    let text = include_str!("../../../../examples/fsi-like.toml").replace("repeats = 3", "repeats = 1");
+    Rig::from_toml(&text.replace("count = 9", "count = 4")).unwrap()
+}
+
+/// Board and machine behind TCP, until it is dropped.
+struct Bench {
+    from: String,
+    stage: String,
+    machine: SimulatedMachine,
+    ends: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Bench {
+    fn start() -> Self {
+        let open = || Link::open(&"tcp://:0".parse().unwrap()).unwrap();
+        let (mut to, mut way) = (open(), open());
+        let at = |link: &Link| link.name().rsplit(' ').next().unwrap().to_owned();
+        let (from, stage) = (at(&to), format!("gcode:{}", at(&way)));
+        let rig = rig();
+        let setup = rig.stage.clone().unwrap();
+        let machine = SimulatedMachine::new(Firmware::Marlin, setup, rig.setup.surface().extent(), 1.0);
+        let ends = Arc::new(AtomicBool::new(false));
+        let (moved, over) = (machine.clone(), Arc::clone(&ends));
+        let thread = std::thread::spawn(move || {
+            let load_cell = Some(LoadCell { name: "F".to_owned(), noise_n: 2e-3 });
+            let config = BoardConfig { rate_hz: 200.0, seed: 1, load_cell, ..BoardConfig::default() };
+            let mut board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, 1)).unwrap();
+            let (start, mut machine, mut was_there) = (Instant::now(), moved, false);
+            while !over.load(Ordering::Relaxed) {
+                match way.bytes().unwrap() {
+                    Some(bytes) => {
+                        if !std::mem::replace(&mut was_there, true) {
+                            machine.reset();
+                        }
+                        machine.write_all(&bytes).unwrap();
+                        let mut answers = [0; 512];
+                        while let Ok(count) = machine.read(&mut answers) {
+                            way.send(&answers[..count]).unwrap();
+                        }
+                    }
+                    None => was_there = false,
+                }
+                board.finger_mut().hold(machine.contact());
+                while board.next_at() <= start.elapsed() {
+                    if let Some(frame) = board.next_frame() {
+                        to.send(&frame).unwrap();
+                    }
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        });
+        Self { from, stage, machine, ends, thread: Some(thread) }
+    }
+}
+
+impl Bench {
+    /// Waits for the stop, which is on its way.
+    fn is_told_to_stop(&self) {
+        let start = Instant::now();
+        while !self.machine.is_stopped() {
+            assert!(start.elapsed() < Duration::from_secs(1));
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        self.ends.store(true, Ordering::Relaxed);
+        self.thread.take().unwrap().join().unwrap();
+    }
+}
+
+fn served(folder: &Path, from: &str, stage: Option<&str>) -> (Arc<Live>, Server) {
+    let plan = CalibrationPlan {
+        rig: rig(),
+        from: from.parse().unwrap(),
+        presses: folder.join("presses.csv"),
+        out: folder.join("locator.json"),
+        comment: "a test".to_owned(),
+        force_n: None,
+        machine: stage.map(|stage| stage.parse().unwrap()),
+        before: Vec::new(),
+        seed: 0,
+    };
+    let live = Arc::new(Live::calibrating(plan, PathBuf::new()));
+    let address: SocketAddr = "127.0.0.1:0".parse().unwrap();
+    let access = Access::new(address, None, Vec::new()).unwrap();
+    let server = Server::start(address, access, Arc::clone(&live)).unwrap();
+    (live, server)
+}
+
+fn step(server: &Server, step: &str) -> (u16, Value) {
+    post(server, "/api/calibration", &json!({ "step": step }).to_string())
+}
+
+/// The state once it is as it should be; asking for it is attendance.
+fn waited(server: &Server, is_so: impl Fn(&Value) -> bool) -> Value {
+    let start = Instant::now();
+    loop {
+        let state = get(server, "/api/calibration").1;
+        if is_so(&state) {
+            return state;
+        }
+        assert!(start.elapsed() < PATIENCE, "{state}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn a_machine_is_stopped_gone_on_with_and_ends_in_a_locator() {
+    let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::start());
+    let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
+    let ready = get(&server, "/api/calibration").1;
+    let moves = &ready["machine"]["moves"];
+    assert_eq!((&ready["left"], &ready["machine"]["runs"]), (&json!(8), &json!(false)));
+    assert_eq!(moves["depths_mm"], json!([1.0, 2.0]));
+    assert_eq!((&moves["travel_z_mm"], &moves["force_limit_n"]), (&json!(27.0), &json!(3.0)));
+    assert_eq!(bench.machine.contact(), None, "nothing moves before somebody begins");
+
+    assert_eq!(step(&server, "begin").0, 200);
+    assert_eq!(step(&server, "begin").0, 409);
+    let pressed = waited(&server, |state| state["taken"] == 2);
+    assert!(pressed["machine"]["runs"] == true && pressed["machine"]["firmware"] == "Marlin", "{pressed}");
+    assert!(pressed["machine"]["x_mm"].is_number() && pressed["machine"]["left_s"].is_number(), "{pressed}");
+    // What would lead a machine past its own press is refused, with what is to be done first.
+    for refused in ["redo", "skip", "finish"] {
+        let (status, answer) = step(&server, refused);
+        assert_eq!((status, &answer["help"]), (409, &json!("end it early, or wait until it has ended")));
+    }
+    assert_eq!(post(&server, "/api/emergency-stop", "{}").0, 200);
+    let stopped = waited(&server, |state| state["machine"]["runs"] == false);
+    bench.is_told_to_stop();
+    assert_eq!(stopped["phase"], "ready");
+    let problem = stopped["problem"].as_str().unwrap();
+    assert!(problem.contains("stopped by hand") && problem.contains("reset it"), "{problem}");
+
+    assert_eq!(step(&server, "begin").0, 200);
+    let all = waited(&server, |state| state["phase"] == "ready");
+    assert_eq!((&all["taken"], &all["left"], &all["problem"]), (&json!(8), &json!(0), &Value::Null));
+    assert!(!bench.machine.is_stopped(), "it ends with its finger lifted, not with a stop");
+    assert_eq!(bench.machine.contact(), None);
+    assert_eq!(step(&server, "finish").0, 200);
+    let done = waited(&server, |state| state["phase"] == "done" || state["problem"].is_string());
+    assert_eq!(done["outcome"]["presses"], 8, "{done}");
+    assert_eq!(get(&server, "/api/session").1["source"], bench.from.as_str());
+    live.end();
+}
+
+#[test]
+fn a_machine_that_ends_early_lifts_its_finger() {
+    let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::start());
+    let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
+    step(&server, "begin");
+    waited(&server, |state| state["taken"] == 1);
+    assert_eq!(step(&server, "stop").0, 200);
+    let ended = waited(&server, |state| state["phase"] == "ready");
+    assert!(ended["left"].as_u64().unwrap() > 0 && ended["problem"].is_null(), "{ended}");
+    assert!(!bench.machine.is_stopped() && bench.machine.contact().is_none());
+    live.end();
+}
+
+#[test]
+fn a_machine_that_nobody_watches_lifts_its_finger_and_ends() {
+    let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::start());
+    let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
+    step(&server, "begin");
+    // 8 presses of 0.8 s each are not done in the 5 s after which nobody is held to be there.
+    std::thread::sleep(Duration::from_secs(8));
+    let state = get(&server, "/api/calibration").1;
+    assert_eq!((&state["phase"], &state["machine"]["runs"]), (&json!("ready"), &json!(false)));
+    assert!(state["problem"].as_str().unwrap().contains("nobody has watched the machine for 5 s"), "{state}");
+    assert!((1..8).contains(&state["taken"].as_u64().unwrap()), "{state}");
+    assert!(!bench.machine.is_stopped() && bench.machine.contact().is_none());
+    live.end();
+}
+
+#[test]
+fn a_server_that_ends_stops_the_machine() {
+    let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::start());
+    let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
+    step(&server, "begin");
+    waited(&server, |state| state["taken"] == 1);
+    live.end();
+    bench.is_told_to_stop();
+}
+
+/// A machine that takes the way down and never says that it is there; its lines with the instants at which they came.
+fn stuck_machine() -> (String, Receiver<(Instant, String)>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("gcode:tcp://{}", listener.local_addr().unwrap());
+    let (tell, told) = channel();
+    std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        stream.write_all(b"start\n").unwrap();
+        let mut presses = false;
+        for line in BufReader::new(stream.try_clone().unwrap()).lines().map_while(Result::ok) {
+            presses |= line.starts_with("G1 Z21");
+            let is_answered = !(presses && line == "M400");
+            if tell.send((Instant::now(), line)).is_err()
+                || (is_answered && stream.write_all(b"ok\n").is_err())
+            {
+                return;
+            }
+        }
+    });
+    (url, told)
+}
+
+#[test]
+fn a_stop_reaches_a_machine_that_is_in_the_middle_of_a_press() {
+    let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::start());
+    let (stage, lines) = stuck_machine();
+    let (live, server) = served(folder.path(), &bench.from, Some(&stage));
+    step(&server, "begin");
+    while !lines.recv_timeout(PATIENCE).unwrap().1.starts_with("G1 Z21") {}
+    assert_eq!(lines.recv_timeout(PATIENCE).unwrap().1, "M400");
+    // As many requests as the server takes in a second do not hold up the one that stops.
+    while post(&server, "/api/mark", "{}").0 != 429 {}
+    let asked = Instant::now();
+    assert_eq!(post(&server, "/api/emergency-stop", "").0, 200);
+    let (at, line) = lines.recv_timeout(PATIENCE).unwrap();
+    assert_eq!(line, "M112");
+    let took = at - asked;
+    println!("from the request to the stop at the machine: {took:?}");
+    assert!(took < Duration::from_millis(250), "{took:?}");
+    waited(&server, |state| state["phase"] == "ready");
+    live.end();
+}
+
+#[test]
+fn what_cannot_be_done_is_told_with_a_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let (live, server) = served(folder.path(), "udp://127.0.0.1:47613", Some("gcode:tcp://127.0.0.1:1"));
+    for body in ["", "{", "{}", r#"{"step":"press"}"#, r#"{"step":1}"#] {
+        let (status, answer) = post(&server, "/api/calibration", body);
+        assert!(status == 400 && answer["help"].is_string(), "{body}: {status} {answer}");
+    }
+    assert_eq!(step(&server, "stop").0, 409);
+    assert_eq!(step(&server, "begin").0, 200);
+    let failed = waited(&server, |state| state["machine"]["runs"] == false);
+    let problem = failed["problem"].as_str().unwrap();
+    assert!(
+        problem.contains("the line to the machine is broken") && problem.contains("see that it is on"),
+        "{problem}"
+    );
+    live.end();
+
+    let (live, server) = served(folder.path(), "udp://127.0.0.1:47613", None);
+    let (status, answer) = post(&server, "/api/emergency-stop", "{}");
+    assert_eq!((status, &answer["error"]), (409, &json!("no machine runs")));
+    assert_eq!(get(&server, "/api/calibration").1["machine"], Value::Null);
+    assert_eq!(get(&server, "/api/emergency-stop").0, 405);
+    live.end();
+}

@@ -1,0 +1,153 @@
+// The machine of a calibration: what it will move, where it is, and the stop that must reach it.
+
+import { api } from "../api";
+import { element, need, setText } from "../dom";
+import type { CalibrationRecord, MachineRecord, MovesRecord } from "../protocol";
+import { seconds, size } from "../words";
+
+/** Milliseconds between two tries to stop it, and tries until the page says that it cannot. */
+const AGAIN_MS = 250;
+const TRIES = 8;
+
+export class MachinePanel {
+  private runs = false;
+  private stopping = false;
+  private asked = false;
+
+  constructor() {
+    need("machine-stop").addEventListener("click", () => void this.stop());
+    // Whatever has the focus, and whether single keys are on or off.
+    document.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape" || !this.runs) return;
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      void this.stop();
+    }, true);
+  }
+
+  /** Says that a machine is about to run: it can be stopped from now on. */
+  begins(): void {
+    this.runs = true;
+    this.asked = false;
+  }
+
+  /** Says that it runs: a stop that came before the server had begun is said again. */
+  begun(): void {
+    if (this.asked) void this.stop();
+  }
+
+  write(state: CalibrationRecord): void {
+    const machine = state.machine;
+    const moves = need("machine-moves");
+    moves.hidden = machine === null || machine.runs || state.left === 0 || state.phase !== "ready";
+    if (machine !== null) {
+      const items = movesWords(machine.moves, state.left).map((words) => element("li", "", words));
+      const list = need("machine-moves-list");
+      if (list.textContent !== items.map((item) => item.textContent).join("")) list.replaceChildren(...items);
+    }
+    this.runs = machine?.runs ?? false;
+    need("machine").hidden = !this.runs;
+    if (machine === null || !this.runs) return;
+    const force = machine.force_n === null ? (state.next?.force_n ?? null) : machine.force_n;
+    setText(need("machine-position"), positionWords(machine) ?? "—");
+    setText(need("machine-depth"), depthWords(machine));
+    setText(need("machine-force"), force === null ? "—" : `${force.toFixed(3).replace("-", "−")} N`);
+    setText(need("machine-force-note"), machine.force_n === null ? "by the rig" : "at the load cell");
+    setText(need("machine-left"), machine.left_s === null ? "—" : seconds(Math.max(machine.left_s, 1)));
+  }
+
+  /** Stops the machine: asks until the server has answered, and says where it has not. */
+  async stop(): Promise<void> {
+    this.asked = true;
+    if (this.stopping) return;
+    this.stopping = true;
+    const words = need("machine-stop-words");
+    setText(words, "Stopping…");
+    words.hidden = false;
+    let stopped = false;
+    for (let i = 0; i < TRIES && !stopped; i++) {
+      if (i > 0) await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
+      stopped = await api.emergencyStop().then(() => true, () => false);
+    }
+    setText(words, stopped ? "" : "The server has not confirmed the stop: switch the machine off.");
+    words.hidden = stopped;
+    this.stopping = false;
+  }
+}
+
+/** What is about to move, how far and how fast, and what stops it. */
+export function movesWords(moves: MovesRecord, presses: number): string[] {
+  const [below, z] = [moves.depths_mm, moves.depths_mm.map((depth) => moves.touch_z_mm - depth)];
+  const limit = moves.force_limit_n === null ? "" : `more than ${size(moves.force_limit_n)} N at the load cell ${moves.load_cell}, `;
+  return [
+    "It looks for its end stops first: its way there must be free.",
+    `It travels over ${spanWords("x", moves.x_mm)} and ${spanWords("y", moves.y_mm)} of its own axes, at z ${mm(moves.travel_z_mm)} mm with ${mm(moves.travel_mm_per_s)} mm/s.`,
+    `It presses ${presses} times, down to z ${list(z)} mm (${list(below)} mm below the untouched surface) with ${mm(moves.press_mm_per_s)} mm/s.`,
+    `The button or Escape stops it at once, and so does ${limit}a channel at the end of its range, or 2 s without readings.`,
+    "When no page has been open for 5 s, it lifts its finger and ends.",
+  ];
+}
+
+/** The machine's step, for the one line that is read out. */
+export function machineStep(machine: MachineRecord, state: CalibrationRecord): string {
+  switch (machine.motion) {
+    case null:
+      return "Greeting the machine…";
+    case "blind":
+      return "Waiting for readings";
+    case "homing":
+      return "The machine looks for its end stops";
+    default: {
+      if (state.waiting === "nothing") return "Lifting the finger";
+      const at = positionWords(machine);
+      if (at === null) return "Leave the surface alone";
+      const depth = machine.depth_mm === null ? "" : `, ${mm(machine.depth_mm)} mm deep`;
+      return `Pressing at ${at}${depth}`;
+    }
+  }
+}
+
+/** What it is doing just now. */
+export function motionWords(machine: MachineRecord, state: CalibrationRecord): string {
+  switch (machine.motion) {
+    case null:
+      return `at ${machine.url}`;
+    case "blind":
+      return "Nothing moves before a reading has come.";
+    case "homing":
+      return "Keep your hands away.";
+    case "pressing":
+      return "The finger is on its way.";
+    case "lifting":
+      return "The finger is being lifted.";
+    case "down":
+      return state.waiting === "press" ? "The finger presses; no reading shows it yet." : "The finger presses; its reading comes to rest.";
+    case "up":
+      return state.waiting === "untouched" ? "The noise and the untouched reading are learnt." : "The finger is lifted; the surface comes to rest.";
+  }
+}
+
+function positionWords(machine: MachineRecord): string | null {
+  if (machine.x_mm === null) return null;
+  const across = machine.y_mm === null ? "" : `, ${machine.y_mm.toFixed(1)}`;
+  return `${machine.x_mm.toFixed(1)}${across} mm`;
+}
+
+function depthWords(machine: MachineRecord): string {
+  if (machine.motion === "down" && machine.depth_mm !== null) return `${mm(machine.depth_mm)} mm`;
+  return { pressing: "going down", lifting: "lifting", up: "lifted" }[machine.motion as string] ?? "—";
+}
+
+function spanWords(axis: string, [from, to]: [number, number]): string {
+  return from === to ? `${axis} ${mm(from)} mm` : `${axis} ${mm(from)} to ${mm(to)} mm`;
+}
+
+function list(values: number[]): string {
+  const words = values.map(mm);
+  return words.length < 2 ? words.join("") : `${words.slice(0, -1).join(", ")} and ${words.at(-1)}`;
+}
+
+/** Millimetres without trailing zeros. */
+function mm(value: number): string {
+  return String(Number(value.toFixed(2))).replace("-", "−");
+}
