@@ -105,7 +105,13 @@ export function eventWords(event: EventRecord): string {
 /** A number with as many decimals as its standard deviation lets mean something: its first digit is the last. */
 export function number(value: number, sd?: number): string {
   if (!Number.isFinite(value)) return "—";
-  return value.toFixed(decimals(sd ?? Math.abs(value) / 100)).replace("-", "−");
+  return fixed(value, decimals(sd ?? Math.abs(value) / 100));
+}
+
+/** A number with so many decimals; one that they round to 0 has no sign. */
+export function fixed(value: number, places: number): string {
+  const digits = value.toFixed(places);
+  return Number(digits) === 0 ? digits.replace("-", "") : digits.replace("-", "−");
 }
 
 /** A standard deviation or another size, to two digits. */
@@ -113,7 +119,7 @@ export function size(value: number): string {
   if (!Number.isFinite(value)) return "—";
   if (value === 0) return "0";
   const places = Math.max(0, Math.min(9, 1 - Math.floor(Math.log10(Math.abs(value)))));
-  return value.toFixed(places).replace("-", "−");
+  return fixed(value, places);
 }
 
 function decimals(sd: number): number {

@@ -8,6 +8,7 @@ describe("numbers", () => {
     expect(number(123.456, 0.03)).toBe("123.46");
     expect(number(123.456, 3)).toBe("123");
     expect(number(-0.5, 0.1)).toBe("−0.5");
+    expect(number(-0.004, 0.1)).toBe("0.0");
     expect(number(NaN, 1)).toBe("—");
     expect(number(3)).toBe("3.00");
   });

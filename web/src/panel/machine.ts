@@ -3,7 +3,7 @@
 import { api } from "../api";
 import { element, need, setText } from "../dom";
 import type { CalibrationRecord, MachineRecord, MovesRecord } from "../protocol";
-import { seconds, size } from "../words";
+import { fixed, seconds, size } from "../words";
 
 /** Milliseconds between two tries to stop it, and tries until the page says that it cannot. */
 const AGAIN_MS = 250;
@@ -51,7 +51,7 @@ export class MachinePanel {
     const force = machine.force_n === null ? (state.next?.force_n ?? null) : machine.force_n;
     setText(need("machine-position"), positionWords(machine) ?? "—");
     setText(need("machine-depth"), depthWords(machine));
-    setText(need("machine-force"), force === null ? "—" : `${force.toFixed(3).replace("-", "−")} N`);
+    setText(need("machine-force"), force === null ? "—" : `${fixed(force, 3)} N`);
     setText(need("machine-force-note"), machine.force_n === null ? "by the rig" : "at the load cell");
     setText(need("machine-left"), machine.left_s === null ? "—" : seconds(Math.max(machine.left_s, 1)));
   }
