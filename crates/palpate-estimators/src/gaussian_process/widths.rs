@@ -167,13 +167,14 @@ impl HeldOut {
         let logarithms = self.logarithms(&kept, regression, None, watch)?;
         let mut widths = Widths { logarithms, factors: vec![1.0; self.outputs()], ellipse: 1.0 };
         let scaled = self.scaled(&widths, &places, &kept, regression, watch)?;
-        let factor = |j: usize| conformal_95(scaled.iter().map(|z| z[j].abs()).collect());
-        let factors: Option<Vec<f64>> = (0..self.outputs()).map(|j| Some(factor(j)? / NORMAL_95)).collect();
+        // Without any error, as of readings made up without noise, there is nothing to be told.
+        let bound = |sizes: Vec<f64>| conformal_95(sizes).filter(|size| size.is_finite() && *size > 0.0);
+        let factor = |j: usize| Some(bound(scaled.iter().map(|z| z[j].abs()).collect())? / NORMAL_95);
+        let factors: Option<Vec<f64>> = (0..self.outputs()).map(factor).collect();
         let Some(factors) = factors else { return Ok(None) };
         let square = |z: &Vec<f64>| z.iter().zip(&factors).map(|(z, f)| (z / f).powi(2)).sum::<f64>();
         if self.outputs() > 1 {
-            widths.ellipse =
-                conformal_95(scaled.iter().map(square).collect()).unwrap_or(ELLIPSE_95) / ELLIPSE_95;
+            widths.ellipse = bound(scaled.iter().map(square).collect()).unwrap_or(ELLIPSE_95) / ELLIPSE_95;
         }
         widths.factors = factors;
         Ok(Some(widths))
