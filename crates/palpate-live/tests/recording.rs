@@ -250,6 +250,21 @@ fn a_full_disk_is_told_and_the_recording_goes_on_when_there_is_room() {
     assert_eq!(recording::summary(&path).unwrap().readings, samples.len() as u64);
 }
 
+/// MCAP's reader subtracts the length of a record in a chunk from what is left of the chunk.
+#[test]
+fn a_record_that_reaches_beyond_its_chunk_is_damage() {
+    let record = |kind: u8, body: &[u8]| [&[kind], &(body.len() as u64).to_le_bytes()[..], body].concat();
+    let header = [&[0; 8 + 8 + 8 + 4][..], &0u32.to_le_bytes()].concat();
+    let mut reaches_beyond = record(5, &[]);
+    reaches_beyond[1..9].copy_from_slice(&20u64.to_le_bytes());
+    let data = [&(reaches_beyond.len() as u64).to_le_bytes()[..], &reaches_beyond].concat();
+    // What lies behind the data of the chunk is within its record.
+    let chunk = [&header[..], &data, &[0; 40]].concat();
+    let path = folder("recording-beyond").join("beyond.mcap");
+    std::fs::write(&path, [&mcap::MAGIC[..], &record(6, &chunk)].concat()).unwrap();
+    assert!(matches!(Playback::open(&path), Err(RecordingError::NotOurs { .. })));
+}
+
 #[test]
 fn damaged_files_are_read_without_a_panic() {
     use rand::{RngExt, SeedableRng};

@@ -59,6 +59,9 @@ struct RecordPlace {
     length: u64,
 }
 
+/// Bytes of a chunk's record beside its texts: times, uncompressed size and checksum, and two lengths.
+const CHUNK_NUMBERS: usize = 8 + 8 + 8 + 4 + 4 + 8;
+
 impl McapFile {
     /// Looks a file through: its head, and where its chunks are.
     ///
@@ -181,6 +184,8 @@ impl McapFile {
         if header.uncompressed_size > MOST {
             return Ok(messages);
         }
+        // What lies behind the data is left out: MCAP's reader would take it for the rest of a record that reaches beyond the chunk.
+        let whole = CHUNK_NUMBERS + header.compression.len() + data.len();
         drop(data);
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
@@ -190,8 +195,8 @@ impl McapFile {
         let mut records = LinearReader::new_with_options(options);
         // A file of one record, the chunk: MCAP's reader of chunks alone allocates whatever length a damaged record says.
         let mut file = vec![op::CHUNK];
-        file.extend(chunk.length.to_le_bytes());
-        file.extend(body.iter());
+        file.extend((whole as u64).to_le_bytes());
+        file.extend(&body[..whole]);
         let mut rest = file.as_slice();
         while let Some(event) = records.next_event() {
             match event {
