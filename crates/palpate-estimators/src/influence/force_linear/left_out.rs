@@ -1,7 +1,7 @@
-//! Intervals of few presses, by presses that are left out.
+//! Intervals of few presses, by positions that are left out.
 //!
-//! What few presses leave open of hyperparameters, such as the places of point sensors, is not in the posterior, which takes them for known. So each press
-//! is left out in turn, everything is learnt anew, and the press is located by its reading. With x the press, x̂ the estimate and h the part of its 95 % interval on
+//! What few presses leave open of hyperparameters, such as the places of point sensors, is not in the posterior, which takes them for known. So each position
+//! is left out in turn, everything is learnt anew, and its presses are located by their readings. With x the press, x̂ the estimate and h the part of its 95 % interval on
 //! the side of x, z = 1.96·(x − x̂)/h is a standard normal variable where intervals are as they should be. ln of the likelihood is divided by the mean of z²,
 //! as that of χ² over its degrees of freedom tells an overdispersion (McCullagh and Nelder, *Generalized Linear Models*, 1989).
 
@@ -17,7 +17,7 @@ use palpate_numerics::{NORMAL_95, mean};
 const MANY: f64 = 25.0;
 /// Fewer than these by so many have all of it.
 const FEWER: f64 = 10.0;
-/// Presses of which one can be left out: of fewer the rest tells next to nothing.
+/// Positions of which one can be left out: of fewer the rest tells next to nothing.
 const LEAST: usize = 7;
 /// One press does not count for more, as it may be wrong.
 const MOST_SQUARE: f64 = 25.0;
@@ -27,25 +27,30 @@ pub(super) fn weight(presses: usize) -> f64 {
     ((MANY - presses as f64) / FEWER).clamp(0.0, 1.0)
 }
 
-/// The factor by which ln of the likelihood is to be divided further; `None` where that cannot be told, or there are many presses.
-pub(super) fn factor(task: FitTask, structure: Structure) -> Result<Option<f64>, MeasuredError> {
+/// The factor by which ln of the likelihood is to be divided further, of a locator that was learnt from so many presses, repeats counted once; `None` where that
+/// cannot be told, or there are many presses. A position is left out with all its presses.
+pub(super) fn factor(
+    task: FitTask,
+    structure: Structure,
+    presses: usize,
+) -> Result<Option<f64>, MeasuredError> {
     let FitTask { setup, recording, watch, .. } = task;
-    let weight = weight(recording.rows.len());
-    let presses: Vec<usize> = (0..recording.rows.len()).filter(|i| recording.rows[*i].touches()).collect();
-    if weight == 0.0 || presses.len() < LEAST {
+    let weight = weight(presses);
+    let positions = recording.touched().distinct_positions();
+    if weight == 0.0 || positions.len() < LEAST {
         return Ok(None);
     }
     let mut squares = Vec::new();
-    for (done, left_out) in presses.iter().enumerate() {
-        watch.counted("leaving presses out", "presses", done, presses.len())?;
-        let others: Vec<usize> = (0..recording.rows.len()).filter(|i| i != left_out).collect();
+    for (done, position) in positions.iter().enumerate() {
+        watch.counted("leaving positions out", "positions", done, positions.len())?;
+        let is_left_out = |row: &Row| row.touches() && row.position == *position;
+        let (left_out, others): (Vec<usize>, Vec<usize>) =
+            (0..recording.rows.len()).partition(|i| is_left_out(&recording.rows[*i]));
         let rest = recording.subset(&others);
-        if rest.distinct_positions().len() < super::LEAST_POSITIONS {
-            continue;
-        }
         let task = FitTask { recording: &rest, ..task };
         let Some(locator) = fit_condensed(task, structure, MOST_PRESSES)? else { continue };
-        squares.extend(square(&locator, &recording.rows[*left_out], setup.surface().extent()));
+        let extent = setup.surface().extent();
+        squares.extend(left_out.iter().filter_map(|i| square(&locator, &recording.rows[*i], extent)));
     }
     Ok((!squares.is_empty()).then(|| 1.0 + weight * (mean(squares) - 1.0).max(0.0)))
 }

@@ -59,7 +59,7 @@ const HARDEST: f64 = 3.0;
 /// they have no forces or all the same one, and unless the structure is force-linear by demand, where they speak against it.
 pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLinearLocator>, MeasuredError> {
     let Some(locator) = fit_condensed(task, structure, MOST_PRESSES)? else { return Ok(None) };
-    Ok(Some(match left_out::factor(task, structure)? {
+    Ok(Some(match left_out::factor(task, structure, locator.presses())? {
         Some(factor) => locator.with_likelihood_divided_by(factor, task.recording),
         None => locator,
     }))
@@ -118,7 +118,7 @@ fn fit_condensed(
 
 /// Number of channels whose errors count as those of one: what few presses leave open of influence functions depends on where they are, which
 /// is the same for all channels, and on hyperparameters that all channels share and that few presses hardly tell. The number is that with
-/// which intervals of strips from 5 to 24 presses hold their touches, multiplied by what presses left out of 7 or more show ([`left_out`]). Of 5 and 6 the
+/// which intervals of strips from 5 to 24 presses hold their touches, multiplied by what positions left out of 7 or more show ([`left_out`]). Of 5 and 6 the
 /// variance of the process is widened already, as its size is hardly told.
 fn channels_as_one(presses: &Presses) -> f64 {
     const FEWEST: f64 = 4.0;
