@@ -261,7 +261,7 @@ fn a_record_that_reaches_beyond_its_chunk_is_damage() {
     // What lies behind the data of the chunk is within its record.
     let chunk = [&header[..], &data, &[0; 40]].concat();
     let path = folder("recording-beyond").join("beyond.mcap");
-    std::fs::write(&path, [&mcap::MAGIC[..], &record(6, &chunk)].concat()).unwrap();
+    std::fs::write(&path, [mcap::MAGIC, &record(6, &chunk)].concat()).unwrap();
     assert!(matches!(Playback::open(&path), Err(RecordingError::NotOurs { .. })));
 }
 

@@ -53,7 +53,8 @@ fn after(part: Part, bytes: &[u8]) -> Option<&[u8]> {
             let after_map = past(4, short()?.into())?;
             let mut pairs = &bytes[4..bytes.len() - after_map.len()];
             while !pairs.is_empty() {
-                pairs = after(Text, pairs)?;
+                // A key without a value would be read on beyond the map.
+                pairs = after(Text, after(Text, pairs)?)?;
             }
             Some(after_map)
         }
@@ -82,6 +83,12 @@ mod tests {
         }
         (0..whole.len())
             .for_each(|length| assert!(parse(op::METADATA, &whole[..length]).is_none(), "{length}"));
+    }
+
+    #[test]
+    fn a_key_without_a_value_is_not_read_on_beyond_its_map() {
+        let map = [&7u32.to_le_bytes()[..], &text("key")].concat();
+        assert!(parse(op::METADATA, &[text("palpate"), map, vec![0xFF; 8]].concat()).is_none());
     }
 
     #[test]
