@@ -5,7 +5,7 @@ import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
 import { Bench } from "./bench";
 import { endAll } from "./children";
-import { hasChromium, launch, open, picture } from "./chromium";
+import { dotAt, hasChromium, launch, open, picture, says } from "./chromium";
 import { Server } from "./server";
 
 const SIX_TWICE: [string, string][] = [
@@ -15,15 +15,6 @@ const SIX_TWICE: [string, string][] = [
 /** The instruction on the page. */
 async function step(page: Page): Promise<string> {
   return (await page.locator("#calibration-step").textContent()) ?? "";
-}
-
-async function says(page: Page, id: string, text: RegExp): Promise<string> {
-  await page.waitForFunction(
-    ({ id, source }) => new RegExp(source).test(document.getElementById(id)?.textContent ?? ""),
-    { id, source: text.source },
-    { timeout: 30_000 },
-  );
-  return (await page.locator(`#${id}`).textContent()) ?? "";
 }
 
 /** Does what the page asks for until `until` holds. */
@@ -50,17 +41,10 @@ function presses(bench: Bench): number {
   return lines.filter((line) => /^[\d.]+,/.test(line) && Number(line.split(",")[2]) > 0).length;
 }
 
-/** Waits for a dot where the finger presses. */
-async function dotAt(page: Page, bench: Bench, x_mm: number): Promise<void> {
+/** Presses somewhere, and waits for a dot there. */
+async function dotUnder(page: Page, bench: Bench, x_mm: number): Promise<void> {
   bench.press(x_mm);
-  await page.waitForFunction(
-    (x_mm) => {
-      const located = document.getElementById("status")?.textContent === "Located";
-      return located && Math.abs(Number(document.getElementById("position")?.textContent) - x_mm) < 2;
-    },
-    x_mm,
-    { timeout: 20_000 },
-  );
+  await dotAt(page, x_mm);
   bench.lift();
 }
 
@@ -99,7 +83,7 @@ describe.skipIf(!hasChromium())("calibration", () => {
     await page.locator("#calibration-finish").click();
     expect(await says(page, "calibration-step", /^Fitted to 12 presses: error at positions held out [\d.]+ mm/)).toContain("median");
     expect(existsSync(bench.path("locator.json"))).toBe(true);
-    await dotAt(page, bench, 123);
+    await dotUnder(page, bench, 123);
     await picture(page, "calibration-done");
     await page.locator("#calibration-close").click();
     expect(await page.locator("#calibration").isVisible()).toBe(false);
@@ -143,7 +127,7 @@ describe.skipIf(!hasChromium())("calibration", () => {
     bench.lift();
     await page.keyboard.press("f");
     await says(page, "calibration-step", /^Fitted to 10 presses/);
-    await dotAt(page, bench, 250);
+    await dotUnder(page, bench, 250);
     await picture(page, "calibration-phone-done");
     expect(faults).toEqual([]);
     await page.context().close();

@@ -54,3 +54,25 @@ export async function open(browser: Browser, url: string, options: BrowserContex
 export async function picture(page: Page, name: string): Promise<void> {
   await page.screenshot({ path: `${PICTURES}/${name}.png`, fullPage: true });
 }
+
+/** Waits until an element has such a text, and gives all of it. */
+export async function says(page: Page, id: string, text: RegExp, timeout = 30_000): Promise<string> {
+  await page.waitForFunction(
+    ({ id, source, flags }) => new RegExp(source, flags).test(document.getElementById(id)?.textContent ?? ""),
+    { id, source: text.source, flags: text.flags },
+    { timeout },
+  );
+  return (await page.locator(`#${id}`).textContent()) ?? "";
+}
+
+/** Waits for a dot at a place. */
+export async function dotAt(page: Page, x_mm: number): Promise<void> {
+  await page.waitForFunction(
+    (x_mm) => {
+      const located = document.getElementById("status")?.textContent === "Located";
+      return located && Math.abs(Number(document.getElementById("position")?.textContent) - x_mm) < 2;
+    },
+    x_mm,
+    { timeout: 20_000 },
+  );
+}

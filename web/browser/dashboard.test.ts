@@ -4,19 +4,9 @@ import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import type { SampleRecord } from "../src/protocol";
 import { isPlaced, number, statusWords } from "../src/words";
-import { hasChromium, launch, open, picture } from "./chromium";
+import { hasChromium, launch, open, picture, says } from "./chromium";
 import { record } from "./recorder";
 import { Server } from "./server";
-
-/** Waits until an element has a text. */
-async function says(page: Page, id: string, text: RegExp, timeout = 30_000): Promise<string> {
-  await page.waitForFunction(
-    ({ id, source, flags }) => new RegExp(source, flags).test(document.getElementById(id)?.textContent ?? ""),
-    { id, source: text.source, flags: text.flags },
-    { timeout },
-  );
-  return (await page.locator(`#${id}`).textContent()) ?? "";
-}
 
 /** Waits until the page shows a sample. */
 async function shows(page: Page, sample: SampleRecord): Promise<void> {

@@ -5,17 +5,8 @@ import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
 import { MachineBench } from "./bench";
 import { endAll } from "./children";
-import { hasChromium, launch, open, picture } from "./chromium";
+import { dotAt, hasChromium, launch, open, picture, says } from "./chromium";
 import { Server } from "./server";
-
-async function says(page: Page, id: string, text: RegExp, timeout = 30_000): Promise<string> {
-  await page.waitForFunction(
-    ({ id, source }) => new RegExp(source).test(document.getElementById(id)?.textContent ?? ""),
-    { id, source: text.source },
-    { timeout },
-  );
-  return (await page.locator(`#${id}`).textContent()) ?? "";
-}
 
 /** Waits until so many presses were taken. */
 async function taken(page: Page, count: number): Promise<void> {
@@ -69,11 +60,7 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await says(page, "calibration-step", /^Fitted to 18 presses: error at positions held out [\d.]+ mm/);
     expect(existsSync(bench.path("locator.json"))).toBe(true);
     await bench.press(55);
-    await page.waitForFunction(
-      () => document.getElementById("status")?.textContent === "Located" && Math.abs(Number(document.getElementById("position")?.textContent) - 55) < 2,
-      undefined,
-      { timeout: 20_000 },
-    );
+    await dotAt(page, 55);
     await picture(page, "machine-done");
     expect(faults).toEqual([]);
   });

@@ -35,17 +35,17 @@ pub struct ReadingCheck {
     own_intervals: Option<OwnIntervals>,
 }
 
-/// What a contact reads: influence functions, or the equations of a bending finger.
+/// Model of what contacts read: influence functions, or the equations of a bending finger.
 #[derive(Clone, Debug, PartialEq)]
 enum Forward {
     Influence(InfluenceLocator),
     Digit(DigitLocator),
 }
 
-/// Own intervals stand where they are shorter than this share of others.
+/// Share of the check's intervals below which, in the mean, the method's own are kept.
 const OWN_SHARE: f64 = 0.9;
 
-/// The method's own intervals stand, at contacts like its presses.
+/// Span of forces at which the method's own intervals are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct OwnIntervals {
@@ -143,10 +143,9 @@ impl ReadingCheck {
         }
         if task.setup.force_n().is_none() && own_m < OWN_SHARE * widened_m {
             let forces_n = task.recording.rows.iter().filter(|row| row.touches()).map(|row| row.force_n);
-            let span = |(least, most): (f64, f64), force_n: f64| (least.min(force_n), most.max(force_n));
-            let force_n = forces_n
-                .collect::<Option<Vec<f64>>>()
-                .and_then(|forces_n| forces_n.into_iter().map(|n| (n, n)).reduce(|all, (n, _)| span(all, n)));
+            let forces_n: Option<Vec<f64>> = forces_n.collect();
+            let end = |of: fn(f64, f64) -> f64| forces_n.as_ref()?.iter().copied().reduce(of);
+            let force_n = end(f64::min).zip(end(f64::max));
             self.own_intervals = Some(OwnIntervals { force_n });
         }
         Ok(self)
@@ -178,7 +177,7 @@ impl ReadingCheck {
         }
     }
 
-    /// Whether the method's own intervals stand at contacts like its presses.
+    /// True where the method's own intervals are kept at contacts like its presses.
     pub fn keeps_intervals(&self) -> bool {
         self.own_intervals.is_some()
     }

@@ -11,7 +11,8 @@
 //! place near by, but tells a little less.
 
 use crate::status::SPREAD_RATE;
-use palpate_numerics::chi_squared_critical_value;
+use palpate_numerics::small::dot;
+use palpate_numerics::{chi_squared_critical_value, push_rest};
 use std::sync::OnceLock;
 
 /// A contact about which readings are looked at.
@@ -76,7 +77,7 @@ impl SpreadDirections {
 
     /// The square of what a residual has along them; on a line, where a spread has but one sign, 0 for the other.
     pub fn score(&self, residual: &[f64]) -> f64 {
-        let along = |unit: &Vec<f64>| product(unit, residual);
+        let along = |unit: &Vec<f64>| dot(unit, residual);
         match self.units.as_slice() {
             [unit] if self.is_line => along(unit).max(0.0).powi(2),
             units => units.iter().map(|unit| along(unit).powi(2)).sum(),
@@ -112,24 +113,6 @@ pub(crate) fn spread_bound(dimensions: usize) -> f64 {
 fn combined(parts: &[(f64, Vec<f64>)]) -> Vec<f64> {
     let channels = parts.first().map_or(0, |(_, part)| part.len());
     (0..channels).map(|c| parts.iter().map(|(factor, part)| factor * part[c]).sum()).collect()
-}
-
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Pushes what of a vector lies across the basis, at unit length; nothing where that is no more than a share of it.
-fn push_rest(basis: &mut Vec<Vec<f64>>, mut vector: Vec<f64>, least: f64) {
-    let length = product(&vector, &vector).sqrt();
-    for unit in &*basis {
-        let along = product(unit, &vector);
-        vector.iter_mut().zip(unit).for_each(|(v, u)| *v -= along * u);
-    }
-    let left = product(&vector, &vector).sqrt();
-    if left > least * length && left.is_finite() {
-        vector.iter_mut().for_each(|v| *v /= left);
-        basis.push(vector);
-    }
 }
 
 #[cfg(test)]

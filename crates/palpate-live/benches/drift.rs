@@ -4,6 +4,7 @@
 //! Untouched for 30 s, held for 60 s, let go for 30 s, at 100 readings a second, at six places. Means of
 //! all readings of the hold; "after" is the time from the contact's end until no contact is told.
 
+use cpu_time::ProcessTime;
 use palpate_core::Status;
 use palpate_estimators::estimator::{Creep, Drift, Locator, TrackerConfig};
 use palpate_estimators::fit::{Fit, FitTask};
@@ -13,7 +14,6 @@ use palpate_live::session::{Follower, Output, Session, SessionConfig};
 use palpate_live::simulated_board::{BoardConfig, FaultConfig, Finger, SimulatedBoard};
 use palpate_live::stamp::Stamp;
 use palpate_rig::Rig;
-use std::time::Instant;
 
 const RATE_HZ: f64 = 100.0;
 const UNTOUCHED_S: f64 = 30.0;
@@ -26,17 +26,7 @@ const PRESSED_S: f64 = 0.2;
 fn main() {
     let known = include_str!("../../../examples/noisy-beam.toml").to_owned();
     let without = known.lines().filter(|line| *line != "[contact]" && !line.starts_with("force = "));
-    let unknown = without
-        .collect::<Vec<_>>()
-        .join(
-            "
-",
-        )
-        .replace(
-            "[training]",
-            "[training]
-force = \"3 N\"",
-        );
+    let unknown = without.collect::<Vec<_>>().join("\n").replace("[training]", "[training]\nforce = \"3 N\"");
     assert_ne!(known, unknown);
     println!("force    faults                       state     error   cov  located  after");
     let none = FaultConfig::default();
@@ -113,7 +103,7 @@ impl Outcome {
         for (seed, x_mm) in places_mm.into_iter().enumerate() {
             let samples = samples(rig, locator, faults, x_mm, seed as u64);
             let mut follower = Follower::new(locator, config).expect("an influence locator");
-            let start = Instant::now();
+            let start = ProcessTime::now();
             let mut touches = true;
             for sample in &samples {
                 let estimate =

@@ -123,7 +123,7 @@ fn follow(address: SocketAddr, query: &str) -> Result<WebSocket<TcpStream>, Box<
     Ok(socket)
 }
 
-/// What a client of all packets has seen.
+/// Latencies and losses that a client of all packets has seen.
 struct Packets {
     /// From the last byte of each arrival to its packet.
     latencies_ms: Vec<f64>,

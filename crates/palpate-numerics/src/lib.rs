@@ -22,6 +22,7 @@ mod cholesky;
 mod distributions;
 mod eigen;
 mod elliptic;
+mod gram_schmidt;
 mod out_of_range;
 mod random_order;
 pub mod regression;
@@ -38,6 +39,7 @@ pub use distributions::{
 };
 pub use eigen::symmetric_eigen;
 pub use elliptic::{Jacobi, carlson_rd, carlson_rf};
+pub use gram_schmidt::push_rest;
 pub use out_of_range::OutOfRange;
 pub use random_order::random_order;
 pub use sparse_cholesky::{SparseCholesky, SparseCholeskyError, SparseSymmetric};

@@ -112,7 +112,7 @@ pub fn stage(
 /// The file of presses, empty, or with the presses that it had.
 fn journal(arguments: &Arguments, rig: &Rig, stage: Option<&Stage>) -> Result<Journal, Failure> {
     let path = &arguments.presses;
-    let depths = DepthKnowledge::of(stage);
+    let depths = DepthKnowledge::for_stage(stage);
     if path.exists() && !arguments.resume {
         let complaint = Complaint::new(format!("{} is there already", path.display()));
         return Err(complaint.help("--resume goes on with its presses; another name begins anew").into());

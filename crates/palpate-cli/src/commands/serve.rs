@@ -189,7 +189,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     let rig = input::read_rig(path)?;
     // What cannot be calibrated is refused here, where the place in the file can be shown.
     let stage = stage(path, &rig, arguments.stage.as_ref(), arguments.force)?;
-    let depths = DepthKnowledge::of(stage.as_ref());
+    let depths = DepthKnowledge::for_stage(stage.as_ref());
     let before = pressed_before(path, &rig, presses, depths)?;
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
     plan(&rig, arguments.force, depths_m, &before).map_err(|error| Complaint::about(path, error))?;

@@ -15,7 +15,7 @@ fn bench() -> TempDir {
     folder
 }
 
-/// What a server of Foxglove says to a client that connects, up to the last of its topics, which come in any order.
+/// Greeting of a server of Foxglove, up to the last of its topics, which come in any order.
 fn greeting(address: &str) -> String {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();

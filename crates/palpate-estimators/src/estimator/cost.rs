@@ -248,11 +248,14 @@ impl Sizes {
         let kept = presses * (1.0 - 1.0 / force_linear::FOLDS as f64);
         let factors = 2.0 * force_linear::FOLDS as f64 * kept.powi(3) / 3.0 + presses.powi(3);
         let learning = EVALUATIONS * searched.powi(3) / 3.0 / NARROW + factors / PRODUCTS;
+        // Each position of few presses is left out of a fit once more.
+        let fits = if presses < force_linear::FEW { 1.0 + presses } else { 1.0 };
         FitCost {
             memory_bytes: NUMBER * (7.0 * presses * presses + 4.0 * nodes * self.channels)
                 + 2.0 * NUMBER * self.presses * (2.0 * self.channels + 10.0),
-            seconds: self.channels * (LEARNT * learning + nodes * presses * presses / 2.0 / PRODUCTS)
-                + LEARNT * self.presses * presses * 5e-8,
+            seconds: fits
+                * (self.channels * (LEARNT * learning + nodes * presses * presses / 2.0 / PRODUCTS)
+                    + LEARNT * self.presses * presses * 5e-8),
         }
     }
 }

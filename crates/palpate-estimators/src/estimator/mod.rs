@@ -192,7 +192,7 @@ pub(crate) fn is_learnt(kind: &str) -> bool {
 }
 
 impl Method {
-    /// Whether its intervals are by errors at positions that were held out, and follow the reading.
+    /// True of a method whose intervals come from errors at positions that were held out, reading by reading.
     fn knows_its_errors(&self) -> bool {
         matches!(self, Self::GaussianProcess(locator) if locator.widths.is_some())
     }

@@ -157,11 +157,11 @@ impl Locate for GaussianProcessLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         let features = self.features.apply(reading);
         let (means_m, variances_m2) = self.process.predict(&features);
-        let widths = self.widths.as_ref().map(|widths| widths.at(&features));
+        let widths = self.widths.as_ref().map(|widths| widths.multiples(&features));
         let coordinate = |j: usize| -> Option<(f64, f64)> {
             let error_m2 = self.process.noise_variance(j).unwrap_or(0.0);
-            let width = widths.as_ref().map_or(1.0, |widths| widths[j]);
-            Some((*means_m.get(j)?, width * (variances_m2.get(j)? + error_m2).sqrt()))
+            let multiple = widths.as_ref().map_or(1.0, |widths| widths[j]);
+            Some((*means_m.get(j)?, multiple * (variances_m2.get(j)? + error_m2).sqrt()))
         };
         let (x_m, x_sd_m) = coordinate(0).unwrap_or_default();
         let (y_m, y_sd_m) = if self.process.outputs() > 1 { coordinate(1) } else { None }.unwrap_or_default();

@@ -43,7 +43,7 @@ struct HeldOut {
     positions: Vec<Position>,
 }
 
-/// |z| below which its logarithm would tell of chance.
+/// Least |z| whose logarithm is taken: that of a smaller one varies by chance alone.
 const LEAST_Z: f64 = 0.1;
 
 impl Widths {
@@ -69,12 +69,10 @@ impl Widths {
         held_out.widths(searched, watch)
     }
 
-    /// What the standard deviation of each coordinate is multiplied by.
-    pub(super) fn at(&self, features: &[f64]) -> Vec<f64> {
-        let mut factors = vec![0.0; self.factors.len()];
-        self.logarithms.mean_into(features, &mut factors, &mut self.logarithms.scratch());
-        factors.iter_mut().zip(&self.factors).for_each(|(at, factor)| *at = factor * (0.5 * *at).exp());
-        factors
+    /// Multiples of the standard deviation of each coordinate, about a reading with these features.
+    pub(super) fn multiples(&self, features: &[f64]) -> Vec<f64> {
+        let widths = local_widths(&self.logarithms, features);
+        widths.into_iter().zip(&self.factors).map(|(width, factor)| factor * width).collect()
     }
 
     /// Checks what a file may have got wrong.
@@ -90,6 +88,14 @@ impl Widths {
         let numbers = self.factors.iter().copied().chain([self.ellipse]);
         LocatorFault::check_numbers("factor of its widths", numbers, |x| x > 0.0, "finite and greater than 0")
     }
+}
+
+/// w_j about a reading with these features.
+fn local_widths(logarithms: &GaussianProcess, features: &[f64]) -> Vec<f64> {
+    let mut widths = vec![0.0; logarithms.outputs()];
+    logarithms.mean_into(features, &mut widths, &mut logarithms.scratch());
+    widths.iter_mut().for_each(|width| *width = (0.5 * *width).exp());
+    widths
 }
 
 /// Folds that positions are dealt to.
@@ -165,25 +171,24 @@ impl HeldOut {
         }
         let kept: Vec<usize> = thinned(self.z.len(), regression.search_points).collect();
         let logarithms = self.logarithms(&kept, regression, None, watch)?;
-        let mut widths = Widths { logarithms, factors: vec![1.0; self.outputs()], ellipse: 1.0 };
-        let scaled = self.scaled(&widths, &places, &kept, regression, watch)?;
+        let scaled = self.scaled(logarithms.hyperparameters(), &places, &kept, regression, watch)?;
         // Without any error, as of readings made up without noise, there is nothing to be told.
         let bound = |sizes: Vec<f64>| conformal_95(sizes).filter(|size| size.is_finite() && *size > 0.0);
         let factor = |j: usize| Some(bound(scaled.iter().map(|z| z[j].abs()).collect())? / NORMAL_95);
         let factors: Option<Vec<f64>> = (0..self.outputs()).map(factor).collect();
         let Some(factors) = factors else { return Ok(None) };
         let square = |z: &Vec<f64>| z.iter().zip(&factors).map(|(z, f)| (z / f).powi(2)).sum::<f64>();
-        if self.outputs() > 1 {
-            widths.ellipse = bound(scaled.iter().map(square).collect()).unwrap_or(ELLIPSE_95) / ELLIPSE_95;
-        }
-        widths.factors = factors;
-        Ok(Some(widths))
+        let ellipse = match self.outputs() {
+            1 => 1.0,
+            _ => bound(scaled.iter().map(square).collect()).unwrap_or(ELLIPSE_95) / ELLIPSE_95,
+        };
+        Ok(Some(Widths { logarithms, factors, ellipse }))
     }
 
     /// z over widths that are told by errors at other positions, as those of contacts in use are.
     fn scaled(
         &self,
-        widths: &Widths,
+        known: &Hyperparameters,
         places: &[Position],
         kept: &[usize],
         regression: Regression,
@@ -199,12 +204,10 @@ impl HeldOut {
             if others.is_empty() {
                 continue;
             }
-            let known = Some(widths.logarithms.hyperparameters());
-            let logarithms = self.logarithms(&others, regression, known, watch)?;
-            let without = Widths { logarithms, ..widths.clone() };
+            let logarithms = self.logarithms(&others, regression, Some(known), watch)?;
             for i in (0..self.z.len()).filter(|i| part(*i) == k) {
-                let at = without.at(&self.features[i]);
-                scaled.push(self.z[i].iter().zip(at).map(|(z, width)| z / width).collect());
+                let widths = local_widths(&logarithms, &self.features[i]);
+                scaled.push(self.z[i].iter().zip(widths).map(|(z, width)| z / width).collect());
             }
         }
         Ok(scaled)

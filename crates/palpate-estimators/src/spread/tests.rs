@@ -38,7 +38,7 @@ fn residual(of: Vec<f64>, unknowns: &[usize]) -> Vec<f64> {
     let mut basis = Vec::new();
     unknowns.iter().for_each(|k| push_rest(&mut basis, tangent(*k), 0.0));
     basis.iter().fold(of, |rest, unit| {
-        let along = product(&rest, unit);
+        let along = dot(&rest, unit);
         rest.iter().zip(unit).map(|(r, u)| r - along * u).collect()
     })
 }
@@ -49,11 +49,11 @@ fn directions_are_of_unit_length_and_right_angles_to_what_a_point_changes() {
         let SpreadDirections { units, .. } = SpreadDirections::about(about, bells);
         assert_eq!(units.len(), count);
         for (i, unit) in units.iter().enumerate() {
-            assert!((product(unit, unit) - 1.0).abs() < 1e-12);
-            assert!(units[..i].iter().all(|other| product(unit, other).abs() < 1e-12));
+            assert!((dot(unit, unit) - 1.0).abs() < 1e-12);
+            assert!(units[..i].iter().all(|other| dot(unit, other).abs() < 1e-12));
             for k in &tangents {
                 let tangent = tangent(*k);
-                assert!(product(unit, &tangent).abs() < 1e-4 * product(&tangent, &tangent).sqrt(), "{i} {k}");
+                assert!(dot(unit, &tangent).abs() < 1e-4 * dot(&tangent, &tangent).sqrt(), "{i} {k}");
             }
         }
     }
@@ -63,8 +63,8 @@ fn directions_are_of_unit_length_and_right_angles_to_what_a_point_changes() {
 fn a_known_force_is_no_way_out_for_a_point() {
     let known = About { ends: [LINE.ends[0], LINE.ends[1], (2.0, 2.0)], ..LINE };
     let unit = SpreadDirections::about(known, bells).on_line().unwrap();
-    assert!(product(&unit, &tangent(0)).abs() < 1e-4);
-    assert!(product(&unit, &tangent(2)).abs() > 0.1);
+    assert!(dot(&unit, &tangent(0)).abs() < 1e-4);
+    assert!(dot(&unit, &tangent(2)).abs() > 0.1);
 }
 
 #[test]
@@ -81,7 +81,7 @@ fn all_that_two_contacts_close_by_leave_is_along_the_directions() {
         for (dx, dy) in ways {
             let left = residual(two(dx, dy), &tangents);
             let directions = SpreadDirections::about(about, bells);
-            let share = directions.score(&left) / product(&left, &left);
+            let share = directions.score(&left) / dot(&left, &left);
             assert!((0.98..1.0 + 1e-9).contains(&share), "{dx} {dy}: {share}");
             let opposite: Vec<f64> = left.iter().map(|r| -r).collect();
             let expected = if about == LINE { 0.0 } else { directions.score(&left) };

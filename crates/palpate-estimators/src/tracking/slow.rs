@@ -1,4 +1,4 @@
-//! What changes slowly: drift of the channels' offsets and creep of the surface, in the state beside the contacts.
+//! Drift of the channels' offsets and creep of the surface, in the state beside the contacts.
 //!
 //! Symbols, all in standard deviations of each channel's noise: y a reading less the offsets that calibration learnt; h(θ) that of the contacts, θ their places and unknown
 //! forces; d the drift and v its rate; z the creep's state and c its share, τ its time; n white noise of variance 1.
@@ -16,7 +16,7 @@
 //! State-Space Methods to Navigation Problems, 1966). The part along is carried on by v, and its doubt is the contacts' doubt: the covariance
 //! of d, brought to θ by least squares, is added to theirs, as it does not average out.
 //!
-//! How much channels drift is learnt: nine filters, of three walks w and three rates r, run beside one another and are weighed by how probable they
+//! The size of the drift is learnt: nine filters, of three walks w and three rates r, run beside one another and are weighed by how probable they
 //! find the untouched readings (D. T. Magill, IEEE Trans. Autom. Control 10, 1965).
 
 use super::Tracked;
@@ -25,7 +25,7 @@ use ndarray::{Array1, Array2, s};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::{Ldl, Matrix, dot, form};
-use palpate_numerics::{Cholesky, clamped_interval};
+use palpate_numerics::{Cholesky, NORMAL_95, clamped_interval, push_rest};
 
 /// Drift that a tracker reckons with, in standard deviations of each channel's noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +60,8 @@ const BLOCK_S: f64 = 0.2;
 const UNSEEN_S: f64 = 600.0;
 /// Variance along the contacts' unknowns, over that of the noise: flat.
 const FLAT: f64 = 1e8;
+/// Share of a derivative that has to lie across the others for it to count.
+const PARALLEL: f64 = 1e-9;
 /// Blocks over which the calibration's error of a contact is the same, so that they tell no more than one does.
 const ALIKE: f64 = 300.0;
 /// Share of a filter's evidence that is kept from block to block: some minutes.
@@ -143,7 +145,7 @@ impl SlowState {
         for (i, value) in whitened.iter_mut().enumerate() {
             let before = *value;
             if let Some(drift) = &self.drift {
-                *value -= drift.at(i, time_s);
+                *value -= drift.offset_at(i, time_s);
             }
             if let Some((Creep { share, time_s }, states)) = &mut self.creep {
                 // Before the first reading nothing touched for long, as far as is known.
@@ -178,7 +180,11 @@ impl SlowState {
         let predicted = likelihood.linearised(&contacts).reading;
         let time_s = self.time_s;
         let shown = whitened.iter().zip(&predicted).enumerate();
-        self.block.add(time_s, shown.map(|(i, (value, own))| value - own + drift.at(i, time_s)), &contacts);
+        self.block.add(
+            time_s,
+            shown.map(|(i, (value, own))| value - own + drift.offset_at(i, time_s)),
+            &contacts,
+        );
     }
 
     /// Adds the doubt that the drift leaves to that of the contacts.
@@ -238,10 +244,8 @@ fn contact_of(tracked: &Tracked) -> Contact {
 
 /// Adds variances xx, xy, yy of the place and of the force.
 fn widen(tracked: &mut Tracked, [xx, xy, yy, force]: [f64; 4], extent: Extent) {
-    /// Half of a 95 % interval in standard deviations.
-    const HALF: f64 = 1.96;
     let wider = |at_m: f64, (low_m, high_m): (f64, f64), variance: f64, side_m: f64| {
-        let half = |own_m: f64| (own_m * own_m + HALF * HALF * variance).sqrt();
+        let half = |own_m: f64| (own_m * own_m + NORMAL_95 * NORMAL_95 * variance).sqrt();
         clamped_interval((at_m - half(at_m - low_m), at_m + half(high_m - at_m)), side_m)
     };
     tracked.x_95_m = wider(tracked.x_m, tracked.x_95_m, xx, extent.length_m());
@@ -297,7 +301,7 @@ impl DriftFilter {
     }
 
     /// d of a channel at an instant.
-    fn at(&self, i: usize, time_s: f64) -> f64 {
+    fn offset_at(&self, i: usize, time_s: f64) -> f64 {
         let since_s = self.time_s.map_or(0.0, |own_s| (time_s - own_s).clamp(0.0, UNSEEN_S));
         self.offset[i] + since_s * self.rate[i]
     }
@@ -321,8 +325,9 @@ impl DriftFilter {
         for (i, variance) in at.variance.iter().enumerate() {
             noise[[i, i]] += ALIKE * variance;
         }
-        for along in orthonormal(&at.derivatives) {
-            let along = Array1::from(along);
+        let mut basis = Vec::new();
+        at.derivatives.into_iter().for_each(|column| push_rest(&mut basis, column, PARALLEL));
+        for along in basis.into_iter().map(Array1::from) {
             let column = along.view().insert_axis(ndarray::Axis(1));
             noise += &(column.dot(&column.t()) * FLAT);
         }
@@ -451,25 +456,6 @@ impl Model {
     }
 }
 
-/// Orthonormal columns that span these (modified Gram and Schmidt); what the others span is left out.
-fn orthonormal(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    const LEFT: f64 = 1e-9;
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    for column in columns {
-        let length = dot(column, column).sqrt();
-        let mut rest = column.clone();
-        for own in &basis {
-            let along = dot(own, &rest);
-            rest.iter_mut().zip(own).for_each(|(rest, own)| *rest -= along * own);
-        }
-        let left = dot(&rest, &rest).sqrt();
-        if left > LEFT * length && left > 0.0 {
-            basis.push(rest.into_iter().map(|rest| rest / left).collect());
-        }
-    }
-    basis
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -535,7 +521,7 @@ mod tests {
         }
         for (c, rate) in [0.02, -0.02, 0.0].into_iter().enumerate() {
             assert!((filter.rate[c] - rate).abs() < 4e-3, "{}", filter.rate);
-            let later = filter.at(c, 119.8 + 30.0);
+            let later = filter.offset_at(c, 119.8 + 30.0);
             assert!((later - offset[c] - 30.0 * rate).abs() < 0.25, "{c}: {later}");
         }
     }

@@ -309,7 +309,7 @@ fn linearisations_are_those_of_differences() {
     }
 }
 
-/// Where the baseline goes, the drift goes the other way, and what is followed stays.
+/// A baseline that moves is taken off the drift, and the contacts that are followed stay.
 #[test]
 fn a_baseline_that_moves_moves_no_contact() {
     let rig = rig();

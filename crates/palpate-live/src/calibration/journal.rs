@@ -173,8 +173,8 @@ pub enum DepthKnowledge {
 }
 
 impl DepthKnowledge {
-    /// That of presses by this machine, or by hand without one.
-    pub fn of(stage: Option<&Stage>) -> Self {
+    /// Knowledge of presses by this machine, or by hand without one.
+    pub fn for_stage(stage: Option<&Stage>) -> Self {
         match stage {
             None => Self::Unknown,
             Some(stage) if stage.depths_m.len() > 1 => Self::Several,

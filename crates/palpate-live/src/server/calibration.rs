@@ -1,8 +1,9 @@
 //! A calibration that browsers guide a person through, and the locator that it ends with.
 
+use super::lock::locked;
 use super::machine::{Attendance, MachineRecord, MachineState};
 use super::pressing::{MachineRun, listen};
-use super::shared::{Shared, locked};
+use super::shared::Shared;
 use crate::calibration::{
     Assessment, Calibration, DepthKnowledge, Journal, JournalError, PlanError, Press, Waiting, places, plan,
 };
@@ -243,7 +244,8 @@ impl Calibrator {
         let machine = self.plan.machine().filter(|_| !to_come.is_empty());
         let stage = machine.map(|(_, stage)| stage);
         let rows = state.rows.clone();
-        let journal = Journal::new(&rig.setup, presses, comment.clone(), rows, DepthKnowledge::of(stage))?;
+        let journal =
+            Journal::new(&rig.setup, presses, comment.clone(), rows, DepthKnowledge::for_stage(stage))?;
         let calibration = Calibration::new(&rig.setup, stage, from.columns(), to_come, journal)?;
         let machine = machine.map(|(url, stage)| MachineRun {
             url: url.clone(),

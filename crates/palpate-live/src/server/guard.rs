@@ -1,12 +1,13 @@
 //! Guard of the server: who may ask.
 
 use super::body::Refusal;
+use super::lock::locked;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use std::net::{IpAddr, SocketAddr};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Shortest token.
@@ -169,7 +170,7 @@ impl Guard {
         if request.method() != Method::POST || request.uri().path() == EMERGENCY_STOP {
             return Ok(());
         }
-        let mut posts = self.posts.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut posts = locked(&self.posts);
         if posts.0.elapsed() > Duration::from_secs(1) {
             *posts = (Instant::now(), 0);
         }

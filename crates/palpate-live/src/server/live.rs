@@ -1,6 +1,7 @@
 //! A locator in live use: the session that runs, and the beginning of another.
 
 use super::calibration::{CalibrationPlan, CalibrationRecord, Calibrator, CalibratorError};
+use super::lock::locked;
 use super::session_info::SessionInfo;
 use super::web_sink::{Hub, WebSink};
 use crate::frame::{Channel, ColumnsError};
@@ -17,7 +18,7 @@ use palpate_estimators::estimator::Locator;
 use palpate_rig::Rig;
 use std::path::PathBuf;
 use std::sync::mpsc::{SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 /// A locator in live use.
@@ -346,7 +347,7 @@ impl Live {
             let name = calibrator.plan().out_name();
             calibrator.fit(|locator| {
                 let subject = Subject::of_locator(locator, &name, false);
-                *live.subject.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(subject);
+                *locked(&live.subject) = Arc::new(subject);
                 live.begin(&url).map_err(|error| error.to_string())
             });
         })?;
@@ -393,7 +394,7 @@ impl Live {
     }
 
     fn subject(&self) -> Arc<Subject> {
-        Arc::clone(&self.subject.lock().unwrap_or_else(PoisonError::into_inner))
+        Arc::clone(&locked(&self.subject))
     }
 
     pub(super) fn hub(&self) -> &Hub {
@@ -401,7 +402,7 @@ impl Live {
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Option<Running>> {
-        self.running.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.running)
     }
 }
 

@@ -97,7 +97,7 @@ pub struct MachineRecord {
     moves: MovesRecord,
 }
 
-/// Where a machine moves, in its own coordinates, and how fast.
+/// Ranges and speeds of a machine, in its own coordinates.
 #[derive(Clone, Debug, Serialize)]
 struct MovesRecord {
     x_mm: (f64, f64),

@@ -7,6 +7,7 @@ mod body;
 mod calibration;
 mod guard;
 mod live;
+mod lock;
 mod machine;
 mod page;
 mod pressing;

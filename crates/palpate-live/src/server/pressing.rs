@@ -1,7 +1,8 @@
 //! The threads of a calibration that runs: readings to a person's presses, or to a machine's.
 
+use super::lock::locked;
 use super::machine::{Attendance, UNWATCHED};
-use super::shared::{Shared, locked};
+use super::shared::Shared;
 use crate::calibration::{Machine, MachineError, MachineNote, Motion, Waiting};
 use crate::input::Input;
 use crate::stage::{StageThread, StageUrl};
@@ -28,7 +29,7 @@ pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
     }
 }
 
-/// What a machine's run needs beside its readings.
+/// A run of a machine, without its readings.
 #[derive(Clone, Debug)]
 pub struct MachineRun {
     pub url: StageUrl,

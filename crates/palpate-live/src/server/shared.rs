@@ -3,7 +3,6 @@
 use super::machine::MachineState;
 use crate::calibration::{Calibration, CalibrationError, Note, last_deviation_percent};
 use crate::input::Arrived;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A calibration that runs, as its thread leaves it for others to see.
 pub struct Shared {
@@ -51,9 +50,4 @@ impl Shared {
         self.calibration.stop();
         self.problem = Some(error.to_string());
     }
-}
-
-/// What a mutex holds, whatever became of the thread that had it.
-pub fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

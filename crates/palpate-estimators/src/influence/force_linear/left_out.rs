@@ -1,21 +1,21 @@
 //! Intervals of few presses, by positions that are left out.
 //!
-//! What few presses leave open of hyperparameters, such as the places of point sensors, is not in the posterior, which takes them for known. So each position
+//! Few presses leave hyperparameters open, such as the places of point sensors, which the posterior takes for known. So each position
 //! is left out in turn, everything is learnt anew, and its presses are located by their readings. With x the press, x̂ the estimate and h the part of its 95 % interval on
 //! the side of x, z = 1.96·(x − x̂)/h is a standard normal variable where intervals are as they should be. ln of the likelihood is divided by the mean of z²,
 //! as that of χ² over its degrees of freedom tells an overdispersion (McCullagh and Nelder, *Generalized Linear Models*, 1989).
 
+use super::presses::FEW;
 use super::{ForceLinearLocator, MOST_PRESSES, fit_condensed};
 use crate::fit::{FitTask, Locate};
 use crate::influence::config::Structure;
 use crate::influence::measured::MeasuredError;
 use crate::recording::Row;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::watch::Cancelled;
 use palpate_numerics::{NORMAL_95, mean};
 
-/// Presses from which on intervals need no widening.
-const MANY: f64 = 25.0;
-/// Fewer than these by so many have all of it.
+/// Presses less than [`FEW`] from which on down the weight is 1.
 const FEWER: f64 = 10.0;
 /// Positions of which one can be left out: of fewer the rest tells next to nothing.
 const LEAST: usize = 7;
@@ -24,7 +24,7 @@ const MOST_SQUARE: f64 = 25.0;
 
 /// Weight of the widening: 1 of few presses, 0 of many.
 pub(super) fn weight(presses: usize) -> f64 {
-    ((MANY - presses as f64) / FEWER).clamp(0.0, 1.0)
+    ((FEW - presses as f64) / FEWER).clamp(0.0, 1.0)
 }
 
 /// The factor by which ln of the likelihood is to be divided further, of a locator that was learnt from so many presses, repeats counted once; `None` where that
@@ -48,7 +48,12 @@ pub(super) fn factor(
             (0..recording.rows.len()).partition(|i| is_left_out(&recording.rows[*i]));
         let rest = recording.subset(&others);
         let task = FitTask { recording: &rest, ..task };
-        let Some(locator) = fit_condensed(task, structure, MOST_PRESSES)? else { continue };
+        let locator = match fit_condensed(task, structure, MOST_PRESSES) {
+            Ok(Some(locator)) => locator,
+            Err(error) if Cancelled::caused(&error) => return Err(error),
+            // A rest that nothing can be learnt from says nothing of the intervals of all.
+            Ok(None) | Err(_) => continue,
+        };
         let extent = setup.surface().extent();
         squares.extend(left_out.iter().filter_map(|i| square(&locator, &recording.rows[*i], extent)));
     }

@@ -35,6 +35,7 @@ use learning::Learnt;
 use locator::{Stored, Tables};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::{mean, mean_and_variance};
+pub(crate) use presses::FEW;
 use presses::{Presses, shares};
 use prior::Prior;
 

@@ -65,6 +65,9 @@ impl RowPress<'_> {
     }
 }
 
+/// Presses of which fewer do not tell noise, offsets and hyperparameters by themselves.
+pub const FEW: f64 = 25.0;
+
 impl Presses {
     /// The presses of a recording but for rows that are set aside, in rising order; `None` where the force of a row is not known.
     pub fn of_recording(
@@ -136,9 +139,8 @@ impl Presses {
 
     /// Weight of what is known beforehand of noise and errors: 1 of few presses, 0 from so many on that they tell these by themselves.
     pub fn fewness(&self) -> f64 {
-        const MANY: f64 = 25.0;
         const FEWER: f64 = 5.0;
-        ((MANY - self.len() as f64) / FEWER).clamp(0.0, 1.0)
+        ((FEW - self.len() as f64) / FEWER).clamp(0.0, 1.0)
     }
 
     /// Distinct forces, that of no contact among them.
