@@ -4,7 +4,7 @@ use super::design::PositionError;
 use ndarray::Array2;
 
 use palpate_estimators::arrangement::cells;
-use palpate_estimators::recording::Recording;
+use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
@@ -23,6 +23,8 @@ const ASKED_ON_A_PLANE: usize = 14;
 const NOMINAL_NOISE: f64 = 1e-4;
 /// Distinct positions without which nobody knows how smooth a function is.
 const FEWEST_POSITIONS: usize = 4;
+/// Variance of the forces at one position, of their squared mean, below which they are one force.
+const NEGLIGIBLE_SPREAD: f64 = 1e-12;
 
 /// Whitened readings as functions of position.
 pub(super) struct ForwardModel {
@@ -57,7 +59,7 @@ impl ForwardModel {
         Self::fit(&positions, &clean, &sds, 0.0, extent, force, watch)
     }
 
-    /// Model of a bench from a recording begun, whose noise its repeats tell, or else the layout.
+    /// Model of a bench from a recording begun, whose noise its repeats tell, or else the layout; untouched rows tell the offsets.
     pub fn from_recording(
         recording: &Recording,
         layout: &Layout,
@@ -68,18 +70,19 @@ impl ForwardModel {
         if recording.channels.len() != layout.len() {
             return Err(PositionError::Channels { needed: layout.len(), found: recording.channels.len() });
         }
-        let found = recording.distinct_positions().len();
+        let presses = recording.touched();
+        let found = presses.distinct_positions().len();
         if found < FEWEST_POSITIONS {
             return Err(PositionError::TooFewPresses { found, needed: FEWEST_POSITIONS });
         }
-        let scaled = at_one_force(recording);
+        let scaled = at_one_force(&presses, &offsets(recording));
         let sds = living(layout).map(|s| {
             let stated = layout.sensors()[s].channel.reading_sd();
-            let sd = scatter(recording, &scaled, s).unwrap_or(stated);
+            let sd = scatter(&presses, &scaled, s).unwrap_or(stated);
             if sd > 0.0 { Ok((s, sd)) } else { Err(PositionError::NoNoise { channel: s + 1 }) }
         });
         let sds = sds.collect::<Result<Vec<_>, _>>()?;
-        let positions: Vec<Position> = recording.rows.iter().map(|row| row.position).collect();
+        let positions: Vec<Position> = presses.rows.iter().map(|row| row.position).collect();
         Self::fit(&positions, &scaled, &sds, 1.0, extent, force, watch)
     }
 
@@ -119,9 +122,8 @@ impl ForwardModel {
         self.signal_variance * Kernel::Matern52.correlation(r2)
     }
 
-    /// The standard deviation, in metres, with which a reading tells a position once everything is calibrated: the limit by
-    /// the expected readings' slopes, combined with what the surface's size tells.
-    pub fn limit_m(&self, at: Position) -> f64 {
+    /// What a reading tells of a position once everything is calibrated, by the expected readings' slopes.
+    pub fn information(&self, at: Position) -> Information {
         let (outputs, d) = (self.process.outputs(), self.process.coordinates());
         let (mut means, mut slopes) = (vec![0.0; outputs], vec![0.0; outputs * d]);
         let point = [at.x_m, at.y_m];
@@ -134,7 +136,7 @@ impl ForwardModel {
         let dot = |f: &dyn Fn(usize) -> (f64, f64)| (0..outputs).map(f).map(|(a, b)| a * b).sum::<f64>();
         // By ln W a reading that is linear in the force changes as much as it is.
         let by_force = dot(&|j| (means[j], means[j])).max(f64::MIN_POSITIVE);
-        let information = |k: usize, l: usize| {
+        let entry = |k: usize, l: usize| {
             let plain = dot(&|j| (slopes[j * d + k], slopes[j * d + l]));
             match self.force {
                 Force::Known => plain,
@@ -144,10 +146,30 @@ impl ForwardModel {
                 }
             }
         };
-        let prior = |side_m: f64| 12.0 / (side_m * side_m);
-        let xx = information(0, 0) + prior(self.extent.length_m());
-        let Some(width_m) = self.extent.width_m() else { return 1.0 / xx.sqrt() };
-        let (yy, xy) = (information(1, 1) + prior(width_m), information(0, 1));
+        match self.extent {
+            Extent::Line { .. } => Information { xx: entry(0, 0), xy: 0.0, yy: 0.0 },
+            Extent::Plane { .. } => Information { xx: entry(0, 0), xy: entry(0, 1), yy: entry(1, 1) },
+        }
+    }
+}
+
+/// The Fisher information of a position in one reading, in 1/m²; of a line only `xx`.
+#[derive(Clone, Copy)]
+pub(super) struct Information {
+    xx: f64,
+    xy: f64,
+    yy: f64,
+}
+
+impl Information {
+    /// The standard deviation, in metres, of a position that is told with this noise variance, in units of a reading's: the
+    /// information divided by it, and what the surface's size tells. In two dimensions that of the distance.
+    pub fn sd_m(self, noise_variance: f64, extent: Extent) -> f64 {
+        let told = |information: f64| information / noise_variance;
+        let size = |side_m: f64| 12.0 / (side_m * side_m);
+        let xx = told(self.xx) + size(extent.length_m());
+        let Some(width_m) = extent.width_m() else { return 1.0 / xx.sqrt() };
+        let (yy, xy) = (told(self.yy) + size(width_m), told(self.xy));
         ((xx + yy) / (xx * yy - xy * xy)).sqrt()
     }
 }
@@ -157,16 +179,45 @@ fn living(layout: &Layout) -> impl Iterator<Item = usize> {
     (0..layout.len()).filter(|s| !layout.sensors()[*s].channel.dead)
 }
 
-/// Readings brought to the mean force, where forces are known.
-fn at_one_force(recording: &Recording) -> Vec<Vec<f64>> {
+/// Readings of presses brought to their mean force, where forces are known: the part of each that is beyond its channel's offset
+/// grows with the force.
+fn at_one_force(presses: &Recording, offsets: &[f64]) -> Vec<Vec<f64>> {
     let forces: Option<Vec<f64>> =
-        recording.rows.iter().map(|row| row.force_n.filter(|force_n| *force_n > 0.0)).collect();
+        presses.rows.iter().map(|row| row.force_n.filter(|force_n| *force_n > 0.0)).collect();
     let mean = forces.as_ref().map(|forces| mean(forces.iter().copied()));
-    let scaled = |(i, row): (usize, &palpate_estimators::recording::Row)| {
+    let scaled = |(i, row): (usize, &Row)| {
         let factor = forces.as_ref().zip(mean).map_or(1.0, |(forces, mean)| mean / forces[i]);
-        row.reading.iter().map(|value| factor * value).collect()
+        row.reading.iter().zip(offsets).map(|(value, offset)| offset + factor * (value - offset)).collect()
     };
-    recording.rows.iter().enumerate().map(scaled).collect()
+    presses.rows.iter().enumerate().map(scaled).collect()
+}
+
+/// What every channel reads while nothing touches: the mean of the untouched rows, or else what presses of one position at several
+/// forces tell, reading = offset + force × g(position) in least squares with a g of its own for each position. Zeros where
+/// neither is there.
+fn offsets(recording: &Recording) -> Vec<f64> {
+    if let Some(untouched) = recording.untouched_mean() {
+        return untouched;
+    }
+    let (mut sums, mut weight) = (vec![0.0; recording.channels.len()], 0.0);
+    for position in recording.distinct_positions() {
+        let rows = recording.rows.iter().filter(|row| row.position == position);
+        let pressed: Vec<(f64, &[f64])> =
+            rows.filter_map(|row| Some((row.force_n?, row.reading.as_slice()))).collect();
+        let squares: f64 = pressed.iter().map(|(force_n, _)| force_n * force_n).sum();
+        let total_n: f64 = pressed.iter().map(|(force_n, _)| force_n).sum();
+        if squares > 0.0 {
+            // What is left of 1 beside the force at the position: the part by which a reading tells the offset.
+            let slope = total_n / squares;
+            for (force_n, reading) in &pressed {
+                let left = 1.0 - slope * force_n;
+                weight += left;
+                sums.iter_mut().zip(*reading).for_each(|(sum, value)| *sum += left * value);
+            }
+        }
+    }
+    let is_told = weight > NEGLIGIBLE_SPREAD * recording.rows.len() as f64;
+    sums.into_iter().map(|sum| if is_told { sum / weight } else { 0.0 }).collect()
 }
 
 /// Standard deviation of a channel about its means at each position; `None` where no position was pressed twice.

@@ -27,7 +27,7 @@ pub struct NextPress {
 /// influence functions counts as noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Advice {
-    /// Rows of the recording.
+    /// Rows of the recording in which something touched.
     pub presses: usize,
     /// Places that were pressed.
     pub positions: usize,
@@ -98,16 +98,17 @@ pub fn next_press(
     let contacts = design.weighted_contacts(extent)?;
     let forward = ForwardModel::from_recording(recording, setup.layout(), extent, setup.force(), watch)?;
     let mut expected = ExpectedError::new(&forward, &contacts, extent);
-    let pressed = recording.distinct_positions();
+    let presses = recording.touched();
+    let pressed = presses.distinct_positions();
     let first = expected.places.len();
     expected.places.extend(&pressed);
     let mut posterior = Posterior::prior(&forward, &expected.places);
     for (i, position) in pressed.iter().enumerate() {
-        let rows = recording.rows.iter().filter(|row| row.position == *position).count();
+        let rows = presses.rows.iter().filter(|row| row.position == *position).count();
         posterior.condition(first + i, 1.0 / rows as f64);
     }
     let mut advice = Advice {
-        presses: recording.rows.len(),
+        presses: presses.rows.len(),
         positions: pressed.len(),
         error_m: expected.error_m(|place| posterior.variance(place)),
         endless_error_m: expected.error_m(|_| 0.0),

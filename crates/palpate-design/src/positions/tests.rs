@@ -4,6 +4,7 @@ use super::search::reads_mirrored;
 use super::variance::{ExpectedError, Posterior};
 use super::*;
 use crate::contacts::ContactPrior;
+use palpate_estimators::recording::Row;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::sensing::{Sensor, SensorKind};
 use palpate_mechanics::surface::plate::PlateSpec;
@@ -105,8 +106,10 @@ fn the_limit_by_learnt_slopes_is_the_limit_by_mechanics() {
     let limit = setup.cramer_rao_bound().unwrap();
     for x_m in [0.05, 0.13, 0.25, 0.33] {
         let contact = palpate_mechanics::contact::Contact { position: Position::along(x_m), force_n: 3.0 };
-        let (ours, theirs) =
-            (forward.limit_m(contact.position), limit.bound_at(contact, Force::Known).unwrap().sd_position_m);
+        let (ours, theirs) = (
+            forward.information(contact.position).sd_m(1.0, *BEAM),
+            limit.bound_at(contact, Force::Known).unwrap().sd_position_m,
+        );
         assert!((ours / theirs - 1.0).abs() < 0.02, "{x_m}: {ours} {theirs}");
     }
 }
@@ -206,6 +209,46 @@ fn the_next_press_is_where_nobody_pressed_and_lowers_the_error() {
     assert!(first.error_m < 0.5 * advice.error_m);
     assert!(advice.next.windows(2).all(|pair| pair[1].error_m < pair[0].error_m));
     assert!(advice.endless_error_m < advice.next.last().unwrap().error_m);
+}
+
+#[test]
+fn the_expected_error_is_never_more_than_a_guess() {
+    let guess_m = 0.4 / 12f64.sqrt();
+    // Presses in the middle tell next to nothing of the readings near the ends.
+    let advice = advised(&[0.19, 0.195, 0.2, 0.205, 0.21], 5);
+    assert!(advice.error_m < guess_m && advice.error_m > 0.3 * guess_m, "{} {guess_m}", advice.error_m);
+    let forward = forward(&noisy().setup);
+    let contacts = WeightedContacts::from_prior(&ContactPrior::all_over(*BEAM), *BEAM).unwrap();
+    let expected = ExpectedError::new(&forward, &contacts, *BEAM);
+    let prior_m = expected.error_m(|_| f64::MAX / 2.0);
+    assert!((prior_m / guess_m - 1.0).abs() < 1e-6, "{prior_m} {guess_m}");
+}
+
+/// Presses of 1, 2 and 4 N at every position on channels of counts, which read 5,000 while nothing touches.
+fn in_counts(positions_m: &[f64], untouched: usize) -> (Setup, palpate_estimators::recording::Recording) {
+    let (setup, mut recording) = begun(positions_m, 3);
+    for (row, force_n) in recording.rows.iter_mut().zip([1.0, 2.0, 4.0].into_iter().cycle()) {
+        // The simulated ones are of 3 N; their noise stays, so what a count is differs little from press to press.
+        row.reading.iter_mut().for_each(|value| *value = 5e3 + 1e6 * *value * force_n / 3.0);
+        row.force_n = Some(force_n);
+    }
+    let nothing =
+        Row { force_n: Some(0.0), reading: vec![5e3; recording.channels.len()], ..recording.rows[0].clone() };
+    recording.rows.extend(std::iter::repeat_n(nothing, untouched));
+    (setup, recording)
+}
+
+#[test]
+fn offsets_and_untouched_rows_do_not_count_as_noise() {
+    let positions_m = [0.02, 0.06, 0.1, 0.14, 0.18, 0.22, 0.26, 0.3, 0.34, 0.38];
+    let plain = advised(&positions_m, 3);
+    for untouched in [0, 12] {
+        let (setup, recording) = in_counts(&positions_m, untouched);
+        let advice = next_press(&setup, &recording, &PositionDesign::default(), Watch::NONE).unwrap();
+        assert_eq!((advice.presses, advice.positions), (30, 10));
+        let beside_plain = advice.error_m / plain.error_m;
+        assert!((0.8..1.25).contains(&beside_plain), "{untouched} untouched: {advice:?} beside {plain:?}");
+    }
 }
 
 #[test]

@@ -1,13 +1,14 @@
 //! Positions that leave the least variance of influence functions learnt as Gaussian processes.
 //!
-//! With noise of 1 a reading and a variance v left in what it should be, a locator sees noise of √(1 + v): it is off by the
-//! limit times that. The mean over the contacts is made small by greedy choice and exchange (Krause, Singh and Guestrin, *Journal
-//! of Machine Learning Research* 9, 2008, choose sensors of fields so).
+//! With noise of 1 a reading and a variance v left in what it should be, a locator sees noise of √(1 + v): a reading tells
+//! 1/(1 + v) of the information that it has at the limit, and the surface's size the rest, so where nothing is known yet the error is
+//! that of a guess. The mean over the contacts is made small by greedy choice and exchange (Krause, Singh and Guestrin, *Journal of
+//! Machine Learning Research* 9, 2008, choose sensors of fields so).
 
 use ndarray::Array2;
 
 use super::design::PositionDesign;
-use super::forward::ForwardModel;
+use super::forward::{ForwardModel, Information};
 use crate::contacts::WeightedContacts;
 use palpate_estimators::arrangement::cells;
 use palpate_mechanics::contact::Position;
@@ -28,7 +29,8 @@ pub(super) struct ExpectedError {
     pub places: Vec<Position>,
     sites: usize,
     weights: Vec<f64>,
-    limits_m: Vec<f64>,
+    information: Vec<Information>,
+    extent: Extent,
 }
 
 impl ExpectedError {
@@ -44,8 +46,9 @@ impl ExpectedError {
         Self {
             sites,
             weights,
-            limits_m: places[sites..].iter().map(|at| forward.limit_m(*at)).collect(),
+            information: places[sites..].iter().map(|at| forward.information(*at)).collect(),
             places,
+            extent,
         }
     }
 
@@ -54,11 +57,11 @@ impl ExpectedError {
         0..self.sites
     }
 
-    /// The mean over the contacts of limit × √(1 + v), in metres; `variance` is of a place.
+    /// The mean over the contacts of the standard deviation with which they are located, in metres; `variance` is of a place.
     pub fn error_m(&self, variance: impl Fn(usize) -> f64) -> f64 {
-        let contacts = self.weights.iter().zip(&self.limits_m).enumerate();
+        let contacts = self.weights.iter().zip(&self.information).enumerate();
         contacts
-            .map(|(i, (weight, limit_m))| weight * limit_m * (1.0 + variance(self.sites + i)).sqrt())
+            .map(|(i, (weight, told))| weight * told.sd_m(1.0 + variance(self.sites + i), self.extent))
             .sum()
     }
 

@@ -55,8 +55,7 @@ impl Assessment {
     /// [`Cancelled`] when the watch stopped it.
     pub fn new(rig: &Rig, recording: &Recording, seed: u64, watch: Watch) -> Result<Self, Cancelled> {
         let mut own = Self::default();
-        let touched = recording.touched();
-        if touched.distinct_positions().len() >= FOLDS {
+        if recording.distinct_positions().len() >= FOLDS {
             let task = FitTask::new(&rig.setup, recording).seed(seed).watch(watch);
             match cross_validate(&rig.estimator, task, FOLDS) {
                 Ok(evaluation) => {
@@ -71,7 +70,7 @@ impl Assessment {
             }
         }
         let design = rig.training.as_ref().map_or_else(PositionDesign::default, PositionDesign::for_training);
-        match next_press(&rig.setup, &touched, &design, watch) {
+        match next_press(&rig.setup, recording, &design, watch) {
             Ok(advice) => {
                 let percent = advice.remaining_gain_percent();
                 own.gain = Some(Gain { percent, stop_percent: advice.stop_percent });
