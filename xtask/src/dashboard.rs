@@ -52,14 +52,38 @@ pub fn wait(building: Option<Building>) -> Result<bool> {
     building.map_or(Ok(true), |building| building.join().unwrap_or_else(|panic| resume_unwind(panic)))
 }
 
-/// Runs the tests of the dashboard and, in a browser, those of the server that was built with it.
-pub fn test(root: &Path, skips: Skips, skipped: &Skipped) -> Result<(bool, Option<Counts>)> {
-    if !NODE.is_there(root) {
+/// Tests of the dashboard that run, and what they come to.
+pub type Testing = JoinHandle<Result<Tested>>;
+
+/// What the tests of the dashboard came to.
+pub struct Tested {
+    succeeded: bool,
+    counts: Option<Counts>,
+    /// All that they printed.
+    lines: Vec<String>,
+}
+
+/// Begins the tests of the dashboard and, in a browser, those of the server that was built with it, in the background: a page that is tested mostly
+/// waits. `None` without Node.
+pub fn begin_tests(root: &Path, skips: Skips, skipped: &Skipped) -> Option<Testing> {
+    let (root, skipped) = (root.to_path_buf(), skipped.clone());
+    NODE.is_there(&root).then(|| thread::spawn(move || tested(&root, skips, &skipped)))
+}
+
+/// Waits for the tests of the dashboard, and shows what they printed.
+pub fn end_tests(testing: Option<Testing>, skips: Skips) -> Result<(bool, Option<Counts>)> {
+    let Some(testing) = testing else {
         println!("{}", NODE.describe());
         return Ok((skips == Skips::Pass, None));
-    }
+    };
+    let tested = testing.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+    tested.lines.iter().for_each(|line| println!("{line}"));
+    Ok((tested.succeeded, tested.counts))
+}
+
+fn tested(root: &Path, skips: Skips, skipped: &Skipped) -> Result<Tested> {
     let before = skipped.lines()?.len();
-    let (mut succeeded, mut counts) = (true, None);
+    let mut tested = Tested { succeeded: true, counts: None, lines: Vec::new() };
     for script in ["test", "browser-test"] {
         let mut tests = npm(root, &["run", "--silent", script]);
         tests.env("NO_COLOR", "1").env(skipped::VARIABLE, &skipped.file);
@@ -71,13 +95,15 @@ pub fn test(root: &Path, skips: Skips, skipped: &Skipped) -> Result<(bool, Optio
             Skips::Fail => tests.env(STRICT, "1"),
             Skips::Pass => tests.env_remove(STRICT),
         };
-        let watched = run::watched(&mut tests)?;
-        succeeded &= watched.succeeded;
-        counts =
-            [counts, Counts::of_vitest(&watched.lines)].into_iter().flatten().reduce(|sum, more| sum + more);
+        let kept = run::kept(&mut tests)?;
+        tested.succeeded &= kept.succeeded;
+        let counts = Counts::of_vitest(&kept.lines);
+        tested.counts = [tested.counts, counts].into_iter().flatten().reduce(|sum, more| sum + more);
+        tested.lines.extend(kept.lines);
     }
     let skips = skipped.lines()?.len() - before;
-    Ok((succeeded, counts.map(|counts| counts.with_skips(skips))))
+    tested.counts = tested.counts.map(|counts| counts.with_skips(skips));
+    Ok(tested)
 }
 
 /// Installs what `web/package-lock.json` names, where that has changed since the last time.

@@ -6,8 +6,8 @@ use std::thread;
 
 use anyhow::{Context, Result};
 
-/// Result of a command that was watched.
-pub struct Watched {
+/// Result of a command whose output was kept.
+pub struct Kept {
     /// Whether it exited with 0.
     pub succeeded: bool,
     /// Everything it printed, without colours: its output first, then its error output.
@@ -21,7 +21,7 @@ pub fn shown(command: &mut Command) -> Result<bool> {
 }
 
 /// Runs a command, shows what it prints as it comes, and keeps it.
-pub fn watched(command: &mut Command) -> Result<Watched> {
+pub fn watched(command: &mut Command) -> Result<Kept> {
     if io::stderr().is_terminal() {
         command.env("CARGO_TERM_COLOR", "always");
     }
@@ -36,7 +36,15 @@ pub fn watched(command: &mut Command) -> Result<Watched> {
     })
     .with_context(|| format!("cannot pass on the output of {command:?}"))?;
     let status = child.wait().with_context(|| format!("cannot wait for {command:?}"))?;
-    Ok(Watched { succeeded: status.success(), lines })
+    Ok(Kept { succeeded: status.success(), lines })
+}
+
+/// Runs a command and keeps what it prints, without showing it.
+pub fn kept(command: &mut Command) -> Result<Kept> {
+    let output = command.stdin(Stdio::null()).output().with_context(|| cannot_start(command))?;
+    let text = [output.stdout, output.stderr].concat();
+    let lines = String::from_utf8_lossy(&text).lines().map(without_colours).collect();
+    Ok(Kept { succeeded: output.status.success(), lines })
 }
 
 /// True when the program can be started and exits with 0, whatever it prints.
@@ -96,9 +104,11 @@ mod tests {
 
     #[test]
     fn both_streams_of_a_command_are_kept() {
-        let watched = watched(Command::new("sh").args(["-c", "echo out; echo err >&2; exit 3"])).unwrap();
-        assert!(!watched.succeeded);
-        assert_eq!(watched.lines, ["out", "err"]);
+        for run in [watched, kept] {
+            let kept = run(Command::new("sh").args(["-c", "echo out; echo err >&2; exit 3"])).unwrap();
+            assert!(!kept.succeeded);
+            assert_eq!(kept.lines, ["out", "err"]);
+        }
     }
 
     #[test]

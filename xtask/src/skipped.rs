@@ -23,6 +23,7 @@ pub enum Skips {
 }
 
 /// The file of one run.
+#[derive(Clone)]
 pub struct Skipped {
     /// Its path.
     pub file: PathBuf,

@@ -38,7 +38,7 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     // Python's environment and the dashboard are made while the compiler waits for one crate or another; the server holds the dashboard.
     let environment = python::make_environment(root);
     let dashboard = dashboard::begin_build(root);
-    let steps = [
+    let mut steps = vec![
         prerequisites,
         step("formatting", || shown(root, &["fmt", "--all", "--check"]))?,
         step("fuzz lock", || {
@@ -53,15 +53,19 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
             Ok((has_dashboard && succeeded, counts))
         })?,
         step("tests", || tests(root, skips, &skipped, &everything))?,
+    ];
+    // The dashboard's tests wait for presses and pages; one core has room for them beside the compiler's and Python's work.
+    let testing = dashboard::begin_tests(root, skips, &skipped);
+    steps.extend([
         step("doc tests", || watched(cargo(root, &[&["test", "--doc"], &everything[..]].concat())))?,
         step("docs", || {
             let mut docs = cargo(root, &[&["doc", "--no-deps"], &everything[..]].concat());
             Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
         })?,
         step("Python tests", || python::test(root, skips, environment, &tested))?,
-        step("dashboard", || dashboard::test(root, skips, &skipped))?,
+        step("dashboard", || dashboard::end_tests(testing, skips))?,
         step("tidy", || Ok((tidy::run(root)?, None)))?,
-    ];
+    ]);
     let lines = skipped.lines()?;
     print!("\n{}", closing(&steps, &missing, &lines));
     Ok(steps.iter().all(|step| step.succeeded))

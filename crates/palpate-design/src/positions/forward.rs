@@ -13,6 +13,7 @@ use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean;
 use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, Samples};
+use palpate_numerics::small::dot;
 use palpate_numerics::watch::Watch;
 
 /// Positions at which a model is asked, along a line and along each side of a plane.
@@ -23,6 +24,8 @@ const ASKED_ON_A_PLANE: usize = 14;
 const NOMINAL_NOISE: f64 = 1e-4;
 /// Distinct positions without which nobody knows how smooth a function is.
 const FEWEST_POSITIONS: usize = 4;
+/// Rounds in which presses are brought to one amplitude.
+const AMPLITUDE_ROUNDS: usize = 8;
 /// Variance of the forces at one position, of their squared mean, below which they are one force.
 const NEGLIGIBLE_SPREAD: f64 = 1e-12;
 
@@ -31,6 +34,8 @@ pub(super) struct ForwardModel {
     process: GaussianProcess,
     /// The variance of the functions before any press, the sensors' mean.
     signal_variance: f64,
+    /// Noise variance of the presses that it was learnt from, in units of a reading's: less than 1 where a press is the mean of many readings, 0 where it is clean.
+    press_variance: f64,
     extent: Extent,
     force: Force,
 }
@@ -59,7 +64,8 @@ impl ForwardModel {
         Self::fit(&positions, &clean, &sds, 0.0, extent, force, watch)
     }
 
-    /// Model of a bench from a recording begun, whose noise its repeats tell, or else the layout; untouched rows tell the offsets.
+    /// Model of a bench from a recording begun, whose noise its repeats tell, or else the layout, and no reading in use has less than the layout
+    /// says; untouched rows tell the offsets.
     pub fn from_recording(
         recording: &Recording,
         layout: &Layout,
@@ -75,24 +81,31 @@ impl ForwardModel {
         if found < FEWEST_POSITIONS {
             return Err(PositionError::TooFewPresses { found, needed: FEWEST_POSITIONS });
         }
-        let scaled = at_one_force(&presses, &offsets(recording));
+        let mut scaled = at_one_force(&presses, &offsets(recording));
         let sds = living(layout).map(|s| {
             let stated = layout.sensors()[s].channel.reading_sd();
             let sd = scatter(&presses, &scaled, s).unwrap_or(stated);
             if sd > 0.0 { Ok((s, sd)) } else { Err(PositionError::NoNoise { channel: s + 1 }) }
         });
-        let sds = sds.collect::<Result<Vec<_>, _>>()?;
+        let mut sds = sds.collect::<Result<Vec<_>, _>>()?;
+        if force == Force::Unknown && sds.len() > 1 {
+            at_one_amplitude(&presses, &mut scaled, &mut sds);
+        }
+        // A press may be the mean of the readings of a second; what is located are single ones.
+        let in_use = sds.iter().map(|&(s, sd)| (s, sd.max(layout.sensors()[s].channel.reading_sd())));
+        let in_use: Vec<(usize, f64)> = in_use.collect();
+        let press_variance = mean(sds.iter().zip(&in_use).map(|((_, press), (_, sd))| (press / sd).powi(2)));
         let positions: Vec<Position> = presses.rows.iter().map(|row| row.position).collect();
-        Self::fit(&positions, &scaled, &sds, 1.0, extent, force, watch)
+        Self::fit(&positions, &scaled, &in_use, press_variance, extent, force, watch)
     }
 
     /// Fits to readings at some positions: those of the sensors in `sds`, divided by their standard deviations, then have the
-    /// `noise_variance`.
+    /// `press_variance`.
     fn fit(
         positions: &[Position],
         readings: &[Vec<f64>],
         sds: &[(usize, f64)],
-        noise_variance: f64,
+        press_variance: f64,
         extent: Extent,
         force: Force,
         watch: Watch,
@@ -106,12 +119,17 @@ impl ForwardModel {
         let samples = Samples {
             coordinates: coordinates.view(),
             outputs: whitened.view(),
-            noise_variance: Some(&vec![noise_variance; rows]),
+            noise_variance: Some(&vec![press_variance; rows]),
         };
         let process = Regression::default().fit(samples, watch)?;
         let outputs = process.outputs();
         let signal_variance = mean((0..outputs).map(|j| process.signal_variance(j)));
-        Ok(Self { process, signal_variance, extent, force })
+        Ok(Self { process, signal_variance, press_variance, extent, force })
+    }
+
+    /// Noise variance of a press, in units of a reading's.
+    pub fn press_variance(&self) -> f64 {
+        self.press_variance
     }
 
     /// The covariance of a whitened reading's function at two positions before any press.
@@ -179,17 +197,57 @@ fn living(layout: &Layout) -> impl Iterator<Item = usize> {
     (0..layout.len()).filter(|s| !layout.sensors()[*s].channel.dead)
 }
 
-/// Readings of presses brought to their mean force, where forces are known: the part of each that is beyond its channel's offset
-/// grows with the force.
+/// Readings of presses beyond their channels' offsets, which grow with the force, brought to the mean force where forces are known.
 fn at_one_force(presses: &Recording, offsets: &[f64]) -> Vec<Vec<f64>> {
     let forces: Option<Vec<f64>> =
         presses.rows.iter().map(|row| row.force_n.filter(|force_n| *force_n > 0.0)).collect();
     let mean = forces.as_ref().map(|forces| mean(forces.iter().copied()));
     let scaled = |(i, row): (usize, &Row)| {
         let factor = forces.as_ref().zip(mean).map_or(1.0, |(forces, mean)| mean / forces[i]);
-        row.reading.iter().zip(offsets).map(|(value, offset)| offset + factor * (value - offset)).collect()
+        row.reading.iter().zip(offsets).map(|(value, offset)| factor * (value - offset)).collect()
     };
     presses.rows.iter().enumerate().map(scaled).collect()
+}
+
+/// Brings the presses of each position to one amplitude, as locating at an unknown force looks at the shape of a reading alone: however hard
+/// they were, or at whatever depth, is no noise. Updates the channels' standard deviations, by what is left across the mean.
+///
+/// With readings in units of their noise, u, and their mean m at the position, u becomes u − (u·m/m·m − 1)·m; of a channel's
+/// variance 1 − m_j²/m·m is left.
+fn at_one_amplitude(presses: &Recording, readings: &mut [Vec<f64>], sds: &mut [(usize, f64)]) {
+    let groups: Vec<Vec<usize>> = presses
+        .distinct_positions()
+        .into_iter()
+        .map(|position| (0..readings.len()).filter(|&i| presses.rows[i].position == position).collect())
+        .filter(|rows: &Vec<usize>| rows.len() > 1)
+        .collect();
+    // What counts as across the mean depends on the noise, and converges in a few rounds.
+    for _ in 0..AMPLITUDE_ROUNDS {
+        let (mut squares, mut freedom) = (vec![0.0; sds.len()], vec![0.0; sds.len()]);
+        for rows in &groups {
+            let whitened = |&i: &usize| sds.iter().map(|&(s, sd)| readings[i][s] / sd).collect();
+            let presses: Vec<Vec<f64>> = rows.iter().map(whitened).collect();
+            let mean: Vec<f64> = (0..sds.len()).map(|j| mean(presses.iter().map(|u| u[j]))).collect();
+            let size = dot(&mean, &mean);
+            if size == 0.0 {
+                continue;
+            }
+            for (&i, u) in rows.iter().zip(&presses) {
+                let excess = dot(u, &mean) / size - 1.0;
+                for (j, &(s, sd)) in sds.iter().enumerate() {
+                    readings[i][s] -= excess * mean[j] * sd;
+                    squares[j] += (u[j] - (1.0 + excess) * mean[j]).powi(2);
+                }
+            }
+            let repeats = (rows.len() - 1) as f64;
+            freedom.iter_mut().zip(&mean).for_each(|(sum, m)| *sum += repeats * (1.0 - m * m / size));
+        }
+        for (j, (_, sd)) in sds.iter_mut().enumerate() {
+            if squares[j] > 0.0 && freedom[j] > 0.0 {
+                *sd *= (squares[j] / freedom[j]).sqrt();
+            }
+        }
+    }
 }
 
 /// What every channel reads while nothing touches: the mean of the untouched rows, or else what presses of one position at several

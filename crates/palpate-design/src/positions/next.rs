@@ -97,6 +97,7 @@ pub fn next_press(
     OutOfRange::check("greater than 0 and less than 100", stop, |percent| percent > 0.0 && percent < 100.0)?;
     let contacts = design.weighted_contacts(extent)?;
     let forward = ForwardModel::from_recording(recording, setup.layout(), extent, setup.force(), watch)?;
+    let press_variance = forward.press_variance();
     let mut expected = ExpectedError::new(&forward, &contacts, extent);
     let presses = recording.touched();
     let pressed = presses.distinct_positions();
@@ -105,7 +106,7 @@ pub fn next_press(
     let mut posterior = Posterior::prior(&forward, &expected.places);
     for (i, position) in pressed.iter().enumerate() {
         let rows = presses.rows.iter().filter(|row| row.position == *position).count();
-        posterior.condition(first + i, 1.0 / rows as f64);
+        posterior.condition(first + i, press_variance / rows as f64);
     }
     let mut advice = Advice {
         presses: presses.rows.len(),
@@ -120,8 +121,8 @@ pub fn next_press(
     }
     while advice.next.len() < MOST_AHEAD && !advice.reaches_goal() {
         watch.round()?;
-        let (site, error_m) = expected.best(&posterior, 1.0);
-        posterior.condition(site, 1.0);
+        let (site, error_m) = expected.best(&posterior, press_variance);
+        posterior.condition(site, press_variance);
         advice.next.push(NextPress { position: expected.places[site], error_m });
     }
     Ok(advice)

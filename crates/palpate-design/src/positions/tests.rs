@@ -252,6 +252,45 @@ fn offsets_and_untouched_rows_do_not_count_as_noise() {
 }
 
 #[test]
+fn how_hard_presses_were_does_not_count_as_noise_where_the_force_is_unknown() {
+    let positions_m = [0.02, 0.06, 0.1, 0.14, 0.18, 0.22, 0.26, 0.3, 0.34, 0.38];
+    let advice = |recording: &palpate_estimators::recording::Recording| {
+        let setup = noisy().setup.unknown_force();
+        next_press(&setup, recording, &PositionDesign::default(), Watch::NONE).unwrap()
+    };
+    let (_, plain) = begun(&positions_m, 6);
+    let mut by_hand = plain.clone();
+    for (row, share) in by_hand.rows.iter_mut().zip([0.7, 0.85, 0.95, 1.05, 1.15, 1.3].into_iter().cycle()) {
+        row.reading.iter_mut().for_each(|value| *value *= share);
+        row.force_n = None;
+    }
+    let (plain, by_hand) = (advice(&plain), advice(&by_hand));
+    let [error, endless] = [by_hand.error_m / plain.error_m, by_hand.endless_error_m / plain.endless_error_m];
+    assert!((0.8..1.25).contains(&error) && (0.8..1.25).contains(&endless), "{by_hand:?} beside {plain:?}");
+}
+
+#[test]
+fn presses_that_are_means_of_readings_promise_no_better_readings() {
+    let positions_m = [0.02, 0.06, 0.1, 0.14, 0.18, 0.22, 0.26, 0.3, 0.34, 0.38];
+    let plain = advised(&positions_m, 40);
+    let (setup, mut means) = begun(&positions_m, 40);
+    // Means of twenty readings each.
+    means.rows = means
+        .rows
+        .chunks(20)
+        .map(|rows| {
+            let reading =
+                (0..8).map(|c| palpate_numerics::mean(rows.iter().map(|row| row.reading[c]))).collect();
+            Row { reading, ..rows[0].clone() }
+        })
+        .collect();
+    let advice = next_press(&setup, &means, &PositionDesign::default(), Watch::NONE).unwrap();
+    assert_eq!(advice.presses, 20);
+    let ratio = advice.error_m / plain.error_m;
+    assert!((0.9..1.1).contains(&ratio), "{advice:?} beside {plain:?}");
+}
+
+#[test]
 fn enough_is_said_when_little_is_left_to_gain() {
     let all: Vec<f64> = (0..40).map(|i| 0.005 + 0.01 * f64::from(i)).collect();
     let advice = advised(&all, 10);

@@ -6,6 +6,7 @@ use crate::input::{self, RecordingFiles};
 use crate::json::object;
 use crate::output::{self, Table};
 use crate::progress::Observer;
+use crate::remark::remark;
 use crate::target::{Inputs, Target, TargetFolder};
 use palpate_design::positions::{
     Advice, Placed, Placement, PositionDesign, PositionError, PositionProblem, best_placed, next_press,
@@ -290,6 +291,11 @@ const SHOWN: usize = 5;
 /// Prints advice on the next presses.
 fn advise(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(), Failure> {
     let design = what_to_design(arguments, rig);
+    if recording.rows.iter().any(|row| !row.nuisances.is_empty()) {
+        remark!(
+            "remark: what the nuisance coordinate changes counts as noise, so the errors expected here are too large"
+        );
+    }
     let advice = Observer::of_stages()
         .watch(|watch| next_press(&rig.setup, recording, &design, watch))
         .map_err(|error| complaint(&error, &arguments.rig))?;
