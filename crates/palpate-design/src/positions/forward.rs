@@ -24,6 +24,8 @@ const ASKED_ON_A_PLANE: usize = 14;
 const NOMINAL_NOISE: f64 = 1e-4;
 /// Distinct positions without which nobody knows how smooth a function is.
 const FEWEST_POSITIONS: usize = 4;
+/// How smooth readings may be.
+const KERNELS: [Kernel; 3] = [Kernel::Matern32, Kernel::Matern52, Kernel::SquaredExponential];
 /// Rounds in which presses are brought to one amplitude.
 const AMPLITUDE_ROUNDS: usize = 8;
 /// Variance of the forces at one position, of their squared mean, below which they are one force.
@@ -32,6 +34,8 @@ const NEGLIGIBLE_SPREAD: f64 = 1e-12;
 /// Whitened readings as functions of position.
 pub(super) struct ForwardModel {
     process: GaussianProcess,
+    /// Its correlation: of the kernels that were tried, the one under which the readings are the most probable.
+    kernel: Kernel,
     /// The variance of the functions before any press, the sensors' mean.
     signal_variance: f64,
     /// Noise variance of the presses that it was learnt from, in units of a reading's: less than 1 where a press is the mean of many readings, 0 where it is clean.
@@ -121,10 +125,15 @@ impl ForwardModel {
             outputs: whitened.view(),
             noise_variance: Some(&vec![press_variance; rows]),
         };
-        let process = Regression::default().fit(samples, watch)?;
+        let mut fitted = Vec::new();
+        for kernel in KERNELS {
+            fitted.push((kernel, Regression { kernel, ..Regression::default() }.fit(samples, watch)?));
+        }
+        fitted.sort_by(|(_, a), (_, b)| a.log_evidence().total_cmp(&b.log_evidence()));
+        let (kernel, process) = fitted.pop().expect("there are kernels");
         let outputs = process.outputs();
         let signal_variance = mean((0..outputs).map(|j| process.signal_variance(j)));
-        Ok(Self { process, signal_variance, press_variance, extent, force })
+        Ok(Self { process, kernel, signal_variance, press_variance, extent, force })
     }
 
     /// Noise variance of a press, in units of a reading's.
@@ -137,7 +146,7 @@ impl ForwardModel {
         let scales = &self.process.hyperparameters().length_scales;
         let r2: f64 =
             [a.x_m - b.x_m, a.y_m - b.y_m].iter().zip(scales).map(|(d, scale)| (d / scale).powi(2)).sum();
-        self.signal_variance * Kernel::Matern52.correlation(r2)
+        self.signal_variance * self.kernel.correlation(r2)
     }
 
     /// What a reading tells of a position once everything is calibrated, by the expected readings' slopes.

@@ -290,6 +290,14 @@ fn presses_that_are_means_of_readings_promise_no_better_readings() {
     assert!((0.9..1.1).contains(&ratio), "{advice:?} beside {plain:?}");
 }
 
+/// A beam's readings are smoother than the roughest functions that are tried, so a few places tell the rest.
+#[test]
+fn smooth_readings_leave_little_to_gain_after_few_presses() {
+    let advice = advised(&[0.04, 0.12, 0.2, 0.28, 0.36], 3);
+    let gain_percent = advice.remaining_gain_percent();
+    assert!((5.0..40.0).contains(&gain_percent), "{gain_percent} %: {advice:?}");
+}
+
 #[test]
 fn enough_is_said_when_little_is_left_to_gain() {
     let all: Vec<f64> = (0..40).map(|i| 0.005 + 0.01 * f64::from(i)).collect();
