@@ -26,6 +26,7 @@
 mod design;
 mod forward;
 mod next;
+mod presses;
 mod search;
 mod variance;
 

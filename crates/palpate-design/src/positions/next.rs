@@ -6,11 +6,13 @@ use super::variance::{ExpectedError, Posterior};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
-use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
+use palpate_numerics::{OutOfRange, random_order};
 
 /// Presses that are looked ahead, at most.
 const MOST_AHEAD: usize = 200;
+/// Positions of a recording that are looked at, at most: of more, that many drawn at random, which leave a little more to gain than all do.
+const MOST_PRESSED: usize = 1000;
 
 /// A press to come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,17 +102,18 @@ pub fn next_press(
     let press_variance = forward.press_variance();
     let mut expected = ExpectedError::new(&forward, &contacts, extent);
     let presses = recording.touched();
-    let pressed = presses.distinct_positions();
+    let positions = presses.distinct_positions();
+    let pressed = few_of(&positions, &presses);
     let first = expected.places.len();
-    expected.places.extend(&pressed);
+    expected.places.extend(pressed.iter().map(|(position, _)| position));
     let mut posterior = Posterior::prior(&forward, &expected.places);
-    for (i, position) in pressed.iter().enumerate() {
-        let rows = presses.rows.iter().filter(|row| row.position == *position).count();
-        posterior.condition(first + i, press_variance / rows as f64);
+    for (i, (_, rows)) in pressed.iter().enumerate() {
+        watch.round()?;
+        posterior.condition(first + i, press_variance / *rows as f64);
     }
     let mut advice = Advice {
         presses: presses.rows.len(),
-        positions: pressed.len(),
+        positions: positions.len(),
         error_m: expected.error_m(|place| posterior.variance(place)),
         endless_error_m: expected.error_m(|_| 0.0),
         next: Vec::new(),
@@ -126,4 +129,17 @@ pub fn next_press(
         advice.next.push(NextPress { position: expected.places[site], error_m });
     }
     Ok(advice)
+}
+
+/// Some positions of a recording, all of them up to [`MOST_PRESSED`], each with the number of its presses.
+fn few_of(positions: &[Position], presses: &Recording) -> Vec<(Position, usize)> {
+    let mut numbers: Vec<usize> = vec![0; positions.len()];
+    for row in &presses.rows {
+        if let Ok(i) = positions.binary_search_by(|position| position.cmp_by_x_then_y(&row.position)) {
+            numbers[i] += 1;
+        }
+    }
+    let mut drawn: Vec<usize> = random_order(positions.len(), 0).into_iter().take(MOST_PRESSED).collect();
+    drawn.sort_unstable();
+    drawn.into_iter().map(|i| (positions[i], numbers[i])).collect()
 }

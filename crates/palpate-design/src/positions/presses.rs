@@ -1,0 +1,150 @@
+//! Presses of a recording begun as readings of the position alone, and their noise.
+//!
+//! Readings are taken beyond what the channels read untouched, and brought to one force; where the force is unknown in use, to one amplitude.
+
+use super::design::PositionError;
+use palpate_estimators::recording::{Recording, Row};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::limit::Force;
+use palpate_mechanics::sensing::Layout;
+use palpate_numerics::mean;
+use palpate_numerics::small::dot;
+
+/// Distinct positions without which nobody knows how smooth a function is.
+const FEWEST_POSITIONS: usize = 4;
+/// Rounds in which presses are brought to one amplitude.
+const AMPLITUDE_ROUNDS: usize = 8;
+/// Variance of the forces at one position, of their squared mean, below which they are one force.
+const NEGLIGIBLE_SPREAD: f64 = 1e-12;
+
+/// Presses of the living channels.
+pub(super) struct Presses {
+    /// Position of each press.
+    pub positions: Vec<Position>,
+    /// Reading of each press beyond the offsets, a value for each living channel.
+    pub readings: Vec<Vec<f64>>,
+    /// Standard deviation of a press at one position, of each living channel.
+    pub sds: Vec<f64>,
+}
+
+impl Presses {
+    /// Presses of a recording of the channels of a layout. Their noise is that of repeats, or else the layout's.
+    pub fn new(recording: &Recording, layout: &Layout, force: Force) -> Result<Self, PositionError> {
+        if recording.channels.len() != layout.len() {
+            return Err(PositionError::Channels { needed: layout.len(), found: recording.channels.len() });
+        }
+        let touched: Vec<&Row> = recording.rows.iter().filter(|row| row.touches()).collect();
+        let groups = by_position(&touched);
+        if groups.len() < FEWEST_POSITIONS {
+            return Err(PositionError::TooFewPresses { found: groups.len(), needed: FEWEST_POSITIONS });
+        }
+        let offsets = recording
+            .untouched_mean()
+            .or_else(|| offsets(&touched, &groups, layout.len()))
+            .unwrap_or_default();
+        let living: Vec<usize> = living(layout).collect();
+        let mut readings = at_one_force(&touched, &living, &offsets);
+        let repeated: Vec<Vec<usize>> = groups.into_iter().filter(|group| group.len() > 1).collect();
+        let sds = living.iter().enumerate().map(|(j, &s)| {
+            let stated = layout.sensors()[s].channel.reading_sd();
+            let sd = scatter(&readings, &repeated, j).unwrap_or(stated);
+            if sd > 0.0 { Ok(sd) } else { Err(PositionError::NoNoise { channel: s + 1 }) }
+        });
+        let mut sds = sds.collect::<Result<Vec<f64>, _>>()?;
+        if force == Force::Unknown && sds.len() > 1 {
+            bring_to_one_amplitude(&mut readings, &repeated, &mut sds);
+        }
+        Ok(Self { positions: touched.iter().map(|row| row.position).collect(), readings, sds })
+    }
+}
+
+/// Indices of the sensors that are alive.
+pub(super) fn living(layout: &Layout) -> impl Iterator<Item = usize> {
+    (0..layout.len()).filter(|s| !layout.sensors()[*s].channel.dead)
+}
+
+/// Indices of the presses of each position.
+fn by_position(presses: &[&Row]) -> Vec<Vec<usize>> {
+    let order = |a: &usize, b: &usize| presses[*a].position.cmp_by_x_then_y(&presses[*b].position);
+    let mut indices: Vec<usize> = (0..presses.len()).collect();
+    indices.sort_by(order);
+    indices.chunk_by(|a, b| order(a, b).is_eq()).map(<[usize]>::to_vec).collect()
+}
+
+/// What every channel reads while nothing touches, as presses of one position at several forces tell it: reading = offset + force × g(position)
+/// in least squares, with a g of its own for each position. `None` where they do not.
+fn offsets(presses: &[&Row], groups: &[Vec<usize>], channels: usize) -> Option<Vec<f64>> {
+    let (mut sums, mut weight) = (vec![0.0; channels], 0.0);
+    for group in groups {
+        let forces: Vec<f64> = group.iter().map(|&i| presses[i].force_n).collect::<Option<_>>()?;
+        // What is left of 1 beside the force at the position: the part by which a reading tells the offset.
+        let slope = forces.iter().sum::<f64>() / dot(&forces, &forces);
+        for (&i, force_n) in group.iter().zip(&forces) {
+            let left = 1.0 - slope * force_n;
+            weight += left;
+            sums.iter_mut().zip(&presses[i].reading).for_each(|(sum, value)| *sum += left * value);
+        }
+    }
+    let is_told = weight > NEGLIGIBLE_SPREAD * presses.len() as f64;
+    is_told.then(|| sums.into_iter().map(|sum| sum / weight).collect())
+}
+
+/// Readings of some channels beyond their offsets, where there are any, brought to the mean force where forces are known.
+fn at_one_force(presses: &[&Row], channels: &[usize], offsets: &[f64]) -> Vec<Vec<f64>> {
+    let forces: Option<Vec<f64>> =
+        presses.iter().map(|row| row.force_n.filter(|force_n| *force_n > 0.0)).collect();
+    let mean = forces.as_ref().map(|forces| mean(forces.iter().copied()));
+    let scaled = |(i, row): (usize, &&Row)| {
+        let factor = forces.as_ref().zip(mean).map_or(1.0, |(forces, mean)| mean / forces[i]);
+        let beyond = |&s: &usize| row.reading[s] - offsets.get(s).unwrap_or(&0.0);
+        channels.iter().map(|s| factor * beyond(s)).collect()
+    };
+    presses.iter().enumerate().map(scaled).collect()
+}
+
+/// Standard deviation of a channel about its means at each position; `None` where no position was pressed twice.
+fn scatter(readings: &[Vec<f64>], repeated: &[Vec<usize>], channel: usize) -> Option<f64> {
+    let (mut squares, mut freedom) = (0.0, 0usize);
+    for group in repeated {
+        let mean = mean(group.iter().map(|&i| readings[i][channel]));
+        squares += group.iter().map(|&i| (readings[i][channel] - mean).powi(2)).sum::<f64>();
+        freedom += group.len() - 1;
+    }
+    (freedom > 0).then(|| (squares / freedom as f64).sqrt()).filter(|sd| *sd > 0.0)
+}
+
+/// Brings the presses of each position to one amplitude, as locating at an unknown force looks at the shape of a reading alone: however hard
+/// they were, or at whatever depth, is no noise. Updates the channels' standard deviations, by what is left across the mean.
+///
+/// With readings in units of their noise, u, and their mean m at the position, u becomes u − (u·m/m·m − 1)·m; of a channel's
+/// variance 1 − m_j²/m·m is left.
+fn bring_to_one_amplitude(readings: &mut [Vec<f64>], repeated: &[Vec<usize>], sds: &mut [f64]) {
+    // What counts as across the mean depends on the noise, and converges in a few rounds.
+    for _ in 0..AMPLITUDE_ROUNDS {
+        let (mut squares, mut freedom) = (vec![0.0; sds.len()], vec![0.0; sds.len()]);
+        for group in repeated {
+            let whitened =
+                |&i: &usize| readings[i].iter().zip(sds.iter()).map(|(value, sd)| value / sd).collect();
+            let presses: Vec<Vec<f64>> = group.iter().map(whitened).collect();
+            let mean: Vec<f64> = (0..sds.len()).map(|j| mean(presses.iter().map(|u| u[j]))).collect();
+            let size = dot(&mean, &mean);
+            if size == 0.0 {
+                continue;
+            }
+            for (&i, u) in group.iter().zip(&presses) {
+                let excess = dot(u, &mean) / size - 1.0;
+                for (j, sd) in sds.iter().enumerate() {
+                    readings[i][j] -= excess * mean[j] * sd;
+                    squares[j] += (u[j] - (1.0 + excess) * mean[j]).powi(2);
+                }
+            }
+            let repeats = (group.len() - 1) as f64;
+            freedom.iter_mut().zip(&mean).for_each(|(sum, m)| *sum += repeats * (1.0 - m * m / size));
+        }
+        for ((sd, squares), freedom) in sds.iter_mut().zip(squares).zip(freedom) {
+            if squares > 0.0 && freedom > 0.0 {
+                *sd *= (squares / freedom).sqrt();
+            }
+        }
+    }
+}
