@@ -190,7 +190,7 @@ def next_press(advice: NextPress, *, ax: Axes | None = None) -> Axes:
     canvas.level(1e3 * advice.endless_error, "endlessly many presses")
     enough = 1e3 * advice.endless_error / (1 - advice.stop_below) if advice.stop_below < 1 else np.nan
     canvas.ax.axhline(enough, color=canvas.colour(1), linewidth=1.0, linestyle="--", label="enough")
-    canvas.ax.set_ylim(bottom=0)
+    canvas.ax.set_ylim(0, 1.1 * np.nanmax(np.r_[error, enough]))
     canvas.ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     canvas.labels("presses to come", "expected error, mm")
     canvas.legend()
