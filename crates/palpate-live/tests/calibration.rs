@@ -1,10 +1,12 @@
 //! A hand that does what the guide of a calibration asks for.
 
+use palpate_core::Status;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulatedBench;
+
 use palpate_live::calibration::{Guide, Press, Progress, Waiting};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_rig::Rig;
@@ -91,10 +93,10 @@ fn presses_are_taken_at_rest_and_the_locator_is_near_the_limit() {
     for (row, press) in presses.iter().zip(&plan) {
         assert_eq!((row.position, row.force_n), (press.position, press.force_n));
         let clean = hand.bench.clean(&[Contact { position: press.position, force_n: FORCE_N }]);
-        // At rest by half a percent of the reading; the noise is 5 µm, of a mean less.
+        // At rest by half a percent of the reading; the noise is 5 µm.
         let size = clean.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
         for (value, clean) in row.reading.iter().zip(&clean) {
-            assert!((value - clean).abs() < 5e-6 + 0.01 * size, "{value} {clean}");
+            assert!((value - clean).abs() < 25e-6 + 0.01 * size, "{value} {clean}");
         }
     }
     let locator = fitted(&rig, rows);
@@ -102,6 +104,52 @@ fn presses_are_taken_at_rest_and_the_locator_is_near_the_limit() {
         locator.locate(&hand.bench.clean(&[Contact { position: Position::along(0.1234), force_n: FORCE_N }]));
     let x_m = estimate.unwrap().contact.position.x_m;
     assert!((x_m - 0.1234).abs() < 1e-3, "{x_m}");
+}
+
+/// The beam as a board without a model, of whose noise nothing is said.
+const BOARD: &str = r#"
+[surface]
+kind = "measured"
+length = "400 mm"
+
+[sensors]
+measure = "raw"
+count = 8
+
+[recording]
+position = "position"
+position_unit = "mm"
+force = "force"
+channels = [2, 3, 4, 5, 6, 7, 8, 9]
+
+[estimator]
+kind = "influence"
+"#;
+
+#[test]
+fn a_board_learns_the_noise_of_the_readings_that_it_will_locate() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let mut guide = Guide::new(plan(&rig));
+    let mut hand = Hand::new(&rig.setup);
+    let rows = hand.obey(&mut guide, 100_000);
+    let locator = fitted(&Rig::from_toml(BOARD).unwrap(), rows);
+    hand.contact = None;
+    (0..400).for_each(|_| drop(hand.reading()));
+    let untouched = (0..500).filter(|_| {
+        let (_, reading) = hand.reading();
+        locator.locate(&reading).unwrap().status == Status::NoContact
+    });
+    let untouched = untouched.count();
+    assert!(untouched >= 490, "{untouched} of 500 untouched readings are `no_contact`");
+    let held = (0..200).filter(|i| {
+        let x_m = 0.04 + 0.32 * f64::from(*i) / 199.0;
+        let clean = hand.bench.clean(&[Contact { position: Position::along(x_m), force_n: FORCE_N }]);
+        let estimate = locator.locate(&hand.bench.measure(&clean)).unwrap();
+        let (low_m, high_m) = estimate.contact.uncertainty.unwrap().x_95_m;
+        (low_m..=high_m).contains(&x_m)
+    });
+    let held = held.count();
+    assert!((180..=200).contains(&held), "{held} of 200 intervals hold their contact");
 }
 
 #[test]

@@ -199,3 +199,20 @@ fn a_machine_that_is_not_there_and_a_rig_without_a_stage_are_told_with_a_remedy(
     let words = calibrate("tcp://127.0.0.1:1");
     assert!(words.contains("gcode:serial:///dev/ttyUSB0"), "{words}");
 }
+
+#[test]
+fn a_board_whose_frames_are_no_readings_is_told_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
+    let mut child = palpate(folder.path())
+        .args(["calibrate", "rig.toml", "--from", "-", "--presses", "presses.csv", "--out", "locator.json"])
+        .stdin(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all("left:1.5,right:2.5\n".repeat(150).as_bytes()).unwrap();
+    let complaint = complained(&child.wait_with_output().unwrap(), 3);
+    let told = "none of 100 frames is a reading of the channels `reaction_1_n`, `reaction_2_n`: a channel is missing; name them in the rig as";
+    assert_eq!(complaint.matches(told).count(), 1, "{complaint}");
+    assert!(complaint.contains("150 frames were no reading: a channel is missing"), "{complaint}");
+}

@@ -1,4 +1,7 @@
 //! The guide of a calibration: which press comes next, and when its reading is taken.
+//!
+//! Means of a stretch tell that a surface is at rest; what is taken of it is its last reading alone. A locator learns from the rows how noisy a reading
+//! is, and readings in use are single ones: from means it would learn noise that is too small by the root of their number.
 
 use super::settling::{Baseline, Stretch};
 use palpate_estimators::recording::Row;
@@ -55,13 +58,23 @@ pub struct Guide {
     baseline: Option<Baseline>,
     /// Mean reading of the press that is held or was let go last.
     pressed: Vec<f64>,
+    /// Mean of the stretch whose last reading was taken last.
+    taken_mean: Vec<f64>,
 }
 
 impl Guide {
     /// A guide through a plan.
     pub fn new(plan: Vec<Press>) -> Self {
         let waiting = if plan.is_empty() { Waiting::Nothing } else { Waiting::Untouched };
-        Self { plan, next: 0, waiting, stretch: Stretch::default(), baseline: None, pressed: Vec::new() }
+        Self {
+            plan,
+            next: 0,
+            waiting,
+            stretch: Stretch::default(),
+            baseline: None,
+            pressed: Vec::new(),
+            taken_mean: Vec::new(),
+        }
     }
 
     /// The press that is next, and how many are planned; `None` after the last.
@@ -83,20 +96,25 @@ impl Guide {
     pub fn add(&mut self, at: Duration, reading: &[f64]) -> Progress {
         self.stretch.add(at, reading);
         match (self.waiting, &self.baseline) {
-            (Waiting::Untouched, _) => self.learn_baseline(at),
+            (Waiting::Untouched, _) => self.learn_baseline(at, reading),
             (Waiting::Press, Some(baseline)) if baseline.is_pressed(reading) => self.wait(Waiting::Rest),
             (Waiting::Rest, Some(baseline)) => match baseline.settled(&self.stretch) {
                 // A press that was let go before it came to rest.
                 Some(mean) if !baseline.is_pressed(&mean) => self.wait(Waiting::Press),
-                Some(mean) => self.take_press(at, mean),
+                Some(mean) => self.take_press(at, reading, mean),
                 None => Progress::None,
             },
             (Waiting::Release, Some(baseline)) => match baseline.released(&self.stretch, &self.pressed) {
-                Some(mean) => self.take_untouched(at, mean),
+                Some(mean) => self.take_untouched(at, reading, mean),
                 None => Progress::None,
             },
             _ => Progress::None,
         }
+    }
+
+    /// Mean of the stretch at rest whose last reading was taken last.
+    pub fn taken_mean(&self) -> &[f64] {
+        &self.taken_mean
     }
 
     /// Takes back the last press, which is asked for again; false where there is none.
@@ -153,35 +171,38 @@ impl Guide {
         Progress::Waits(waiting)
     }
 
-    fn learn_baseline(&mut self, at: Duration) -> Progress {
+    fn learn_baseline(&mut self, at: Duration, reading: &[f64]) -> Progress {
         match Baseline::learn(&self.stretch) {
             Some(baseline) => {
                 let mean = baseline.mean.clone();
                 self.baseline = Some(baseline);
-                self.take_untouched(at, mean)
+                self.take_untouched(at, reading, mean)
             }
             None => Progress::None,
         }
     }
 
-    fn take_press(&mut self, at: Duration, mean: Vec<f64>) -> Progress {
+    fn take_press(&mut self, at: Duration, reading: &[f64], mean: Vec<f64>) -> Progress {
         let Some(press) = self.plan.get(self.next).copied() else { return Progress::None };
         self.next += 1;
         self.pressed.clone_from(&mean);
+        self.taken_mean = mean;
         self.wait(Waiting::Release);
-        Progress::Taken(row(press.position, press.force_n, at, mean))
+        Progress::Taken(row(press.position, press.force_n, at, reading))
     }
 
     /// The untouched surface: its row, and the baseline from now on.
-    fn take_untouched(&mut self, at: Duration, mean: Vec<f64>) -> Progress {
+    fn take_untouched(&mut self, at: Duration, reading: &[f64], mean: Vec<f64>) -> Progress {
         if let Some(baseline) = &mut self.baseline {
             baseline.mean.clone_from(&mean);
         }
+        self.taken_mean = mean;
         self.wait(if self.next < self.plan.len() { Waiting::Press } else { Waiting::Nothing });
-        Progress::Taken(row(Position::default(), Some(0.0), at, mean))
+        Progress::Taken(row(Position::default(), Some(0.0), at, reading))
     }
 }
 
-fn row(position: Position, force_n: Option<f64>, at: Duration, reading: Vec<f64>) -> Row {
-    Row { position, force_n, nuisances: Vec::new(), time_s: Some(at.as_secs_f64()), reading }
+fn row(position: Position, force_n: Option<f64>, at: Duration, reading: &[f64]) -> Row {
+    let (time_s, reading) = (Some(at.as_secs_f64()), reading.to_vec());
+    Row { position, force_n, nuisances: Vec::new(), time_s, reading }
 }

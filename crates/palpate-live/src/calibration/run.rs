@@ -29,6 +29,9 @@ pub enum CalibrationError {
     },
 }
 
+/// Frames without a reading among them after which it is said that there is none.
+const UNREAD: u64 = 100;
+
 /// Note on what a calibration has read or done.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Note {
@@ -36,6 +39,8 @@ pub enum Note {
     Opened(String),
     /// The source went away, and is looked for again; why.
     Lost(String),
+    /// Many frames and not one reading: why, and what a reading must have.
+    Unread(String),
     /// The source has no more.
     Ended,
     /// Something else is waited for.
@@ -66,6 +71,8 @@ pub struct Calibration {
     guide: Guide,
     journal: Journal,
     decoder: Decoder,
+    /// Names by which a board may call the channels, the load cell's among them.
+    labels: Vec<String>,
     health: HealthWatch,
     load_cell: Option<LoadCell>,
     /// Frames that were no reading, by cause.
@@ -106,6 +113,7 @@ impl Calibration {
             guide: Guide::new(plan),
             journal,
             decoder,
+            labels: channels.into_iter().map(|channel| channel.label).collect(),
             health: HealthWatch::new(setup.layout()),
             load_cell,
             bad: BTreeMap::new(),
@@ -173,13 +181,25 @@ impl Calibration {
         for frame in frames {
             match frame {
                 Ok(Frame { reading, .. }) => self.add(arrived.at.elapsed, &reading, notes)?,
-                Err(cause) => *self.bad.entry(cause).or_default() += 1,
+                Err(cause) => {
+                    *self.bad.entry(cause).or_default() += 1;
+                    notes.extend(self.unread(cause));
+                }
             }
         }
         if arrived.arrival == Arrival::Ended {
             notes.push(Note::Ended);
         }
         Ok(())
+    }
+
+    /// A note where the last of many frames was no reading either, for this cause.
+    fn unread(&self, cause: BadFrame) -> Option<Note> {
+        let is_time = self.readings == 0 && self.bad.values().sum::<u64>() == UNREAD;
+        let labels = self.labels.join("`, `");
+        let words =
+            format!("none of {UNREAD} frames is a reading of the channels `{labels}`: {}", cause.describe());
+        is_time.then_some(Note::Unread(words))
     }
 
     fn add(&mut self, at: Duration, reading: &[f64], notes: &mut Vec<Note>) -> Result<(), CalibrationError> {
@@ -215,10 +235,11 @@ impl Calibration {
         Ok(())
     }
 
-    /// A row whose force is that of the load cell, where there is one.
+    /// A row whose force is that of the load cell, where there is one: the mean of the stretch at rest, as a force is no reading that is located.
     fn weighed(&mut self, mut row: Row) -> Result<Row, CalibrationError> {
         let Some(cell) = &mut self.load_cell else { return Ok(row) };
-        let Some(read_n) = row.reading.pop() else { return Ok(row) };
+        let Some(&read_n) = self.guide.taken_mean().last() else { return Ok(row) };
+        row.reading.pop();
         if row.touches() {
             let force_n = read_n - cell.untouched_n.unwrap_or(0.0);
             if force_n <= 0.0 {

@@ -31,6 +31,11 @@ impl Shared {
             Note::Lost(why) => {
                 (self.source, self.problem) = (None, Some(format!("the source went away: {why}")));
             }
+            Note::Unread(words) => {
+                self.problem = Some(format!(
+                    "{words}; name them in the rig as the board does, or in columns= of the source"
+                ));
+            }
             Note::Ended => {
                 (self.source, self.problem) = (None, Some("the source has ended".to_owned()));
             }
