@@ -8,7 +8,7 @@ use palpate_numerics::regression::Kernel;
 /// Structure, influence functions, offsets, noise and disturbances: a line for each.
 pub fn learnt(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     let channels =
-        linear.channels().map(|(c, offset, noise)| format!("{}: {offset:.4} ± {noise:.2}", names[c]));
+        linear.channels().map(|(c, offset, noise)| format!("{}: {}", names[c], with_noise(offset, noise)));
     let presses = format_count(linear.presses() as u64);
     let mut lines = vec![
         "reading = offset + force × influence(position), learnt from the recording".to_owned(),
@@ -18,6 +18,12 @@ pub fn learnt(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     ];
     lines.extend(disturbances(linear, names));
     lines
+}
+
+/// A value and its noise, of which three digits are shown.
+fn with_noise(value: f64, noise: f64) -> String {
+    let decimals = (2.0 - noise.log10().floor()).clamp(0.0, 15.0) as usize;
+    format!("{value:.decimals$} ± {noise:.decimals$}")
 }
 
 /// Structure, drift, scatter and what was set aside, for the summary of a fit.
@@ -129,4 +135,17 @@ fn influences(linear: &ForceLinearLocator) -> String {
     };
     let rest = smooth.map(|smooth| format!(", and {smooth}")).unwrap_or_default();
     format!("those of sensors of {kind} at places that the presses tell, polynomials{rest}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_noise;
+
+    #[test]
+    fn noise_has_three_digits_of_any_size() {
+        assert_eq!(with_noise(282.5181, 1.0234), "282.52 ± 1.02");
+        assert_eq!(with_noise(0.000_123_4, 0.002_011), "0.00012 ± 0.00201");
+        assert_eq!(with_noise(51_234.6, 1234.5), "51235 ± 1234");
+        assert_eq!(with_noise(1.0, 0.0), "1.000000000000000 ± 0.000000000000000");
+    }
 }
