@@ -191,8 +191,13 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
         interval(&told.total_n, "N")
     ))?;
     let Seen { margin_mm, low_n, high_n } = told.seen;
+    let seen = if high_n.is_finite() {
+        format!("{low_n:.3} to {high_n:.3} N")
+    } else {
+        format!("{low_n:.3} N or more")
+    };
     output::say(format!(
-        "                    {low_n:.3} to {high_n:.3} N where nothing lies within {margin_mm:.0} mm of an edge"
+        "                    {seen} where nothing lies within {margin_mm:.0} mm of an edge"
     ))?;
     output::say(format!("centre of pressure  {}", interval(centre, "mm")))?;
     if let Some(across) = &told.centre_y_mm {

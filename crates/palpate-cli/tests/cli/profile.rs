@@ -116,3 +116,11 @@ fn what_cannot_be_told_is_refused_in_words() {
     };
     insta::assert_snapshot!(cases.iter().map(complaint).collect::<Vec<_>>().join("\n"));
 }
+
+#[test]
+fn a_total_without_an_upper_end_is_said_as_such() {
+    let bench = LOAD_PROFILE.split("[[load]]").next().unwrap();
+    let folder = folder(format!("{bench}[[load]]\nfrom = \"2 mm\"\nto = \"6 mm\"\nforce = \"0.2 N\"\n"));
+    let told = said(&run(folder.path(), &["profile", "rig.toml"]));
+    assert!(told.contains(" N or more where nothing lies within") && !told.contains("inf"), "{told}");
+}

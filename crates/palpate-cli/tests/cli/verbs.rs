@@ -156,3 +156,12 @@ fn the_force_has_an_interval_and_a_word_where_it_trades_off_against_the_place() 
     let rows = json.lines().count();
     assert!(trading > 0 && trading < rows / 2, "{trading} of {rows}");
 }
+
+#[test]
+fn a_recording_without_a_touch_has_no_positions() {
+    let folder = folder(crate::support::board::RIG);
+    let text = "Position,Force,g1,g2,g3,g4,g5,g6\n0,0,1,2,3,4,5,6\n0,0,2,3,4,5,6,7\n";
+    std::fs::write(folder.path().join("untouched.csv"), text).unwrap();
+    let told = said(&run(folder.path(), &["inspect", "untouched.csv", "--rig", "rig.toml"]));
+    assert!(told.contains("2 rows at 0 positions") && !told.contains("inf"), "{told}");
+}

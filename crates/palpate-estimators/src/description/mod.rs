@@ -110,10 +110,11 @@ pub fn recording(recording: &Recording, setup: &Setup) -> Vec<String> {
         Extent::Line { .. } => ends(|at| at.x_m),
         Extent::Plane { .. } => format!("{} along, {} across", ends(|at| at.x_m), ends(|at| at.y_m)),
     };
-    let mut lines = vec![
-        format!("a recording: {} rows at {} positions", recording.rows.len(), positions.len()),
-        format!("positions: {positioned}"),
-    ];
+    let mut lines =
+        vec![format!("a recording: {} rows at {} positions", recording.rows.len(), positions.len())];
+    if !positions.is_empty() {
+        lines.push(format!("positions: {positioned}"));
+    }
     for (i, (name, kind)) in recording.channels.iter().zip(&recording.kinds).enumerate() {
         let (low, high) = range(&mut recording.rows.iter().map(|row| row.reading[i]));
         let shown = |value| Quantity { value, dimension: kind.dimension() };
