@@ -199,9 +199,14 @@ pub enum PositionError {
         /// Least number.
         needed: usize,
     },
+    /// Presses of forces that differ on a surface without a model, of whose readings without contact nothing is known.
+    #[error(
+        "the forces of the presses differ, and nothing says what the channels read while nothing touches"
+    )]
+    NoOffset,
     /// A channel of unknown noise.
     #[error(
-        "nothing says how noisy channel {channel} is: no position was pressed twice, and the setup states no noise"
+        "nothing says how noisy channel {channel} is: no position was pressed twice, or its repeats are equal, and the setup states no noise"
     )]
     NoNoise {
         /// Which channel, from 1.

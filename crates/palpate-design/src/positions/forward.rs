@@ -9,7 +9,6 @@ use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
-use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean;
 use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, Samples};
@@ -66,19 +65,14 @@ impl ForwardModel {
     }
 
     /// Model of a bench from a recording begun; no reading in use has less noise than the layout says.
-    pub fn from_recording(
-        recording: &Recording,
-        layout: &Layout,
-        extent: Extent,
-        force: Force,
-        watch: Watch,
-    ) -> Result<Self, PositionError> {
-        let Presses { positions, readings, sds } = Presses::new(recording, layout, force)?;
+    pub fn from_recording(recording: &Recording, setup: &Setup, watch: Watch) -> Result<Self, PositionError> {
+        let (layout, extent) = (setup.layout(), setup.surface().extent());
+        let Presses { positions, readings, sds } = Presses::new(recording, setup)?;
         // A press may be the mean of the readings of a second; what is located are single ones.
         let stated = living(layout).map(|s| layout.sensors()[s].channel.reading_sd());
         let in_use: Vec<f64> = sds.iter().zip(stated).map(|(sd, stated)| sd.max(stated)).collect();
         let press_variance = mean(sds.iter().zip(&in_use).map(|(press, sd)| (press / sd).powi(2)));
-        Self::fit(&positions, &readings, &in_use, press_variance, extent, force, watch)
+        Self::fit(&positions, &readings, &in_use, press_variance, extent, setup.force(), watch)
     }
 
     /// Fits to readings of the living channels at some positions: divided by the standard deviations, they have the

@@ -98,7 +98,7 @@ pub fn next_press(
     let stop = [("the gain in % that is worth a press", stop_percent)];
     OutOfRange::check("greater than 0 and less than 100", stop, |percent| percent > 0.0 && percent < 100.0)?;
     let contacts = design.weighted_contacts(extent)?;
-    let forward = ForwardModel::from_recording(recording, setup.layout(), extent, setup.force(), watch)?;
+    let forward = ForwardModel::from_recording(recording, setup, watch)?;
     let press_variance = forward.press_variance();
     let mut expected = ExpectedError::new(&forward, &contacts, extent);
     let presses = recording.touched();

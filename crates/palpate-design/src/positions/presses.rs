@@ -4,6 +4,7 @@
 
 use super::design::PositionError;
 use palpate_estimators::recording::{Recording, Row};
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::Layout;
@@ -28,8 +29,9 @@ pub(super) struct Presses {
 }
 
 impl Presses {
-    /// Presses of a recording of the channels of a layout. Their noise is that of repeats, or else the layout's.
-    pub fn new(recording: &Recording, layout: &Layout, force: Force) -> Result<Self, PositionError> {
+    /// Presses of a recording of a setup. Their noise is that of repeats, or else the setup's; the sensors of a model have no offsets.
+    pub fn new(recording: &Recording, setup: &Setup) -> Result<Self, PositionError> {
+        let layout = setup.layout();
         if recording.channels.len() != layout.len() {
             return Err(PositionError::Channels { needed: layout.len(), found: recording.channels.len() });
         }
@@ -38,10 +40,11 @@ impl Presses {
         if groups.len() < FEWEST_POSITIONS {
             return Err(PositionError::TooFewPresses { found: groups.len(), needed: FEWEST_POSITIONS });
         }
-        let offsets = recording
-            .untouched_mean()
-            .or_else(|| offsets(&touched, &groups, layout.len()))
-            .unwrap_or_default();
+        let offsets = recording.untouched_mean().or_else(|| offsets(&touched, &groups, layout.len()));
+        if offsets.is_none() && setup.surface().model().is_none() && forces_differ(&touched) {
+            return Err(PositionError::NoOffset);
+        }
+        let offsets = offsets.unwrap_or_default();
         let living: Vec<usize> = living(layout).collect();
         let mut readings = at_one_force(&touched, &living, &offsets);
         let repeated: Vec<Vec<usize>> = groups.into_iter().filter(|group| group.len() > 1).collect();
@@ -51,7 +54,7 @@ impl Presses {
             if sd > 0.0 { Ok(sd) } else { Err(PositionError::NoNoise { channel: s + 1 }) }
         });
         let mut sds = sds.collect::<Result<Vec<f64>, _>>()?;
-        if force == Force::Unknown && sds.len() > 1 {
+        if setup.force() == Force::Unknown && sds.len() > 1 {
             bring_to_one_amplitude(&mut readings, &repeated, &mut sds);
         }
         Ok(Self { positions: touched.iter().map(|row| row.position).collect(), readings, sds })
@@ -69,6 +72,12 @@ fn by_position(presses: &[&Row]) -> Vec<Vec<usize>> {
     let mut indices: Vec<usize> = (0..presses.len()).collect();
     indices.sort_by(order);
     indices.chunk_by(|a, b| order(a, b).is_eq()).map(<[usize]>::to_vec).collect()
+}
+
+/// True where presses have forces, and not all the same.
+fn forces_differ(presses: &[&Row]) -> bool {
+    let mut forces = presses.iter().filter_map(|row| row.force_n);
+    forces.next().is_some_and(|first_n| forces.any(|force_n| force_n != first_n))
 }
 
 /// What every channel reads while nothing touches, as presses of one position at several forces tell it: reading = offset + force × g(position)

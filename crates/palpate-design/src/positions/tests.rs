@@ -321,3 +321,15 @@ fn a_recording_that_tells_too_little_is_refused() {
     assert!(refused(&setup, &recording).contains("8 channels; the setup has 7"));
     assert_eq!(setup.layout().kinds()[0], SensorKind::Deflection);
 }
+
+#[test]
+fn forces_that_differ_need_a_reading_without_contact() {
+    let positions_m: Vec<f64> = (0..12).map(|i| 0.02 + 0.03 * f64::from(i)).collect();
+    let (_, mut recording) = in_counts(&positions_m, 0);
+    // One press of each position, of 1, 2 and 4 N in turn.
+    let rows = recording.rows.into_iter().enumerate();
+    recording.rows = rows.filter(|(i, _)| i % 3 == i / 3 % 3).map(|(_, row)| row).collect();
+    let setup = Setup::measured(0.4, &["1", "2", "3", "4", "5", "6", "7", "8"]).unwrap();
+    let refused = next_press(&setup, &recording, &PositionDesign::default(), Watch::NONE).unwrap_err();
+    assert!(matches!(refused, PositionError::NoOffset), "{refused}");
+}
