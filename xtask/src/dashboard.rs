@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::io::ErrorKind;
-use std::panic::resume_unwind;
 use std::path::Path;
 use std::process::Command;
 use std::thread::{self, JoinHandle};
@@ -49,13 +48,13 @@ pub fn begin_build(root: &Path) -> Option<Building> {
 
 /// Waits for a dashboard; true where there is none to wait for.
 pub fn wait(building: Option<Building>) -> Result<bool> {
-    building.map_or(Ok(true), |building| building.join().unwrap_or_else(|panic| resume_unwind(panic)))
+    building.map_or(Ok(true), run::joined)
 }
 
-/// Tests of the dashboard that run, and what they come to.
+/// Tests of the dashboard that run, with their result.
 pub type Testing = JoinHandle<Result<Tested>>;
 
-/// What the tests of the dashboard came to.
+/// Result of the dashboard's tests.
 pub struct Tested {
     succeeded: bool,
     counts: Option<Counts>,
@@ -76,7 +75,7 @@ pub fn end_tests(testing: Option<Testing>, skips: Skips) -> Result<(bool, Option
         println!("{}", NODE.describe());
         return Ok((skips == Skips::Pass, None));
     };
-    let tested = testing.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+    let tested = run::joined(testing)?;
     tested.lines.iter().for_each(|line| println!("{line}"));
     Ok((tested.succeeded, tested.counts))
 }

@@ -2,7 +2,6 @@
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fs;
-use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::thread::{self, JoinHandle};
@@ -57,7 +56,7 @@ pub fn test(
     fs::copy(&built, &copied)
         .and_then(|_| fs::rename(&copied, &module))
         .with_context(|| format!("cannot copy {}", built.display()))?;
-    let environment = environment.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+    let environment = run::joined(environment)?;
     let mut tests = environment.pytest(root);
     tests.env("PYTHONPATH", root.join("python"));
     if skips == Skips::Fail {

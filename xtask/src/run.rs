@@ -1,8 +1,9 @@
 //! Running a command so that a person sees its output as it comes.
 
 use std::io::{self, BufRead, BufReader, IsTerminal, Read, Write};
+use std::panic::resume_unwind;
 use std::process::{Command, Stdio};
-use std::thread;
+use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, Result};
 
@@ -12,6 +13,11 @@ pub struct Kept {
     pub succeeded: bool,
     /// Everything it printed, without colours: its output first, then its error output.
     pub lines: Vec<String>,
+}
+
+/// Result of a thread that ends; its panic goes on here.
+pub fn joined<T>(thread: JoinHandle<T>) -> T {
+    thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
 /// Runs a command with nothing on its standard input; true when it exits with 0.

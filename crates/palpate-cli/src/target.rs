@@ -87,6 +87,13 @@ impl Target {
     pub fn new(path: &Path, inputs: &Inputs) -> Result<Self, Failure> {
         let target = Self { path: path.to_owned(), inputs: inputs.clone() };
         let place = target.place()?;
+        if let Some(name) = result_beside(&place) {
+            let complaint = format!(
+                "cannot write {}: it is a result of the study whose {name} is beside it",
+                path.display()
+            );
+            return Err(Complaint::new(complaint).help("name another file").into());
+        }
         check_takes_files(folder_of(&place)).map_err(|error| cannot("write", path, &error))?;
         Ok(target)
     }
@@ -132,6 +139,12 @@ impl Target {
             false => Err(refused(&format!("there is no folder {}", folder.display())).into()),
         }
     }
+}
+
+/// Another file of the study that a file is a result of, if it is there and is one.
+fn result_beside(place: &Path) -> Option<&'static str> {
+    let name = place.file_name()?.to_str().filter(|name| is_of_a_report(name) && place.exists())?;
+    OF_A_STUDY.into_iter().find(|other| *other != name && place.with_file_name(other).exists())
 }
 
 /// The reason why an entry of a folder must not be replaced by a file, whatever the command; `None` for a regular file.

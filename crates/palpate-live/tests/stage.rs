@@ -100,7 +100,7 @@ fn a_machine_calibrates_by_itself_to_the_limit() {
         let clean = bench.clean(machine.contact().as_slice());
         let at = Duration::from_millis(10) * reading_number;
         match guide.add(at, &bench.measure(&clean)) {
-            Progress::Taken(row) => rows.push(row),
+            Progress::Taken { row, .. } => rows.push(row),
             Progress::Waits(_) | Progress::None => {}
         }
         match (guide.waiting(), guide.next_press()) {

@@ -263,9 +263,7 @@ fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
         match note {
             Note::Opened(name) => remark!("readings from {name}"),
             Note::Lost(why) => remark!("the source went away: {why}; it is waited for"),
-            Note::Unread(words) => {
-                remark!("{words}; name them in the rig as the board does, or in columns= of --from");
-            }
+            Note::Unread(words) => remark!("{words}"),
             Note::Taken => {
                 let rows = calibration.journal().rows();
                 let off = calibration::last_deviation_percent(rows)

@@ -57,6 +57,10 @@ fn depth_and_temperature_are_fitted_located_and_evaluated() {
     assert!(mean_mm < 3.0, "{mean_mm} mm\n{located}");
     let judged = said(&run(folder.path(), &["evaluate", "rig.toml", "--data", "presses.csv"]));
     assert!(judged.contains("effective: 100.0 %"), "{judged}");
+    let advised = run(folder.path(), &["design", "positions", "rig.toml", "--data", "presses.csv"]);
+    said(&advised);
+    let warned = String::from_utf8_lossy(&advised.stderr);
+    assert!(warned.contains("warning: what the nuisance coordinate changes counts as noise"), "{warned}");
 }
 
 #[test]

@@ -173,6 +173,17 @@ fn finished_studies_are_kept() {
     assert!(complaint.contains("a study's results.json is there"), "{complaint}");
     assert_eq!((text(path, "out/networks.csv"), text(path, "out/results.json")), (networks.clone(), results));
 
+    // Nor by a command that writes one file.
+    fs::write(path.join("load.toml"), LOAD_PROFILE).unwrap();
+    for (arguments, name) in [
+        (&["fit", "rig.toml", "-o", "out/results.json"][..], "results.json"),
+        (&["simulate", "rig.toml", "-o", "out/networks.csv"], "networks.csv"),
+        (&["profile", "load.toml", "--report", "out/report.html"], "report.html"),
+    ] {
+        kept(path, arguments, &format!("out/{name}"), "it is a result of the study whose");
+    }
+    said(&run(path, &["fit", "rig.toml", "-o", "out/locator.json"]));
+
     // Fewer seeds: the results are of them, and no network is lost.
     let fewer = seeds("2", &["--resume"]);
     said(&fewer);

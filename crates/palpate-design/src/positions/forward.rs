@@ -4,7 +4,6 @@ use super::design::PositionError;
 use super::presses::{Presses, living};
 use ndarray::Array2;
 use palpate_estimators::arrangement::cells;
-use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
@@ -20,7 +19,7 @@ const ASKED_ON_A_PLANE: usize = 14;
 /// Noise of a sensor whose channel has none, as a share of its full scale: what is then left is the error of
 /// interpolating.
 const NOMINAL_NOISE: f64 = 1e-4;
-/// How smooth readings may be.
+/// Correlations of the process that are tried, from the roughest to the smoothest.
 const KERNELS: [Kernel; 3] = [Kernel::Matern32, Kernel::Matern52, Kernel::SquaredExponential];
 
 /// Whitened readings as functions of position.
@@ -30,8 +29,6 @@ pub(super) struct ForwardModel {
     kernel: Kernel,
     /// The variance of the functions before any press, the sensors' mean.
     signal_variance: f64,
-    /// Noise variance of the presses that it was learnt from, in units of a reading's: less than 1 where a press is the mean of many readings, 0 where it is clean.
-    press_variance: f64,
     extent: Extent,
     force: Force,
 }
@@ -64,15 +61,10 @@ impl ForwardModel {
         Self::fit(&positions, &clean, &sds, 0.0, extent, force, watch)
     }
 
-    /// Model of a bench from a recording begun; no reading in use has less noise than the layout says.
-    pub fn from_recording(recording: &Recording, setup: &Setup, watch: Watch) -> Result<Self, PositionError> {
-        let (layout, extent) = (setup.layout(), setup.surface().extent());
-        let Presses { positions, readings, sds } = Presses::new(recording, setup)?;
-        // A press may be the mean of the readings of a second; what is located are single ones.
-        let stated = living(layout).map(|s| layout.sensors()[s].channel.reading_sd());
-        let in_use: Vec<f64> = sds.iter().zip(stated).map(|(sd, stated)| sd.max(stated)).collect();
-        let press_variance = mean(sds.iter().zip(&in_use).map(|(press, sd)| (press / sd).powi(2)));
-        Self::fit(&positions, &readings, &in_use, press_variance, extent, setup.force(), watch)
+    /// Model of a bench from the presses of a recording begun.
+    pub fn from_presses(presses: &Presses, setup: &Setup, watch: Watch) -> Result<Self, PositionError> {
+        let Presses { positions, readings, reading_sds, variance, .. } = presses;
+        Self::fit(positions, readings, reading_sds, *variance, setup.surface().extent(), setup.force(), watch)
     }
 
     /// Fits to readings of the living channels at some positions: divided by the standard deviations, they have the
@@ -104,12 +96,7 @@ impl ForwardModel {
         let (kernel, process) = fitted.pop().expect("there are kernels");
         let outputs = process.outputs();
         let signal_variance = mean((0..outputs).map(|j| process.signal_variance(j)));
-        Ok(Self { process, kernel, signal_variance, press_variance, extent, force })
-    }
-
-    /// Noise variance of a press, in units of a reading's.
-    pub fn press_variance(&self) -> f64 {
-        self.press_variance
+        Ok(Self { process, kernel, signal_variance, extent, force })
     }
 
     /// The covariance of a whitened reading's function at two positions before any press.
@@ -120,7 +107,7 @@ impl ForwardModel {
         self.signal_variance * self.kernel.correlation(r2)
     }
 
-    /// What a reading tells of a position once everything is calibrated, by the expected readings' slopes.
+    /// Fisher information of a position in one reading once everything is calibrated, by the expected readings' slopes.
     pub fn information(&self, at: Position) -> Information {
         let (outputs, d) = (self.process.outputs(), self.process.coordinates());
         let (mut means, mut slopes) = (vec![0.0; outputs], vec![0.0; outputs * d]);

@@ -2,6 +2,7 @@
 
 use super::design::{PositionDesign, PositionError};
 use super::forward::ForwardModel;
+use super::presses::Presses;
 use super::variance::{ExpectedError, Posterior};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
@@ -98,22 +99,20 @@ pub fn next_press(
     let stop = [("the gain in % that is worth a press", stop_percent)];
     OutOfRange::check("greater than 0 and less than 100", stop, |percent| percent > 0.0 && percent < 100.0)?;
     let contacts = design.weighted_contacts(extent)?;
-    let forward = ForwardModel::from_recording(recording, setup, watch)?;
-    let press_variance = forward.press_variance();
+    let presses = Presses::new(recording, setup)?;
+    let forward = ForwardModel::from_presses(&presses, setup, watch)?;
     let mut expected = ExpectedError::new(&forward, &contacts, extent);
-    let presses = recording.touched();
-    let positions = presses.distinct_positions();
-    let pressed = few_of(&positions, &presses);
+    let pressed = few_of(&presses.places);
     let first = expected.places.len();
     expected.places.extend(pressed.iter().map(|(position, _)| position));
     let mut posterior = Posterior::prior(&forward, &expected.places);
-    for (i, (_, rows)) in pressed.iter().enumerate() {
+    for (i, (_, repeats)) in pressed.iter().enumerate() {
         watch.round()?;
-        posterior.condition(first + i, press_variance / *rows as f64);
+        posterior.condition(first + i, presses.variance / *repeats as f64);
     }
     let mut advice = Advice {
-        presses: presses.rows.len(),
-        positions: positions.len(),
+        presses: presses.positions.len(),
+        positions: presses.places.len(),
         error_m: expected.error_m(|place| posterior.variance(place)),
         endless_error_m: expected.error_m(|_| 0.0),
         next: Vec::new(),
@@ -124,22 +123,16 @@ pub fn next_press(
     }
     while advice.next.len() < MOST_AHEAD && !advice.reaches_goal() {
         watch.round()?;
-        let (site, error_m) = expected.best(&posterior, press_variance);
-        posterior.condition(site, press_variance);
+        let (site, error_m) = expected.best(&posterior, presses.variance);
+        posterior.condition(site, presses.variance);
         advice.next.push(NextPress { position: expected.places[site], error_m });
     }
     Ok(advice)
 }
 
-/// Some positions of a recording, all of them up to [`MOST_PRESSED`], each with the number of its presses.
-fn few_of(positions: &[Position], presses: &Recording) -> Vec<(Position, usize)> {
-    let mut numbers: Vec<usize> = vec![0; positions.len()];
-    for row in &presses.rows {
-        if let Ok(i) = positions.binary_search_by(|position| position.cmp_by_x_then_y(&row.position)) {
-            numbers[i] += 1;
-        }
-    }
-    let mut drawn: Vec<usize> = random_order(positions.len(), 0).into_iter().take(MOST_PRESSED).collect();
+/// All positions up to [`MOST_PRESSED`], and of more that many.
+fn few_of(places: &[(Position, usize)]) -> Vec<(Position, usize)> {
+    let mut drawn: Vec<usize> = random_order(places.len(), 0).into_iter().take(MOST_PRESSED).collect();
     drawn.sort_unstable();
-    drawn.into_iter().map(|i| (positions[i], numbers[i])).collect()
+    drawn.into_iter().map(|i| places[i]).collect()
 }

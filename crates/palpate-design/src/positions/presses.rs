@@ -24,12 +24,17 @@ pub(super) struct Presses {
     pub positions: Vec<Position>,
     /// Reading of each press beyond the offsets, a value for each living channel.
     pub readings: Vec<Vec<f64>>,
-    /// Standard deviation of a press at one position, of each living channel.
-    pub sds: Vec<f64>,
+    /// Distinct positions, each with the number of its presses.
+    pub places: Vec<(Position, usize)>,
+    /// Standard deviation of a reading in use, of each living channel.
+    pub reading_sds: Vec<f64>,
+    /// Noise variance of a press, in units of a reading's: less than 1 where a press is the mean of many readings.
+    pub variance: f64,
 }
 
 impl Presses {
-    /// Presses of a recording of a setup. Their noise is that of repeats, or else the setup's; the sensors of a model have no offsets.
+    /// Presses of a recording of a setup. Their noise is that of repeats, or else the setup's, and no reading in use has less than the
+    /// setup states; the sensors of a model have no offsets.
     pub fn new(recording: &Recording, setup: &Setup) -> Result<Self, PositionError> {
         let layout = setup.layout();
         if recording.channels.len() != layout.len() {
@@ -46,18 +51,22 @@ impl Presses {
         }
         let offsets = offsets.unwrap_or_default();
         let living: Vec<usize> = living(layout).collect();
+        let stated: Vec<f64> = living.iter().map(|&s| layout.sensors()[s].channel.reading_sd()).collect();
         let mut readings = at_one_force(&touched, &living, &offsets);
+        let places = groups.iter().map(|group| (touched[group[0]].position, group.len())).collect();
         let repeated: Vec<Vec<usize>> = groups.into_iter().filter(|group| group.len() > 1).collect();
         let sds = living.iter().enumerate().map(|(j, &s)| {
-            let stated = layout.sensors()[s].channel.reading_sd();
-            let sd = scatter(&readings, &repeated, j).unwrap_or(stated);
+            let sd = scatter(&readings, &repeated, j).unwrap_or(stated[j]);
             if sd > 0.0 { Ok(sd) } else { Err(PositionError::NoNoise { channel: s + 1 }) }
         });
         let mut sds = sds.collect::<Result<Vec<f64>, _>>()?;
         if setup.force() == Force::Unknown && sds.len() > 1 {
             bring_to_one_amplitude(&mut readings, &repeated, &mut sds);
         }
-        Ok(Self { positions: touched.iter().map(|row| row.position).collect(), readings, sds })
+        let reading_sds: Vec<f64> = sds.iter().zip(stated).map(|(sd, stated)| sd.max(stated)).collect();
+        let variance = mean(sds.iter().zip(&reading_sds).map(|(press, sd)| (press / sd).powi(2)));
+        let positions = touched.iter().map(|row| row.position).collect();
+        Ok(Self { positions, readings, places, reading_sds, variance })
     }
 }
 
@@ -80,8 +89,8 @@ fn forces_differ(presses: &[&Row]) -> bool {
     forces.next().is_some_and(|first_n| forces.any(|force_n| force_n != first_n))
 }
 
-/// What every channel reads while nothing touches, as presses of one position at several forces tell it: reading = offset + force × g(position)
-/// in least squares, with a g of its own for each position. `None` where they do not.
+/// Offsets of the channels by presses of one position at several forces: least squares of reading = offset + force × g(position), with a g of its own
+/// for each position. `None` where the forces do not tell them.
 fn offsets(presses: &[&Row], groups: &[Vec<usize>], channels: usize) -> Option<Vec<f64>> {
     let (mut sums, mut weight) = (vec![0.0; channels], 0.0);
     for group in groups {

@@ -4,7 +4,7 @@ use super::search::reads_mirrored;
 use super::variance::{ExpectedError, Posterior};
 use super::*;
 use crate::contacts::ContactPrior;
-use palpate_estimators::recording::Row;
+use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::sensing::{Sensor, SensorKind};
 use palpate_mechanics::surface::plate::PlateSpec;
@@ -188,7 +188,7 @@ fn what_cannot_be_designed_is_refused() {
     assert!(refusal(measured, 5).contains("has no model"));
 }
 
-fn begun(positions_m: &[f64], repeats: usize) -> (Setup, palpate_estimators::recording::Recording) {
+fn begun(positions_m: &[f64], repeats: usize) -> (Setup, Recording) {
     let setup = noisy().setup;
     let positions: Vec<Position> = positions_m.iter().map(|x_m| Position::along(*x_m)).collect();
     let recording = simulate_at(&setup, &positions, repeats, 3).unwrap();
@@ -224,8 +224,11 @@ fn the_expected_error_is_never_more_than_a_guess() {
     assert!((prior_m / guess_m - 1.0).abs() < 1e-6, "{prior_m} {guess_m}");
 }
 
+/// Ten positions all over the beam.
+const TEN_M: [f64; 10] = [0.02, 0.06, 0.1, 0.14, 0.18, 0.22, 0.26, 0.3, 0.34, 0.38];
+
 /// Presses of 1, 2 and 4 N at every position on channels of counts, which read 5,000 while nothing touches.
-fn in_counts(positions_m: &[f64], untouched: usize) -> (Setup, palpate_estimators::recording::Recording) {
+fn in_counts(positions_m: &[f64], untouched: usize) -> (Setup, Recording) {
     let (setup, mut recording) = begun(positions_m, 3);
     for (row, force_n) in recording.rows.iter_mut().zip([1.0, 2.0, 4.0].into_iter().cycle()) {
         // The simulated ones are of 3 N; their noise stays, so what a count is differs little from press to press.
@@ -240,10 +243,9 @@ fn in_counts(positions_m: &[f64], untouched: usize) -> (Setup, palpate_estimator
 
 #[test]
 fn offsets_and_untouched_rows_do_not_count_as_noise() {
-    let positions_m = [0.02, 0.06, 0.1, 0.14, 0.18, 0.22, 0.26, 0.3, 0.34, 0.38];
-    let plain = advised(&positions_m, 3);
+    let plain = advised(&TEN_M, 3);
     for untouched in [0, 12] {
-        let (setup, recording) = in_counts(&positions_m, untouched);
+        let (setup, recording) = in_counts(&TEN_M, untouched);
         let advice = next_press(&setup, &recording, &PositionDesign::default(), Watch::NONE).unwrap();
         assert_eq!((advice.presses, advice.positions), (30, 10));
         let beside_plain = advice.error_m / plain.error_m;
@@ -253,12 +255,11 @@ fn offsets_and_untouched_rows_do_not_count_as_noise() {
 
 #[test]
 fn how_hard_presses_were_does_not_count_as_noise_where_the_force_is_unknown() {
-    let positions_m = [0.02, 0.06, 0.1, 0.14, 0.18, 0.22, 0.26, 0.3, 0.34, 0.38];
-    let advice = |recording: &palpate_estimators::recording::Recording| {
+    let advice = |recording: &Recording| {
         let setup = noisy().setup.unknown_force();
         next_press(&setup, recording, &PositionDesign::default(), Watch::NONE).unwrap()
     };
-    let (_, plain) = begun(&positions_m, 6);
+    let (_, plain) = begun(&TEN_M, 6);
     let mut by_hand = plain.clone();
     for (row, share) in by_hand.rows.iter_mut().zip([0.7, 0.85, 0.95, 1.05, 1.15, 1.3].into_iter().cycle()) {
         row.reading.iter_mut().for_each(|value| *value *= share);
@@ -271,9 +272,8 @@ fn how_hard_presses_were_does_not_count_as_noise_where_the_force_is_unknown() {
 
 #[test]
 fn presses_that_are_means_of_readings_promise_no_better_readings() {
-    let positions_m = [0.02, 0.06, 0.1, 0.14, 0.18, 0.22, 0.26, 0.3, 0.34, 0.38];
-    let plain = advised(&positions_m, 40);
-    let (setup, mut means) = begun(&positions_m, 40);
+    let plain = advised(&TEN_M, 40);
+    let (setup, mut means) = begun(&TEN_M, 40);
     // Means of twenty readings each.
     means.rows = means
         .rows
@@ -309,7 +309,7 @@ fn enough_is_said_when_little_is_left_to_gain() {
 #[test]
 fn a_recording_that_tells_too_little_is_refused() {
     let (setup, recording) = begun(&[0.1, 0.2, 0.3], 2);
-    let refused = |setup: &Setup, recording: &palpate_estimators::recording::Recording| {
+    let refused = |setup: &Setup, recording: &Recording| {
         next_press(setup, recording, &PositionDesign::default(), Watch::NONE).unwrap_err().to_string()
     };
     assert!(refused(&setup, &recording).contains("3 distinct positions; at least 4"));

@@ -318,7 +318,7 @@ fn many_sites_are_searched_as_few_are() {
     let (setup, mut design) = sensor_design();
     design.sites = Sites::Count(1599);
     let few = exchanged(&problem(&setup, &design)).assessment.score;
-    design.sites = Sites::Count(3999);
+    design.sites = Sites::Count(6399);
     let many = exchanged(&problem(&setup, &design)).assessment.score;
     assert!((many / few - 1.0).abs() < 0.005, "{many} {few}");
 }

@@ -44,7 +44,12 @@ pub enum Progress {
     /// Something else is waited for.
     Waits(Waiting),
     /// A row of the recording was taken: of a press, or of the untouched surface.
-    Taken(Row),
+    Taken {
+        /// The row, whose reading is the last of the stretch at rest.
+        row: Row,
+        /// Mean reading of that stretch.
+        mean: Vec<f64>,
+    },
 }
 
 /// The guide of a calibration.
@@ -58,23 +63,13 @@ pub struct Guide {
     baseline: Option<Baseline>,
     /// Mean reading of the press that is held or was let go last.
     pressed: Vec<f64>,
-    /// Mean of the stretch whose last reading was taken last.
-    taken_mean: Vec<f64>,
 }
 
 impl Guide {
     /// A guide through a plan.
     pub fn new(plan: Vec<Press>) -> Self {
         let waiting = if plan.is_empty() { Waiting::Nothing } else { Waiting::Untouched };
-        Self {
-            plan,
-            next: 0,
-            waiting,
-            stretch: Stretch::default(),
-            baseline: None,
-            pressed: Vec::new(),
-            taken_mean: Vec::new(),
-        }
+        Self { plan, next: 0, waiting, stretch: Stretch::default(), baseline: None, pressed: Vec::new() }
     }
 
     /// The press that is next, and how many are planned; `None` after the last.
@@ -110,11 +105,6 @@ impl Guide {
             },
             _ => Progress::None,
         }
-    }
-
-    /// Mean of the stretch at rest whose last reading was taken last.
-    pub fn taken_mean(&self) -> &[f64] {
-        &self.taken_mean
     }
 
     /// Takes back the last press, which is asked for again; false where there is none.
@@ -186,9 +176,8 @@ impl Guide {
         let Some(press) = self.plan.get(self.next).copied() else { return Progress::None };
         self.next += 1;
         self.pressed.clone_from(&mean);
-        self.taken_mean = mean;
         self.wait(Waiting::Release);
-        Progress::Taken(row(press.position, press.force_n, at, reading))
+        Progress::Taken { row: row(press.position, press.force_n, at, reading), mean }
     }
 
     /// The untouched surface: its row, and the baseline from now on.
@@ -196,9 +185,8 @@ impl Guide {
         if let Some(baseline) = &mut self.baseline {
             baseline.mean.clone_from(&mean);
         }
-        self.taken_mean = mean;
         self.wait(if self.next < self.plan.len() { Waiting::Press } else { Waiting::Nothing });
-        Progress::Taken(row(Position::default(), Some(0.0), at, reading))
+        Progress::Taken { row: row(Position::default(), Some(0.0), at, reading), mean }
     }
 }
 

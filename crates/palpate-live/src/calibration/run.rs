@@ -39,7 +39,7 @@ pub enum Note {
     Opened(String),
     /// The source went away, and is looked for again; why.
     Lost(String),
-    /// Many frames and not one reading: why, and what a reading must have.
+    /// Many frames and not one reading: why, and what to do.
     Unread(String),
     /// The source has no more.
     Ended,
@@ -197,8 +197,10 @@ impl Calibration {
     fn unread(&self, cause: BadFrame) -> Option<Note> {
         let is_time = self.readings == 0 && self.bad.values().sum::<u64>() == UNREAD;
         let labels = self.labels.join("`, `");
-        let words =
-            format!("none of {UNREAD} frames is a reading of the channels `{labels}`: {}", cause.describe());
+        let words = format!(
+            "none of {UNREAD} frames is a reading of the channels `{labels}`: {}; name them in the rig as the board does, or in columns= of the source",
+            cause.describe()
+        );
         is_time.then_some(Note::Unread(words))
     }
 
@@ -225,10 +227,10 @@ impl Calibration {
         match self.guide.add(at, reading) {
             Progress::None => {}
             Progress::Waits(waiting) => notes.push(Note::Waits(waiting)),
-            Progress::Taken(row) => {
+            Progress::Taken { row, mean } => {
                 let depth_m = press.and_then(|press| press.depth_m).filter(|_| row.touches());
                 notes.push(if row.touches() { Note::Taken } else { Note::Untouched });
-                let row = self.weighed(row)?;
+                let row = self.weighed(row, &mean)?;
                 self.journal.add(row, depth_m)?;
             }
         }
@@ -236,9 +238,9 @@ impl Calibration {
     }
 
     /// A row whose force is that of the load cell, where there is one: the mean of the stretch at rest, as a force is no reading that is located.
-    fn weighed(&mut self, mut row: Row) -> Result<Row, CalibrationError> {
+    fn weighed(&mut self, mut row: Row, mean: &[f64]) -> Result<Row, CalibrationError> {
         let Some(cell) = &mut self.load_cell else { return Ok(row) };
-        let Some(&read_n) = self.guide.taken_mean().last() else { return Ok(row) };
+        let Some(&read_n) = mean.last() else { return Ok(row) };
         row.reading.pop();
         if row.touches() {
             let force_n = read_n - cell.untouched_n.unwrap_or(0.0);

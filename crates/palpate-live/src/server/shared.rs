@@ -31,11 +31,7 @@ impl Shared {
             Note::Lost(why) => {
                 (self.source, self.problem) = (None, Some(format!("the source went away: {why}")));
             }
-            Note::Unread(words) => {
-                self.problem = Some(format!(
-                    "{words}; name them in the rig as the board does, or in columns= of the source"
-                ));
-            }
+            Note::Unread(words) => self.problem = Some(words),
             Note::Ended => {
                 (self.source, self.problem) = (None, Some("the source has ended".to_owned()));
             }

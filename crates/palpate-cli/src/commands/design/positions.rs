@@ -294,7 +294,7 @@ fn advise(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(),
     let design = what_to_design(arguments, rig);
     if recording.rows.iter().any(|row| !row.nuisances.is_empty()) {
         remark!(
-            "remark: what the nuisance coordinate changes counts as noise, so the errors expected here are too large"
+            "warning: what the nuisance coordinate changes counts as noise here: the expected errors are too large"
         );
     }
     let advice = Observer::of_stages()
