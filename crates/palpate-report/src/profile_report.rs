@@ -72,24 +72,20 @@ impl<'a> ProfileReport<'a> {
     fn summary(&self) -> Markup {
         let profile = self.profile;
         let ForceBounds { total_95_n, margin_m, seen_95_n } = profile.bounds;
-        let interval = |(low_n, high_n): (f64, f64)| match high_n.is_finite() {
-            true => format!("{}–{} N", number(low_n), number(high_n)),
-            false => format!("at least {} N", number(low_n)),
-        };
         html! {
             li { (status_in_words(profile)) }
             @if let Some(centre) = &profile.centre {
                 li {
-                    "Total force " b { (number(profile.total_n)) " N" } ", 95 % interval " (interval(total_95_n))
-                    " whatever the shape of the load; " (interval(seen_95_n)) " where nothing lies within " (mm(margin_m))
+                    "Total force " b { (number(profile.total_n)) " N" } ", 95 % interval " (interval_n(total_95_n)) " N"
+                    " whatever the shape of the load; " (interval_n(seen_95_n)) " N where nothing lies within " (mm(margin_m))
                     " mm of an edge."
                 }
                 li {
                     "Centre of pressure at " b { (number(centre.position.x_m * 1e3)) " mm" } ", 95 % interval "
-                    (interval_mm(profile.centre_95_m().unwrap_or(centre.x_95_m()))) " mm"
+                    (interval_mm(centre.x_95_m)) " mm"
                     @if let Extent::Plane { .. } = self.extent() {
                         "; across at " b { (number(centre.position.y_m * 1e3)) " mm" } ", 95 % interval "
-                        (interval_mm(centre.y_95_m())) " mm"
+                        (interval_mm(centre.y_95_m)) " mm"
                     }
                     "."
                 }
@@ -267,19 +263,18 @@ impl<'a> ProfileReport<'a> {
         type Row<'r> = (&'r Patch, Option<&'r PatchLimit>, usize);
         // Stretch, centre, its interval and its limit: along the surface, and on a plane across it.
         let stretch = |from_m: f64, to_m: f64| format!("{}–{}", mm(from_m), mm(to_m));
-        let extent = self.extent();
         let along = |table: Columns<Row<'a>>, [to, centre]: [&str; 2]| {
             table
                 .numeric(to, |(patch, ..)| stretch(patch.from.x_m, patch.to.x_m))
                 .numeric(centre, |(patch, ..)| tenths_mm(patch.centre.position.x_m))
-                .numeric("95 %, mm", move |(patch, ..)| interval_mm(patch.centre_95_m(extent)))
+                .numeric("95 %, mm", move |(patch, ..)| interval_mm(patch.centre.x_95_m))
                 .mm("limit, mm", |(_, limit, _)| limit.map(|limit| limit.sd_x_m))
         };
         let across = |table: Columns<Row<'a>>| {
             table
                 .numeric("across, mm", |(patch, ..)| stretch(patch.from.y_m, patch.to.y_m))
                 .numeric("centre y, mm", |(patch, ..)| tenths_mm(patch.centre.position.y_m))
-                .numeric("95 %, mm", |(patch, ..)| interval_mm(patch.centre.y_95_m()))
+                .numeric("95 %, mm", |(patch, ..)| interval_mm(patch.centre.y_95_m))
                 .mm("limit, mm", |(_, limit, _)| limit.map(|limit| limit.sd_y_m))
         };
         let limit = |i: usize| self.limits.and_then(|limits| limits.get(i));
@@ -289,15 +284,14 @@ impl<'a> ProfileReport<'a> {
             Extent::Line { .. } => along(table, ["stretch, mm", "centre, mm"]),
             Extent::Plane { .. } => across(along(table, ["along, mm", "centre x, mm"])),
         };
-        let interval = |(low_n, high_n): (f64, f64)| format!("{}–{}", number(low_n), number(high_n));
         let caption = html! {
             "The patches: connected parts where the load is above a tenth of its highest density, and their limits, the least \
-             standard deviations that an unbiased estimator of evenly loaded patches of this number and these sizes can have. Beside an edge \
-             force and place trade off: the intervals of a patch there are of all that lies between it and the edge."
+             standard deviations that an unbiased estimator of evenly loaded patches of this number and these sizes can have. Intervals are of \
+             evenly loaded patches of this number and of any size. Beside an edge force, place and size trade off."
         };
         table
             .number("force, N", |(patch, ..)| patch.force_n)
-            .numeric("95 %, N", |(patch, ..)| interval(patch.force_95_n()))
+            .numeric("95 %, N", |(patch, ..)| interval_n(patch.force_95_n))
             .number("limit, N", |(_, limit, _)| limit.map(|limit| limit.sd_force_n))
             .caption(caption)
     }
@@ -330,6 +324,15 @@ fn interval_mm((from_m, to_m): (f64, f64)) -> String {
     format!("{}–{}", tenths_mm(from_m), tenths_mm(to_m))
 }
 
+/// The ends of an interval of a force, in newtons; the upper one may be infinite.
+fn interval_n((low_n, high_n): (f64, f64)) -> String {
+    if high_n.is_finite() {
+        format!("{}–{}", number(low_n), number(high_n))
+    } else {
+        format!("≥ {}", number(low_n))
+    }
+}
+
 /// A length in millimetres, to a tenth.
 fn tenths_mm(length_m: f64) -> String {
     format!("{:.1}", length_m * 1e3)
@@ -360,7 +363,8 @@ fn meaning() -> Markup {
         p {
             "The averaging kernels say over how much of the surface the profile is a mean. They are those of the linear inverse; \
              that a load cannot pull resolves more than they show. What lies next to a support hardly moves any sensor, and the \
-             profile puts no load there unless the reading asks for it."
+             profile puts no load there unless the reading asks for it: a patch and a total that even loads exclude are theirs, and not the sum of the \
+             profile that is drawn."
         }
     }
 }

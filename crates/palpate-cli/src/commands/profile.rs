@@ -174,9 +174,8 @@ impl Printer<'_> {
 
 /// Prints a profile for people.
 fn print(told: &JsonProfile) -> Result<(), Failure> {
-    let interval = |value: &Interval, unit: &str| {
-        format!("{:.3} {unit} ({:.3} to {:.3})", value.value, value.low, value.high)
-    };
+    let interval =
+        |value: &Interval, unit: &str| format!("{:.3} {unit} ({})", value.value, ends(value.low, value.high));
     let heading = match told.line {
         Some(line) => format!("line {line}: {}", told.status),
         None => format!("simulated: {}", told.status),
@@ -191,13 +190,9 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
         interval(&told.total_n, "N")
     ))?;
     let Seen { margin_mm, low_n, high_n } = told.seen;
-    let seen = if high_n.is_finite() {
-        format!("{low_n:.3} to {high_n:.3} N")
-    } else {
-        format!("{low_n:.3} N or more")
-    };
     output::say(format!(
-        "                    {seen} where nothing lies within {margin_mm:.0} mm of an edge"
+        "                    {} N where nothing lies within {margin_mm:.0} mm of an edge",
+        ends(low_n, high_n)
     ))?;
     output::say(format!("centre of pressure  {}", interval(centre, "mm")))?;
     if let Some(across) = &told.centre_y_mm {
@@ -208,13 +203,18 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
             "resolution          {width_mm:.0} mm, the median width of the averaging kernels"
         ))?;
     }
-    let interval = |value: &Interval| format!("{:.3} ({:.3} to {:.3})", value.value, value.low, value.high);
+    let interval = |value: &Interval| format!("{:.3} ({})", value.value, ends(value.low, value.high));
     output::say(format!("\n{}", JsonPatch::columns(&told.patches, "patch", told.extent, interval)))?;
     if told.loads.is_empty() {
         return Ok(());
     }
     let number = |value: &f64| format!("{value:.3}");
     output::say(format!("\n{}", JsonPatch::columns(&told.loads, "true load", told.extent, number)))
+}
+
+/// The ends of an interval in words.
+fn ends(low: f64, high: f64) -> String {
+    if high.is_finite() { format!("{low:.3} to {high:.3}") } else { format!("{low:.3} or more") }
 }
 
 /// Load profile of a reading as JSON; what the reading does not tell is null.
@@ -323,7 +323,7 @@ impl JsonProfile {
                 low_n: profile.bounds.seen_95_n.0,
                 high_n: profile.bounds.seen_95_n.1,
             },
-            centre_x_mm: profile.centre.zip(profile.centre_95_m()).map(|(centre, held)| x_mm(&centre, held)),
+            centre_x_mm: profile.centre.as_ref().map(x_mm),
             centre_y_mm: profile.centre.and_then(|centre| extent.if_plane(y_mm(&centre))),
             resolution_mm: profiler.resolution(profile).map(|resolution| resolution.median_width_m() * 1e3),
             patches: patches.map(|(i, patch)| JsonPatch::of_patch(patch, limit(limits, i), extent)).collect(),
@@ -340,9 +340,8 @@ impl JsonProfile {
 impl JsonPatch<Interval> {
     fn of_patch(patch: &Patch, limit: Option<PatchLimit>, extent: Extent) -> Self {
         let Patch { from, to, centre, .. } = patch;
-        let force_n = Interval::new(patch.force_n, patch.force_sd_n, patch.force_95_n(), 1.0);
-        let centre_x_mm = x_mm(centre, patch.centre_95_m(extent));
-        Self::new([*from, *to], (centre_x_mm, y_mm(centre)), force_n, limit, extent)
+        let force_n = Interval::new(patch.force_n, patch.force_sd_n, patch.force_95_n, 1.0);
+        Self::new([*from, *to], (x_mm(centre), y_mm(centre)), force_n, limit, extent)
     }
 }
 
@@ -427,10 +426,10 @@ impl JsonCell {
     }
 }
 
-fn x_mm(centre: &CentreOfPressure, held_95_m: (f64, f64)) -> Interval {
-    Interval::new(centre.position.x_m, centre.sd_x_m, held_95_m, 1e3)
+fn x_mm(centre: &CentreOfPressure) -> Interval {
+    Interval::new(centre.position.x_m, centre.sd_x_m, centre.x_95_m, 1e3)
 }
 
 fn y_mm(centre: &CentreOfPressure) -> Interval {
-    Interval::new(centre.position.y_m, centre.sd_y_m, centre.y_95_m(), 1e3)
+    Interval::new(centre.position.y_m, centre.sd_y_m, centre.y_95_m, 1e3)
 }

@@ -135,11 +135,15 @@ impl Cells {
     /// Points of a cell whose mean is the mean over the cell.
     pub(super) fn points(&self, cell: usize) -> Vec<Position> {
         let (from, to) = self.corners(cell);
-        let counts = match self.extent {
+        midpoints(from, to, self.points_a_side())
+    }
+
+    /// Number of the points of a cell along x and along y.
+    pub(super) fn points_a_side(&self) -> [usize; 2] {
+        match self.extent {
             Extent::Line { .. } => POINTS_ON_A_LINE,
             Extent::Plane { .. } => POINTS_ON_A_PLANE,
-        };
-        midpoints(from, to, counts)
+        }
     }
 
     /// P: xᵀP·x is the sum of the squared second differences of x along the line, or the bending energy Σ x_uu² + 2·x_uv² +

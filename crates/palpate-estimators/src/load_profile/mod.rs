@@ -10,16 +10,23 @@
 //!    sensor sees, as next to a support, is not invented.
 //! 3. Smoothness is weighed by its evidence, the probability of the reading under it, in the Gaussian approximation on the
 //!    cells that are not zero; profile and covariance are the mixture over all λ.
-//! 4. Total force, centre of pressure and patches are functions of the mixture, their intervals by its covariance.
+//! 4. Patches are the connected parts that carry load. Their forces and centres, and the centre of pressure, have the intervals of even loads in
+//!    their places, by which no prior decides, and the values of such loads where the mixture's are outside of these; where no even loads
+//!    explain the reading, the intervals are those of the mixture's covariance.
+//! 5. The whole force is bounded over loads of any shape.
 //!
 //! The method is penalised non-negative least squares in Bayesian dress: MacKay, *Bayesian Interpolation*, Neural
 //! Computation 4 (1992), for the evidence; Jaynes, *Prior Probabilities*, IEEE Trans. SSC 4 (1968), for the exponential prior.
 
 mod bounds;
 mod cells;
+mod cumulative;
+mod even_loads;
+mod patches;
 mod smoothness;
 
 pub use cells::Cells;
+pub use patches::{CentreOfPressure, PATCH_SHARE, Patch};
 
 use ndarray::{Array1, Array2, Axis};
 use serde::Serialize;
@@ -27,15 +34,21 @@ use std::sync::Arc;
 
 use crate::fit::ReadingError;
 use crate::setup::Setup;
-use crate::status::{OUTSIDE_MODEL_RATE, misfit_bound};
+use crate::status::misfit_bound;
 use bounds::Bounds;
+use cumulative::CumulativeInfluence;
+use even_loads::{Aim, EvenLoads};
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
 use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface, UniformLoad, Unsolvable};
 use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_numerics::{Cholesky, median, normal_interval_95, normal_quantile};
+use palpate_numerics::{Cholesky, median, normal_interval_95};
+use patches::{Part, centre_of, find_patches, holds, hull, mean_position};
 use smoothness::{Mixture, Problem};
+
+/// Reading over its noise beyond which it makes no difference how far.
+const LOUDEST: f64 = 1e60;
 
 /// One channel of a reading.
 #[derive(Clone)]
@@ -144,6 +157,7 @@ pub struct Profiler<'a> {
     sensors: LoadSensors<'a>,
     cells: Cells,
     problem: Problem,
+    cumulative: CumulativeInfluence,
     /// Bound of the misfit, exceeded by noise at [`OUTSIDE_MODEL_RATE`].
     worst_misfit: f64,
 }
@@ -160,13 +174,13 @@ pub struct LoadProfile {
     pub forces_n: Vec<f64>,
     /// Covariance of the cells' forces, in N².
     pub covariance_n2: Array2<f64>,
-    /// Their sum, in newtons.
+    /// The whole force, in newtons: their sum, or that of the patches where even loads exclude it.
     pub total_n: f64,
-    /// Standard deviation of the sum, by the mixture.
+    /// Standard deviation of the cells' sum, by the mixture.
     pub total_sd_n: f64,
     /// Bounds of the sum.
     pub bounds: ForceBounds,
-    /// Centre of the whole force; `None` without load.
+    /// Centre of the whole force, as far as it is in patches: what lies unseen beside an edge is not in it; `None` without load.
     pub centre: Option<CentreOfPressure>,
     /// The patches that carry load, along x.
     pub patches: Vec<Patch>,
@@ -174,7 +188,7 @@ pub struct LoadProfile {
     pub fitted: Vec<Option<f64>>,
     /// Reading less fitted, over the standard deviation of the noise; `None` for dead channels.
     pub residuals: Vec<Option<f64>>,
-    /// The least sum of squared residuals that any smoothness leaves.
+    /// The least sum of squared residuals that any smoothness leaves, or even loads in the places of the patches.
     pub misfit: f64,
     /// Bound of the misfit, exceeded by noise in [`OUTSIDE_MODEL_RATE`] of all readings, whatever the load.
     pub worst_misfit: f64,
@@ -191,17 +205,6 @@ pub struct ForceBounds {
     pub margin_m: f64,
     /// Of the whole force, where nothing lies within that distance.
     pub seen_95_n: (f64, f64),
-}
-
-/// Centre of pressure: the mean position of the load.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct CentreOfPressure {
-    /// The place.
-    pub position: Position,
-    /// Standard deviation along x, in metres.
-    pub sd_x_m: f64,
-    /// Standard deviation along y, in metres; 0 on a line.
-    pub sd_y_m: f64,
 }
 
 impl<'a> Profiler<'a> {
@@ -223,7 +226,8 @@ impl<'a> Profiler<'a> {
             sum / points.len() as f64 / alive[i].noise_sd
         });
         let worst_misfit = misfit_bound(alive.len());
-        Self { sensors, cells, problem: Problem::new(influence, cells.roughness()), worst_misfit }
+        let cumulative = CumulativeInfluence::new(&sensors, &cells);
+        Self { sensors, cells, problem: Problem::new(influence, cells.roughness()), cumulative, worst_misfit }
     }
 
     /// The cells of its profiles.
@@ -251,11 +255,6 @@ impl<'a> Profiler<'a> {
         let y: Array1<f64> = whitened.collect();
         let silent = y.dot(&y) <= self.worst_misfit;
         let mixture = if silent { None } else { self.problem.solve(&y) };
-        let status = match &mixture {
-            Some(mixture) if mixture.least_misfit <= self.worst_misfit => Status::Located,
-            None if silent => Status::NoContact,
-            _ => Status::OutsideModel,
-        };
         let smoothness = mixture.as_ref().map(|mixture| mixture.smoothness);
         let cells = self.cells.len();
         let Mixture { forces, covariance, least_misfit, .. } = mixture.unwrap_or_else(|| Mixture {
@@ -266,40 +265,97 @@ impl<'a> Profiler<'a> {
         });
         let forces_n = forces.to_vec();
         let mut patches = find_patches(&self.cells, &forces_n, &covariance);
-        let bounds = self.bounds(&y, forces.sum(), &mut patches);
         let everything: Vec<usize> = (0..cells).collect();
+        let mut centre = centre_of(&self.cells, &everything, &forces_n, &covariance);
+        let mut total_n = forces.sum();
+        let mut bounds = self.bounds(&y, total_n);
+        let even = self.even_loads(&y, &patches);
+        let misfit = even.as_ref().map_or(least_misfit, |even| least_misfit.min(even.misfit()));
+        if let Some(centre) = &mut centre {
+            match &even {
+                Some(even) => self.follow(even, &mut patches, (centre, &mut total_n, &mut bounds)),
+                None => self.widen_beside_edges(&y, &mut patches, centre),
+            }
+        }
+        let status = match smoothness {
+            Some(_) if misfit <= self.worst_misfit => Status::Located,
+            None if silent => Status::NoContact,
+            _ => Status::OutsideModel,
+        };
         let (fitted, residuals) = self.fitted(&y, &forces);
         Ok(LoadProfile {
             status,
             cells: self.cells,
-            total_n: forces.sum(),
+            total_n,
             total_sd_n: covariance.sum().sqrt(),
             bounds,
-            centre: centre_of(&self.cells, &everything, &forces_n, &covariance),
+            centre,
             patches: patches.into_iter().map(|(_, patch)| patch).collect(),
             forces_n,
             covariance_n2: covariance,
             fitted,
             residuals,
-            misfit: least_misfit,
+            misfit,
             worst_misfit: self.worst_misfit,
             smoothness,
         })
     }
 
-    /// Bounds of the force by a whitened reading, over loads of any shape; patches beside an edge are given theirs.
-    fn bounds(&self, y: &Array1<f64>, total_n: f64, patches: &mut [(Part, Patch)]) -> ForceBounds {
+    /// Bounds of the force by a whitened reading, over loads of any shape.
+    fn bounds(&self, y: &Array1<f64>, total_n: f64) -> ForceBounds {
         let influence = &self.problem.influence;
-        let bounds = Bounds::new(influence, y);
         let cells = self.cells.len();
-        let hull = |(low, high): (f64, f64), held: f64| (low.min(held), high.max(held));
-        let total_95_n = hull(bounds.of_sum(&Array1::ones(cells)), total_n);
+        let total_95_n = hull(Bounds::new(influence, y).of_sum(&Array1::ones(cells)), total_n);
         if total_n <= 0.0 {
             return ForceBounds { total_95_n, margin_m: 0.0, seen_95_n: total_95_n };
         }
         let blind = self.blind_cells(total_n);
         let seen: Vec<usize> = (0..cells).filter(|cell| !blind.contains(cell)).collect();
         let of_seen = Bounds::new(&influence.select(Axis(1), &seen), y).of_sum(&Array1::ones(seen.len()));
+        let margin_m = blind.iter().map(|cell| self.cells.edge_distance_m(*cell)).fold(0.0, f64::max);
+        ForceBounds { total_95_n, margin_m, seen_95_n: hull(of_seen, total_n) }
+    }
+
+    /// Even loads in the places of patches, where such explain the reading.
+    fn even_loads(&'a self, y: &'a Array1<f64>, patches: &[(Part, Patch)]) -> Option<EvenLoads<'a>> {
+        let extent = self.cells.extent;
+        let starts: Vec<UniformLoad> = patches.iter().map(|(_, patch)| patch.as_load(extent)).collect();
+        EvenLoads::new(&self.cumulative, y, extent, &starts).filter(|even| even.misfit() <= self.worst_misfit)
+    }
+
+    /// Gives patches, their centre and their sum the intervals of even loads, and what is outside of these the values of such loads.
+    fn follow(
+        &self,
+        even: &EvenLoads,
+        patches: &mut [(Part, Patch)],
+        (centre, total_n, bounds): (&mut CentreOfPressure, &mut f64, &mut ForceBounds),
+    ) {
+        let extent = self.cells.extent;
+        for (number, (_, patch)) in patches.iter_mut().enumerate() {
+            patch.follow(even, number, extent);
+        }
+        let of_total = even.interval_95(Aim::Total);
+        let is_held = centre.follow(even, extent, Aim::CentreOfPressure) && holds(of_total, *total_n);
+        if !is_held {
+            centre.move_to(mean_position(patches));
+            *total_n = patches.iter().map(|(_, patch)| patch.force_n).sum();
+        }
+        // Even loads may be narrower than a cell.
+        bounds.total_95_n = hull(hull(hull(bounds.total_95_n, of_total.0), of_total.1), *total_n);
+        bounds.seen_95_n = hull(bounds.seen_95_n, *total_n);
+    }
+
+    /// Widens the intervals of patches beside an edge, where no even loads explain the reading: they are then of all loads between the patch and
+    /// the edge.
+    fn widen_beside_edges(
+        &self,
+        y: &Array1<f64>,
+        patches: &mut [(Part, Patch)],
+        centre: &mut CentreOfPressure,
+    ) {
+        let bounds = Bounds::new(&self.problem.influence, y);
+        let (cells, length_m) = (self.cells.len(), self.cells.extent.length_m());
+        let blind = self.blind_cells(patches.iter().map(|(_, patch)| patch.force_n).sum());
         for i in 0..patches.len() {
             let others = patches.iter().enumerate().filter(|(other, _)| *other != i);
             let others: Vec<usize> = others.flat_map(|(_, (part, _))| part.all.iter().copied()).collect();
@@ -309,11 +365,12 @@ impl<'a> Profiler<'a> {
             if part.core.iter().any(|cell| blind.contains(cell)) || blind.iter().any(could_be) {
                 let mut c = Array1::zeros(cells);
                 part.all.iter().chain(&blind).for_each(|cell| c[*cell] = 1.0);
-                patch.beside_edge = Some(hull(bounds.of_sum(&c), patch.force_n));
+                patch.force_95_n = hull(bounds.of_sum(&c), patch.force_n);
+                let is_left = patch.centre.position.x_m < 0.5 * length_m;
+                patch.centre.x_95_m = hull(patch.centre.x_95_m, if is_left { 0.0 } else { length_m });
+                centre.x_95_m = hull(hull(centre.x_95_m, patch.centre.x_95_m.0), patch.centre.x_95_m.1);
             }
         }
-        let margin_m = blind.iter().map(|cell| self.cells.edge_distance_m(*cell)).fold(0.0, f64::max);
-        ForceBounds { total_95_n, margin_m, seen_95_n: hull(of_seen, total_n) }
     }
 
     /// Cells beside an edge in which a load of this force is not told from one at the edge: its distance from there is within 1.96 standard
@@ -383,223 +440,10 @@ impl LoadProfile {
         (force / measure, (low.max(0.0) / measure, high / measure))
     }
 
-    /// The ends of the 95 % interval of the centre of pressure along x, in metres: from an edge on where a patch beside it may be harder and nearer.
-    pub fn centre_95_m(&self) -> Option<(f64, f64)> {
-        let (mut low, mut high) = self.centre?.x_95_m();
-        for patch in &self.patches {
-            let (first, last) = patch.centre_95_m(self.cells.extent);
-            if patch.beside_edge.is_some() {
-                (low, high) = (low.min(first), high.max(last));
-            }
-        }
-        Some((low, high))
-    }
-
     /// Standard deviation of the density in a cell: N/m on a line, N/m² on a plane.
     pub fn density_sd(&self, cell: usize) -> f64 {
         self.covariance_n2[[cell, cell]].sqrt() / self.cells.measure()
     }
-}
-
-impl CentreOfPressure {
-    /// The ends of the 95 % interval along x, in metres.
-    pub fn x_95_m(&self) -> (f64, f64) {
-        normal_interval_95(self.position.x_m, self.sd_x_m)
-    }
-
-    /// The ends of the 95 % interval along y, in metres.
-    pub fn y_95_m(&self) -> (f64, f64) {
-        normal_interval_95(self.position.y_m, self.sd_y_m)
-    }
-}
-
-/// The mean position of the force of some cells, with its standard deviation to first order; `None` where they have none.
-fn centre_of(
-    cells: &Cells,
-    listed: &[usize],
-    forces_n: &[f64],
-    covariance: &Array2<f64>,
-) -> Option<CentreOfPressure> {
-    let force: f64 = listed.iter().map(|cell| forces_n[*cell]).sum();
-    if force <= 0.0 {
-        return None;
-    }
-    let along = |coordinate: fn(Position) -> f64| {
-        let at = |cell: &usize| coordinate(cells.centre(*cell));
-        let mean = listed.iter().map(|cell| at(cell) * forces_n[*cell]).sum::<f64>() / force;
-        let slopes: Vec<f64> = listed.iter().map(|cell| (at(cell) - mean) / force).collect();
-        (mean, sd_of_sum(listed, &slopes, covariance))
-    };
-    let ((x_m, sd_x_m), (y_m, sd_y_m)) = (along(|p| p.x_m), along(|p| p.y_m));
-    Some(CentreOfPressure { position: Position { x_m, y_m }, sd_x_m, sd_y_m })
-}
-
-/// Standard deviation of Σ slope·force over some cells.
-fn sd_of_sum(listed: &[usize], slopes: &[f64], covariance: &Array2<f64>) -> f64 {
-    let row = |(i, a): (&usize, &f64)| {
-        listed.iter().zip(slopes).map(|(j, b)| a * b * covariance[[*i, *j]]).sum::<f64>()
-    };
-    listed.iter().zip(slopes).map(row).sum::<f64>().max(0.0).sqrt()
-}
-
-/// Reading over its noise beyond which it makes no difference how far.
-const LOUDEST: f64 = 1e60;
-
-/// A patch is where the load is above this share of its highest density.
-pub const PATCH_SHARE: f64 = 0.1;
-/// Cells between a patch and another that it may be part of.
-const REACH_CELLS: usize = 2;
-
-/// A connected part of the surface that carries load.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Patch {
-    /// Its left end, or lower left corner: where the load rises above the share of its highest density.
-    pub from: Position,
-    /// Its right end, or upper right corner.
-    pub to: Position,
-    /// Centre of its force.
-    pub centre: CentreOfPressure,
-    /// Its force in newtons, its flanks below the share included.
-    pub force_n: f64,
-    /// Standard deviation of the force.
-    pub force_sd_n: f64,
-    /// Bounds of the force, in newtons, of a patch beside an edge, where force and place trade off: with all that lies between the two.
-    pub beside_edge: Option<(f64, f64)>,
-}
-
-impl Patch {
-    /// The ends of the force's 95 % interval, in newtons.
-    pub fn force_95_n(&self) -> (f64, f64) {
-        let (low, high) = normal_interval_95(self.force_n, self.force_sd_n);
-        self.beside_edge.unwrap_or((low.max(0.0), high))
-    }
-
-    /// The ends of the centre's 95 % interval along x, in metres: of a patch beside an edge, from that edge on.
-    pub fn centre_95_m(&self, extent: Extent) -> (f64, f64) {
-        let (low, high) = self.centre.x_95_m();
-        match self.beside_edge {
-            Some(_) if self.centre.position.x_m < 0.5 * extent.length_m() => (0.0, high),
-            Some(_) => (low, extent.length_m()),
-            None => (low, high),
-        }
-    }
-
-    /// An even load of its force and sizes around its centre, as far as the surface reaches: what its limit is of.
-    pub fn as_load(&self, extent: Extent) -> UniformLoad {
-        let Position { x_m, y_m } = self.centre.position;
-        let side = |centre: f64, (from, to): (f64, f64), size: f64| {
-            let half = (0.5 * (to - from)).min(centre).min(size - centre).max(0.0);
-            (centre - half, centre + half)
-        };
-        let (left, right) = side(x_m, (self.from.x_m, self.to.x_m), extent.length_m());
-        let (low, high) = side(y_m, (self.from.y_m, self.to.y_m), extent.width_m().unwrap_or(0.0));
-        let corner = |x_m, y_m| Position { x_m, y_m };
-        UniformLoad::new(corner(left, low), corner(right, high), self.force_n)
-    }
-}
-
-/// A patch in the making: cells above the share, and all cells with its flanks.
-struct Part {
-    core: Vec<usize>,
-    all: Vec<usize>,
-}
-
-/// The patches of a profile, along x.
-///
-/// Connected cells above the share of the highest are patches; each takes the cells downhill from it as its flanks, up to the
-/// valley to the next. A patch whose force does not stand out of its own uncertainty becomes a part of the one beside it, or,
-/// where there is none, is none.
-fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<(Part, Patch)> {
-    let mut parts = grow(cells, forces_n, cores(cells, forces_n));
-    let least_ratio = normal_quantile(1.0 - OUTSIDE_MODEL_RATE);
-    let stands_out = |part: &Part| {
-        let (force, sd) = force_of(&part.all, forces_n, covariance);
-        force > least_ratio * sd
-    };
-    let force = |part: &Part| force_of(&part.all, forces_n, covariance).0;
-    let weakest = |parts: &[Part]| {
-        let weak = (0..parts.len()).filter(|number| !stands_out(&parts[*number]));
-        weak.min_by(|a, b| force(&parts[*a]).total_cmp(&force(&parts[*b])))
-    };
-    while let Some(weak) = weakest(&parts) {
-        let part = parts.swap_remove(weak);
-        if let Some(beside) = parts.iter_mut().find(|other| touches(cells, &part.all, &other.all)) {
-            beside.all.extend(part.all);
-        }
-    }
-    let of_part = |part: Part| patch(cells, &part, forces_n, covariance).map(|patch| (part, patch));
-    let mut patches: Vec<(Part, Patch)> = parts.into_iter().filter_map(of_part).collect();
-    patches.sort_by(|(_, a), (_, b)| a.centre.position.x_m.total_cmp(&b.centre.position.x_m));
-    patches
-}
-
-/// Connected cells above the share of the highest.
-fn cores(cells: &Cells, forces_n: &[f64]) -> Vec<Vec<usize>> {
-    let highest = forces_n.iter().fold(0.0, |most: f64, force| most.max(*force));
-    let mut open: Vec<bool> = forces_n.iter().map(|force| *force > PATCH_SHARE * highest).collect();
-    let mut cores = Vec::new();
-    for start in 0..cells.len() {
-        let mut core = Vec::new();
-        let mut edge = vec![start];
-        while let Some(cell) = edge.pop() {
-            if std::mem::replace(&mut open[cell], false) {
-                core.push(cell);
-                edge.extend(cells.neighbours(cell));
-            }
-        }
-        if !core.is_empty() {
-            cores.push(core);
-        }
-    }
-    cores
-}
-
-/// Gives each part the cells that lie downhill from it, the highest first.
-fn grow(cells: &Cells, forces_n: &[f64], cores: Vec<Vec<usize>>) -> Vec<Part> {
-    let mut owner = vec![None; cells.len()];
-    for (number, core) in cores.iter().enumerate() {
-        core.iter().for_each(|cell| owner[*cell] = Some(number));
-    }
-    let mut parts: Vec<Part> = cores.into_iter().map(|core| Part { all: core.clone(), core }).collect();
-    let mut flanks: Vec<usize> =
-        (0..cells.len()).filter(|cell| owner[*cell].is_none() && forces_n[*cell] > 0.0).collect();
-    flanks.sort_by(|a, b| forces_n[*b].total_cmp(&forces_n[*a]));
-    for cell in flanks {
-        let uphill = cells.neighbours(cell).filter(|beside| owner[*beside].is_some());
-        let uphill = uphill.max_by(|a, b| forces_n[*a].total_cmp(&forces_n[*b]));
-        if let Some(number) = uphill.and_then(|beside| owner[beside]) {
-            owner[cell] = Some(number);
-            parts[number].all.push(cell);
-        }
-    }
-    parts
-}
-
-/// Whether at most [`REACH_CELLS`] cells lie between two sets of cells.
-fn touches(cells: &Cells, one: &[usize], other: &[usize]) -> bool {
-    let place = |cell: usize| (cell % cells.columns, cell / cells.columns);
-    one.iter().any(|a| {
-        other.iter().any(|b| {
-            let ((ax, ay), (bx, by)) = (place(*a), place(*b));
-            ax.abs_diff(bx).max(ay.abs_diff(by)) <= REACH_CELLS + 1
-        })
-    })
-}
-
-fn force_of(listed: &[usize], forces_n: &[f64], covariance: &Array2<f64>) -> (f64, f64) {
-    let force = listed.iter().map(|cell| forces_n[*cell]).sum();
-    (force, sd_of_sum(listed, &vec![1.0; listed.len()], covariance))
-}
-
-fn patch(cells: &Cells, part: &Part, forces_n: &[f64], covariance: &Array2<f64>) -> Option<Patch> {
-    let centre = centre_of(cells, &part.all, forces_n, covariance)?;
-    let (force_n, force_sd_n) = force_of(&part.all, forces_n, covariance);
-    let corners = part.core.iter().map(|cell| cells.corners(*cell));
-    let (from, to) = corners.reduce(|(from, to), (low, high)| {
-        let least = Position { x_m: from.x_m.min(low.x_m), y_m: from.y_m.min(low.y_m) };
-        (least, Position { x_m: to.x_m.max(high.x_m), y_m: to.y_m.max(high.y_m) })
-    })?;
-    Some(Patch { from, to, centre, force_n, force_sd_n, beside_edge: None })
 }
 
 /// Least standard deviations for one of several patches.
@@ -689,5 +533,7 @@ fn width_m(cells: &Cells, kernel: &[f64]) -> f64 {
     cells.sides_m()[0] * (reach(&mut (0..top).rev()) + reach(&mut (top + 1..kernel.len())))
 }
 
+#[cfg(test)]
+mod coverage;
 #[cfg(test)]
 mod tests;

@@ -1,0 +1,119 @@
+//! Shares of 95 % intervals that hold what they are of, by where loads lie.
+
+use super::tests::{beam, clean, layout, noisy};
+use super::*;
+use crate::fixtures;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Distances of the outermost load's centre from a support, in metres.
+const DISTANCES_M: [(f64, f64); 6] =
+    [(0.001, 0.01), (0.01, 0.02), (0.02, 0.04), (0.04, 0.06), (0.06, 0.1), (0.1, 0.2)];
+
+/// Readings of which the profile has as many patches as there are loads, and how many of their intervals hold.
+#[derive(Debug, Default)]
+struct Held {
+    readings: usize,
+    told: usize,
+    force: usize,
+    centre: usize,
+    pressure: usize,
+    total: usize,
+    bounded: usize,
+}
+
+impl Held {
+    fn add(&mut self, profile: &LoadProfile, loads: &[UniformLoad]) {
+        let Some(pressure) = profile.centre else { return };
+        self.readings += 1;
+        let total_n: f64 = loads.iter().map(UniformLoad::force_n).sum();
+        let centre_m = loads.iter().map(|load| load.force_n() * load.centre().x_m).sum::<f64>() / total_n;
+        self.total += usize::from(holds(profile.bounds.total_95_n, total_n));
+        assert!(
+            holds(profile.bounds.total_95_n, profile.total_n)
+                && holds(pressure.x_95_m, pressure.position.x_m)
+        );
+        if profile.patches.len() != loads.len() {
+            return;
+        }
+        self.told += 1;
+        self.pressure += usize::from(holds(pressure.x_95_m, centre_m));
+        let outermost = if loads[0].centre().x_m < 0.2 { 0 } else { loads.len() - 1 };
+        let (patch, load) = (&profile.patches[outermost], &loads[0]);
+        self.force += usize::from(holds(patch.force_95_n, load.force_n()));
+        self.centre += usize::from(holds(patch.centre.x_95_m, load.centre().x_m));
+        self.bounded += usize::from(patch.force_95_n.1.is_finite());
+        assert!(
+            holds(patch.force_95_n, patch.force_n) && holds(patch.centre.x_95_m, patch.centre.position.x_m)
+        );
+    }
+}
+
+/// A load of 1 to 60 mm and 0.5 to 20 N around a centre, as wide as the beam allows.
+fn load(centre_m: f64, rng: &mut Xoshiro256PlusPlus) -> UniformLoad {
+    let widest_m = f64::min(0.06, 2.0 * centre_m.min(0.4 - centre_m));
+    let half_m = 0.5 * rng.random_range(0.001..widest_m.max(0.0011));
+    let force_n = 0.5 * 40_f64.powf(rng.random_range(0.0..1.0));
+    UniformLoad::along((centre_m - half_m).max(0.0), (centre_m + half_m).min(0.4), force_n)
+}
+
+fn held(readings: usize, two: bool, (from_m, to_m): (f64, f64), rng: &mut Xoshiro256PlusPlus) -> Held {
+    let beam = beam();
+    let benches = [true, false].map(|strain| LoadSensors::new(&beam, &layout(strain)).unwrap());
+    let profilers = benches.clone().map(Profiler::new);
+    let mut held = Held::default();
+    for i in 0..readings {
+        let centre_m = rng.random_range(from_m..to_m);
+        let mut loads = vec![load(centre_m, rng)];
+        if two {
+            loads.push(load(rng.random_range(centre_m + 0.1..0.4 - f64::min(centre_m, 0.1)), rng));
+        }
+        if i % 4 > 1 {
+            // Beside the other support.
+            let mirrored = |load: &UniformLoad| {
+                UniformLoad::along(0.4 - load.from().x_m, 0.4 - load.to().x_m, load.force_n())
+            };
+            loads = loads.iter().map(mirrored).collect();
+        }
+        let (sensors, profiler) = (&benches[i % 2], &profilers[i % 2]);
+        let reading = noisy(sensors, &clean(sensors, &loads), rng);
+        held.add(&profiler.profile(&reading).unwrap(), &loads);
+    }
+    held
+}
+
+/// The tables of docs/load-profiles.md for 2,000 readings: PALPATE_READINGS=2000.
+#[test]
+fn patches_are_held_wherever_they_lie() {
+    let readings = fixtures::readings(30);
+    for two in [false, true] {
+        println!(
+            "| centre | patches told | force held | bounded | centre held | centre of pressure | total |"
+        );
+        println!("|---|---|---|---|---|---|---|");
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+        for (from_m, to_m) in DISTANCES_M {
+            let held = held(readings, two, (from_m, to_m), &mut rng);
+            let share = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
+            println!(
+                "| {:.0}–{:.0} mm | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.1} % |",
+                from_m * 1e3,
+                to_m * 1e3,
+                share(held.told, held.readings),
+                share(held.force, held.told),
+                share(held.bounded, held.told),
+                share(held.centre, held.told),
+                share(held.pressure, held.told),
+                share(held.total, held.readings)
+            );
+            for (count, of) in [
+                (held.force, held.told),
+                (held.centre, held.told),
+                (held.pressure, held.told),
+                (held.total, held.readings),
+            ] {
+                assert!(share(count, of) >= 85.0, "{held:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! Means of influence functions over stretches and rectangles, of any ends, from one table.
+
+use super::cells::Cells;
+use super::{LoadChannel, LoadSensors};
+
+/// Nodes that an interpolation goes by along an axis.
+const STENCIL: usize = 4;
+
+/// Influence functions, over the noise of their sensors, summed up from the lower left corner of the surface: the sum at the nodes of a grid, between
+/// which it is cubic. A mean over a rectangle is a difference of four of its values over the area.
+pub(super) struct CumulativeInfluence {
+    channels: usize,
+    /// Sides of the surface in metres; of a line, 1 across.
+    sides_m: [f64; 2],
+    /// Nodes along x and along y.
+    nodes: [usize; 2],
+    /// Sums in 1/N times the measure, node by node along x and then along y, the channels of a node beside each other.
+    sums: Vec<f64>,
+}
+
+/// The mean over a rectangle of each channel's influence function, over its noise, in 1/N; with derivatives per metre by its ends.
+pub(super) struct EvenMean {
+    pub value: Vec<f64>,
+    /// By the ends along x and along y: the lower and the upper one.
+    pub slopes: [[Vec<f64>; 2]; 2],
+}
+
+impl CumulativeInfluence {
+    /// The table of the living channels, from the points of each cell.
+    pub fn new(sensors: &LoadSensors, cells: &Cells) -> Self {
+        let alive: Vec<&LoadChannel> = sensors.alive().collect();
+        let channels = alive.len();
+        let [along, across] = cells.points_a_side();
+        let parts = [cells.columns * along, cells.rows * across];
+        let nodes = parts.map(|parts| parts + 1);
+        let sides_m = [cells.extent.length_m(), cells.extent.width_m().unwrap_or(1.0)];
+        let measure = sides_m[0] * sides_m[1] / (parts[0] * parts[1]) as f64;
+        let mut sums = vec![0.0; nodes[0] * nodes[1] * channels];
+        for cell in 0..cells.len() {
+            let (column, row) = (cell % cells.columns, cell / cells.columns);
+            for (i, point) in cells.points(cell).into_iter().enumerate() {
+                let [x, y] = [column * along + i % along + 1, row * across + i / along + 1];
+                for (c, channel) in alive.iter().enumerate() {
+                    sums[(y * nodes[0] + x) * channels + c] =
+                        measure * channel.influence.at(point) / channel.noise_sd;
+                }
+            }
+        }
+        for (axis, step) in [(0, channels), (1, nodes[0] * channels)] {
+            for at in 0..nodes[0] * nodes[1] {
+                let place = [at % nodes[0], at / nodes[0]][axis];
+                for c in (0..channels).filter(|_| place > 0) {
+                    sums[at * channels + c] += sums[at * channels + c - step];
+                }
+            }
+        }
+        Self { channels, sides_m, nodes, sums }
+    }
+
+    /// The length of a part of the grid along an axis, in metres.
+    pub fn part_m(&self, axis: usize) -> f64 {
+        self.sides_m[axis] / (self.nodes[axis] - 1) as f64
+    }
+
+    /// The length of an axis, in metres; of a line, 1 across.
+    pub fn side_m(&self, axis: usize) -> f64 {
+        self.sides_m[axis]
+    }
+
+    /// The mean between two ends along x and two along y, in metres; the upper ends are beyond the lower ones.
+    pub fn mean(&self, ends_m: [[f64; 2]; 2]) -> EvenMean {
+        let [x, y] = [0, 1].map(|axis| ends_m[axis].map(|at_m| self.stencil(axis, at_m)));
+        let zeros = || vec![0.0; self.channels];
+        let mut value = zeros();
+        let mut slopes = [[zeros(), zeros()], [zeros(), zeros()]];
+        for (x_end, x) in x.iter().enumerate() {
+            for (y_end, y) in y.iter().enumerate() {
+                let sign = if x_end == y_end { 1.0 } else { -1.0 };
+                for (i, (wx, dx)) in x.terms() {
+                    for (j, (wy, dy)) in y.terms() {
+                        let node = &self.sums[(j * self.nodes[0] + i) * self.channels..][..self.channels];
+                        add(&mut value, sign * wx * wy, node);
+                        add(&mut slopes[0][x_end], sign * dx * wy, node);
+                        add(&mut slopes[1][y_end], sign * wx * dy, node);
+                    }
+                }
+            }
+        }
+        let lengths_m = ends_m.map(|[from_m, to_m]| to_m - from_m);
+        let area = lengths_m[0] * lengths_m[1];
+        value.iter_mut().for_each(|value| *value /= area);
+        for (slopes, length_m) in slopes.iter_mut().zip(lengths_m) {
+            // A longer stretch takes in what is beyond its end, and thins out the rest.
+            for (slopes, sign) in slopes.iter_mut().zip([1.0, -1.0]) {
+                slopes
+                    .iter_mut()
+                    .zip(&value)
+                    .for_each(|(slope, mean)| *slope = *slope / area + sign * mean / length_m);
+            }
+        }
+        EvenMean { value, slopes }
+    }
+
+    /// Lagrange's polynomials on the nodes around a place.
+    fn stencil(&self, axis: usize, at_m: f64) -> Stencil {
+        let nodes = self.nodes[axis];
+        let count = STENCIL.min(nodes);
+        let at = (at_m / self.part_m(axis)).clamp(0.0, (nodes - 1) as f64);
+        let first = (at.floor() as usize).saturating_sub(1).min(nodes - count);
+        let off = |k: usize| at - (first + k) as f64;
+        let mut terms = [(0.0, 0.0); STENCIL];
+        for (i, (weight, slope)) in terms.iter_mut().take(count).enumerate() {
+            let others = || (0..count).filter(|k| *k != i);
+            let scale: f64 = others().map(|k| i as f64 - k as f64).product();
+            *weight = others().map(off).product::<f64>() / scale;
+            let without = |left_out: usize| others().filter(|k| *k != left_out).map(off).product::<f64>();
+            *slope = others().map(without).sum::<f64>() / scale / self.part_m(axis);
+        }
+        Stencil { first, count, terms }
+    }
+}
+
+/// Weights of some nodes beside each other, and their derivatives per metre.
+struct Stencil {
+    first: usize,
+    count: usize,
+    terms: [(f64, f64); STENCIL],
+}
+
+impl Stencil {
+    fn terms(&self) -> impl Iterator<Item = (usize, (f64, f64))> {
+        (self.first..).zip(self.terms.into_iter().take(self.count))
+    }
+}
+
+fn add(sum: &mut [f64], weight: f64, values: &[f64]) {
+    sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{Foam, beam, foam_layout, layout};
+    use super::*;
+    use palpate_mechanics::contact::Position;
+    use palpate_mechanics::sensing::Layout;
+    use palpate_mechanics::surface::{Surface, UniformLoad};
+
+    /// Means and their slopes by the ends are those of loads that are summed point by point.
+    fn check(surface: &dyn Surface, layout: &Layout, ends_m: [[f64; 2]; 2], tolerance: f64) {
+        let sensors = LoadSensors::new(surface, layout).unwrap();
+        let table = CumulativeInfluence::new(&sensors, &Cells::new(sensors.extent));
+        let on_plane = sensors.extent.width_m().is_some();
+        let told = table.mean(if on_plane { ends_m } else { [ends_m[0], [0.0, 1.0]] });
+        let summed = |[[left, right], [low, high]]: [[f64; 2]; 2]| -> Vec<f64> {
+            let corner = |x_m, y_m| Position { x_m, y_m: if on_plane { y_m } else { 0.0 } };
+            let load = UniformLoad::new(corner(left, low), corner(right, high), 1.0);
+            sensors.alive().map(|channel| load.mean(&*channel.influence) / channel.noise_sd).collect()
+        };
+        let size = summed(ends_m).iter().fold(0.0, |size: f64, value| size.max(value.abs()));
+        for (told, summed) in told.value.iter().zip(summed(ends_m)) {
+            assert!((told - summed).abs() < tolerance * size, "{told} {summed}");
+        }
+        for axis in 0..sensors.extent.dimensions() {
+            for end in 0..2 {
+                let moved = |by_m: f64| {
+                    let mut ends_m = ends_m;
+                    ends_m[axis][end] += by_m;
+                    summed(ends_m)
+                };
+                let step_m = 0.05 * (ends_m[axis][1] - ends_m[axis][0]);
+                for ((slope, more), less) in
+                    told.slopes[axis][end].iter().zip(moved(step_m)).zip(moved(-step_m))
+                {
+                    let found = (more - less) / (2.0 * step_m);
+                    assert!((slope - found).abs() * step_m < 10.0 * tolerance * size, "{slope} {found}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn means_are_those_of_loads_summed_point_by_point() {
+        for ends_m in [[0.0, 0.01], [0.0033, 0.0047], [0.1, 0.31], [0.377, 0.4]] {
+            check(&beam(), &layout(false), [ends_m, [0.0, 1.0]], 1e-4);
+        }
+        check(&Foam, &foam_layout(), [[0.03, 0.11], [0.0, 0.04]], 2e-3);
+        check(&Foam, &foam_layout(), [[0.187, 0.2], [0.061, 0.077]], 2e-3);
+    }
+}

@@ -1,0 +1,467 @@
+//! Patches as evenly loaded stretches or rectangles: those that a reading does not exclude.
+//!
+//! A profile is drawn by its prior, smooth and no heavier than the reading asks for, and next to a support, where a heavy load reads as a lighter
+//! one farther in does, the prior decides. Here none does: a patch is a force F, spread evenly around a centre c over a width w, and
+//! a value v of its force, of its centre or of the centre of pressure is in the 95 % interval when some loads with that value leave
+//! ‖y − Σ F·m(c, w)‖² within [`RATIO_95`] of the least that any leave, m being the means of the influence functions over the noise
+//! (the likelihood ratio, profiled over everything else: Pawitan, *In All Likelihood*, 2001, section 3.4).
+//!
+//! The least for a given v is had without a constraint, as in [`super::bounds`]: the minimum with (v − t)²·ρ² added is the least for its own v.
+//! Minima are those of Levenberg and Marquardt, with unknowns held at the ends of their ranges. A width is told by its square, to which
+//! readings are proportional where it is small, as a share s of the way from the least, a part of the grid, to the widest
+//! at its centre: w² = w_min² + s·(w_max(c)² − w_min²).
+
+use super::cumulative::CumulativeInfluence;
+use ndarray::{Array1, Array2};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::{Extent, UniformLoad};
+use palpate_numerics::Cholesky;
+
+/// 95 % quantile of χ² of one.
+const RATIO_95: f64 = 3.84;
+/// Widths along an axis, from the least to the widest, that a mean is over.
+const WIDTHS: usize = 5;
+/// Sum of their likelihoods, beside the greatest of all, below which they miss the width that is told.
+const LEAST_WEIGHT: f64 = 0.1;
+/// Misfit that does not matter.
+const NEGLIGIBLE: f64 = 1e-3;
+/// Steps of a minimisation; a dozen is usual.
+const MOST_STEPS: usize = 200;
+/// Share by which the diagonal of the normal equations is raised at first, at least, and at most.
+const FIRST_DAMPING: f64 = 1e-4;
+const LEAST_DAMPING: f64 = 1e-12;
+const MOST_DAMPING: f64 = 1e6;
+/// Times that a search for an end doubles its step; beyond, there is none.
+const MOST_DOUBLINGS: usize = 40;
+/// Halvings of the interval that holds an end.
+const MOST_HALVINGS: usize = 20;
+
+/// Loads that explain a reading: as many as there are patches.
+pub(super) struct EvenLoads<'a> {
+    table: &'a CumulativeInfluence,
+    y: &'a Array1<f64>,
+    dimensions: usize,
+    best: Minimum,
+}
+
+/// Unknowns at a minimum: of each load its force, and along each axis its centre and the share of its width.
+#[derive(Clone)]
+struct Minimum {
+    unknowns: Vec<f64>,
+    misfit: f64,
+}
+
+/// Value that an interval is of.
+#[derive(Clone, Copy)]
+pub(super) enum Aim {
+    /// Force of a load, in newtons.
+    Force(usize),
+    /// Force of all loads, in newtons.
+    Total,
+    /// Centre of a load along an axis, in metres.
+    Centre(usize, usize),
+    /// Centre of pressure along an axis, in metres.
+    CentreOfPressure(usize),
+}
+
+/// A value that is drawn to `t` with the weight ρ².
+type Drawn = (Aim, f64, f64);
+
+impl<'a> EvenLoads<'a> {
+    /// The loads of least misfit, from those that a profile shows; `None` without any.
+    pub fn new(
+        table: &'a CumulativeInfluence,
+        y: &'a Array1<f64>,
+        extent: Extent,
+        starts: &[UniformLoad],
+    ) -> Option<Self> {
+        let mut loads = Self {
+            table,
+            y,
+            dimensions: extent.dimensions(),
+            best: Minimum { unknowns: Vec::new(), misfit: f64::INFINITY },
+        };
+        // Beside a support a profile is drawn inwards: the same moment may be that of a heavier load nearer to it.
+        for nearer in [1.0, 0.5, 0.25] {
+            let unknowns = starts.iter().flat_map(|start| loads.unknowns_of(start, nearer)).collect();
+            let found = loads.minimum(unknowns, None, &[]);
+            if found.misfit < loads.best.misfit {
+                loads.best = found;
+            }
+        }
+        loads.best.misfit.is_finite().then_some(loads)
+    }
+
+    /// The misfit that they leave.
+    pub fn misfit(&self) -> f64 {
+        self.best.misfit
+    }
+
+    /// One of the loads, the mean over widths of the likeliest of each width, by their likelihoods: of widths that the reading does not tell apart, the
+    /// likeliest is as good as drawn by lot.
+    pub fn mean_load(&self, number: usize) -> UniformLoad {
+        let first = number * self.each();
+        let shares: Vec<usize> = (0..self.dimensions).map(|axis| first + 2 + 2 * axis).collect();
+        let (mut sum, mut weights) = (vec![0.0; self.each()], 0.0);
+        for i in 0..WIDTHS.pow(self.dimensions as u32) {
+            let mut unknowns = self.best.unknowns.clone();
+            for (axis, share) in shares.iter().enumerate() {
+                unknowns[*share] = (i / WIDTHS.pow(axis as u32) % WIDTHS) as f64 / (WIDTHS - 1) as f64;
+            }
+            let found = self.minimum(unknowns, None, &shares);
+            let weight = (0.5 * (self.best.misfit - found.misfit)).exp();
+            weights += weight;
+            sum.iter_mut().zip(&found.unknowns[first..]).for_each(|(sum, value)| *sum += weight * value);
+        }
+        let mean: Vec<f64> = sum.into_iter().map(|sum| sum / weights).collect();
+        let is_sound = weights > LEAST_WEIGHT && mean.iter().all(|value| value.is_finite());
+        self.load(if is_sound { &mean } else { &self.best.unknowns[first..][..self.each()] })
+    }
+
+    /// The load of some unknowns.
+    fn load(&self, unknowns: &[f64]) -> UniformLoad {
+        let [[left, right], [low, high]] = self.ends_m(unknowns);
+        let corner = |x_m, y_m| Position { x_m, y_m: if self.dimensions > 1 { y_m } else { 0.0 } };
+        UniformLoad::new(corner(left, low), corner(right, high), unknowns[0])
+    }
+
+    /// The 95 % interval of a value; the upper end of a force is infinite where the reading gives none.
+    pub fn interval_95(&self, aim: Aim) -> (f64, f64) {
+        let whole = match aim {
+            Aim::Force(_) | Aim::Total => (0.0, f64::INFINITY),
+            Aim::Centre(_, axis) | Aim::CentreOfPressure(axis) => (0.0, self.table.side_m(axis)),
+        };
+        let Some(sd) = self.sd(aim) else { return whole };
+        let [low, high] = [-sd, sd].map(|step| self.end(aim, step));
+        (low.unwrap_or(whole.0), high.unwrap_or(whole.1))
+    }
+
+    /// Number of the unknowns of a load.
+    fn each(&self) -> usize {
+        1 + 2 * self.dimensions
+    }
+
+    fn unknowns_of(&self, load: &UniformLoad, nearer: f64) -> Vec<f64> {
+        let (centre, from, to) = (load.centre(), load.from(), load.to());
+        let along = [(centre.x_m, to.x_m - from.x_m), (centre.y_m, to.y_m - from.y_m)];
+        let mut unknowns = vec![load.force_n() / nearer];
+        for (axis, (centre_m, width_m)) in along.into_iter().take(self.dimensions).enumerate() {
+            let side_m = self.table.side_m(axis);
+            let centre_m = if centre_m < 0.5 * side_m {
+                nearer * centre_m
+            } else {
+                side_m - nearer * (side_m - centre_m)
+            };
+            let nearest_m = 0.5 * self.table.part_m(axis);
+            let centre_m = centre_m.clamp(nearest_m, side_m - nearest_m);
+            let widest_m = 2.0 * centre_m.min(side_m - centre_m);
+            unknowns.extend([centre_m, (nearer * width_m / widest_m).powi(2).clamp(0.0, 1.0)]);
+        }
+        unknowns
+    }
+
+    /// Width along an axis in metres, with its derivatives by the centre and by the share.
+    fn width_m(&self, axis: usize, centre_m: f64, share: f64) -> (f64, f64, f64) {
+        let (side_m, least_m) = (self.table.side_m(axis), self.table.part_m(axis));
+        let widest_m = 2.0 * centre_m.min(side_m - centre_m);
+        let inwards = if centre_m < 0.5 * side_m { 2.0 } else { -2.0 };
+        let (least, spread) = (least_m * least_m, widest_m * widest_m - least_m * least_m);
+        let width_m = (least + share * spread).sqrt();
+        (width_m, share * widest_m * inwards / width_m, 0.5 * spread / width_m)
+    }
+
+    /// Ends of a load along x and y, in metres.
+    fn ends_m(&self, unknowns: &[f64]) -> [[f64; 2]; 2] {
+        let mut ends_m = [0, 1].map(|axis| [0.0, self.table.side_m(axis)]);
+        for (axis, place) in unknowns[1..].chunks(2).enumerate() {
+            let (width_m, ..) = self.width_m(axis, place[0], place[1]);
+            ends_m[axis] = [place[0] - 0.5 * width_m, place[0] + 0.5 * width_m];
+        }
+        ends_m
+    }
+
+    /// Residuals and their derivatives, an unknown a row.
+    fn residuals(&self, unknowns: &[f64]) -> (Array1<f64>, Array2<f64>) {
+        let mut residuals = -self.y.clone();
+        let mut slopes = Array2::zeros((unknowns.len(), self.y.len()));
+        for (k, load) in unknowns.chunks(self.each()).enumerate() {
+            let (first, force_n) = (k * self.each(), load[0]);
+            let mean = self.table.mean(self.ends_m(load));
+            let places: Vec<_> = load[1..]
+                .chunks(2)
+                .enumerate()
+                .map(|(axis, place)| self.width_m(axis, place[0], place[1]))
+                .collect();
+            for i in 0..self.y.len() {
+                residuals[i] += force_n * mean.value[i];
+                slopes[[first, i]] = mean.value[i];
+                for (axis, (_, by_centre, by_share)) in places.iter().enumerate() {
+                    let [from, to] = [0, 1].map(|end| mean.slopes[axis][end][i]);
+                    let wider = 0.5 * (to - from);
+                    slopes[[first + 1 + 2 * axis, i]] = force_n * (from + to + wider * by_centre);
+                    slopes[[first + 2 + 2 * axis, i]] = force_n * wider * by_share;
+                }
+            }
+        }
+        (residuals, slopes)
+    }
+
+    fn value_at(&self, aim: Aim, unknowns: &[f64]) -> f64 {
+        match aim {
+            Aim::Force(load) => unknowns[load * self.each()],
+            Aim::Total => unknowns.chunks(self.each()).map(|load| load[0]).sum(),
+            Aim::Centre(load, axis) => unknowns[load * self.each() + 1 + 2 * axis],
+            Aim::CentreOfPressure(axis) => {
+                let loads = || unknowns.chunks(self.each());
+                let force_n: f64 = loads().map(|load| load[0]).sum();
+                loads().map(|load| load[0] * load[1 + 2 * axis]).sum::<f64>() / force_n
+            }
+        }
+    }
+
+    fn slope_of(&self, aim: Aim, unknowns: &[f64]) -> Array1<f64> {
+        let mut slope = Array1::zeros(unknowns.len());
+        match aim {
+            Aim::Force(load) => slope[load * self.each()] = 1.0,
+            Aim::Total => slope.iter_mut().step_by(self.each()).for_each(|slope| *slope = 1.0),
+            Aim::Centre(load, axis) => slope[load * self.each() + 1 + 2 * axis] = 1.0,
+            Aim::CentreOfPressure(axis) => {
+                let force_n: f64 = unknowns.chunks(self.each()).map(|load| load[0]).sum();
+                let centre_m = self.value_at(aim, unknowns);
+                for (k, load) in unknowns.chunks(self.each()).enumerate() {
+                    let (first, at) = (k * self.each(), 1 + 2 * axis);
+                    slope[first] = (load[at] - centre_m) / force_n;
+                    slope[first + at] = load[0] / force_n;
+                }
+            }
+        }
+        slope
+    }
+
+    /// The range of an unknown. A force of nothing would have no centre.
+    fn range(&self, unknown: usize) -> (f64, f64) {
+        match unknown % self.each() {
+            0 => (LEAST_FORCE_N, f64::INFINITY),
+            i if i % 2 == 1 => {
+                let axis = (i - 1) / 2;
+                let nearest_m = 0.5 * self.table.part_m(axis);
+                (nearest_m, self.table.side_m(axis) - nearest_m)
+            }
+            _ => (0.0, 1.0),
+        }
+    }
+
+    /// The minimum of the misfit near some unknowns, of which some are held; a value may be drawn.
+    fn minimum(&self, mut unknowns: Vec<f64>, drawn: Option<Drawn>, held: &[usize]) -> Minimum {
+        let mut damping = FIRST_DAMPING;
+        let mut here = self.normal_equations(&unknowns, drawn);
+        for _ in 0..MOST_STEPS {
+            let tried = self.step(&unknowns, &here, damping, held);
+            let there = tried.as_ref().map(|tried| self.normal_equations(tried, drawn));
+            let gain = there.as_ref().map_or(f64::NEG_INFINITY, |there| here.cost - there.cost);
+            // Along a valley, as of force and width, a damped step gains little anywhere.
+            let is_there = gain.abs() < 0.01 * NEGLIGIBLE && damping <= LEAST_DAMPING;
+            if let (Some(tried), Some(there), true) = (tried, there, gain > 0.0) {
+                (unknowns, here) = (tried, there);
+                damping = f64::max(0.1 * damping, LEAST_DAMPING);
+            } else {
+                damping *= 10.0;
+            }
+            if is_there || damping > MOST_DAMPING {
+                break;
+            }
+        }
+        Minimum { misfit: here.misfit, unknowns }
+    }
+
+    fn normal_equations(&self, unknowns: &[f64], drawn: Option<Drawn>) -> NormalEquations {
+        let (residuals, slopes) = self.residuals(unknowns);
+        let misfit = residuals.dot(&residuals);
+        let mut found = NormalEquations {
+            misfit,
+            cost: misfit,
+            gradient: slopes.dot(&residuals),
+            hessian: slopes.dot(&slopes.t()),
+        };
+        if let Some((aim, t, stiffness)) = drawn {
+            let (off, slope) = (self.value_at(aim, unknowns) - t, self.slope_of(aim, unknowns));
+            found.cost += stiffness * off * off;
+            found.gradient.scaled_add(stiffness * off, &slope);
+            for (i, mut row) in found.hessian.outer_iter_mut().enumerate() {
+                row.scaled_add(stiffness * slope[i], &slope);
+            }
+        }
+        found
+    }
+
+    /// Unknowns after a step of Levenberg and Marquardt, in which those at an end of their range stay there or come away from it; `None` where the
+    /// equations have no solution.
+    fn step(
+        &self,
+        unknowns: &[f64],
+        here: &NormalEquations,
+        damping: f64,
+        held: &[usize],
+    ) -> Option<Vec<f64>> {
+        let mut free: Vec<usize> = (0..unknowns.len()).filter(|i| !held.contains(i)).collect();
+        loop {
+            let found = solve(&here.hessian, &free, damping, &here.gradient)?;
+            let stays = |(i, value): (&usize, &f64)| {
+                let (least, most) = self.range(*i);
+                unknowns[*i] <= least && *value > 0.0 || unknowns[*i] >= most && *value < 0.0
+            };
+            let inwards: Vec<usize> =
+                free.iter().zip(&found).filter(|pair| !stays(*pair)).map(|(i, _)| *i).collect();
+            if inwards.len() == free.len() {
+                let mut tried = unknowns.to_vec();
+                for (i, value) in free.iter().zip(&found) {
+                    let (least, most) = self.range(*i);
+                    tried[*i] = (tried[*i] - value).clamp(least, most);
+                }
+                return tried.iter().all(|value| value.is_finite()).then_some(tried);
+            }
+            free = inwards;
+        }
+    }
+
+    /// Standard deviation of a value to first order; `None` where the reading does not tell it.
+    fn sd(&self, aim: Aim) -> Option<f64> {
+        let unknowns = &self.best.unknowns;
+        let here = self.normal_equations(unknowns, None);
+        let slope = self.slope_of(aim, unknowns);
+        let everything: Vec<usize> = (0..unknowns.len()).collect();
+        let sd = slope.dot(&solve(&here.hessian, &everything, 1e-9, &slope)?).sqrt();
+        Some(sd.min(self.value_at(aim, unknowns))).filter(|sd| sd.is_finite() && *sd > 0.0)
+    }
+
+    /// The value at which the least misfit reaches the largest one that is not excluded, found by steps of `step` to begin with; `None` where there is
+    /// no end but that of the surface.
+    fn end(&self, aim: Aim, step: f64) -> Option<f64> {
+        let most = self.best.misfit + RATIO_95;
+        let stiffness = 1.0 / (step * step);
+        let start = self.value_at(aim, &self.best.unknowns);
+        let (mut inside, mut from, mut way) = (self.best.clone(), start, 2.0 * step);
+        for _ in 0..MOST_DOUBLINGS {
+            let t = start + way;
+            let found = self.minimum(inside.unknowns.clone(), Some((aim, t, stiffness)), &[]);
+            if found.misfit > most {
+                return self.between((aim, stiffness, most), (from, inside), (t, found));
+            }
+            let (was, is) = (self.value_at(aim, &inside.unknowns), self.value_at(aim, &found.unknowns));
+            (inside, from) = (found, t);
+            // It does not follow.
+            if way.abs() > 8.0 * step.abs() && (is - was).abs() < 1e-6 * step.abs() {
+                return (!self.is_at_edge(aim, &inside.unknowns)).then_some(is);
+            }
+            way *= 2.0;
+        }
+        None
+    }
+
+    /// The value between two targets t at which the least misfit is the largest one.
+    fn between(
+        &self,
+        (aim, stiffness, most): (Aim, f64, f64),
+        mut inside: (f64, Minimum),
+        mut outside: (f64, Minimum),
+    ) -> Option<f64> {
+        for _ in 0..MOST_HALVINGS {
+            if outside.1.misfit - most < 10.0 * NEGLIGIBLE || most - inside.1.misfit < 10.0 * NEGLIGIBLE {
+                break;
+            }
+            let t = inside.0.midpoint(outside.0);
+            let found = self.minimum(inside.1.unknowns.clone(), Some((aim, t, stiffness)), &[]);
+            let end = if found.misfit > most { &mut outside } else { &mut inside };
+            *end = (t, found);
+        }
+        let [low, high] =
+            [&inside, &outside].map(|(_, minimum)| (minimum.misfit, self.value_at(aim, &minimum.unknowns)));
+        let share = (most - low.0) / (high.0 - low.0).max(f64::MIN_POSITIVE);
+        (!self.is_at_edge(aim, &inside.1.unknowns)).then_some(low.1 + share * (high.1 - low.1))
+    }
+
+    /// Whether a load that a value is of is as near to an edge as it can be: a narrower one would be nearer, and harder.
+    fn is_at_edge(&self, aim: Aim, unknowns: &[f64]) -> bool {
+        let is_at_end = |i: usize| {
+            let (least, most) = self.range(i);
+            unknowns[i] <= least || unknowns[i] >= most
+        };
+        let mut loads = 0..unknowns.len() / self.each();
+        let is_at_edge =
+            |load: usize| (0..self.dimensions).any(|axis| is_at_end(load * self.each() + 1 + 2 * axis));
+        match aim {
+            Aim::Force(load) => is_at_edge(load),
+            Aim::Centre(load, axis) => is_at_end(load * self.each() + 1 + 2 * axis),
+            Aim::Total | Aim::CentreOfPressure(_) => loads.any(is_at_edge),
+        }
+    }
+}
+
+/// Least force of a load, in newtons.
+const LEAST_FORCE_N: f64 = 1e-12;
+
+/// Half of the misfit's derivatives, to first order in the residuals' own.
+struct NormalEquations {
+    misfit: f64,
+    /// The misfit with what a value is drawn by.
+    cost: f64,
+    gradient: Array1<f64>,
+    hessian: Array2<f64>,
+}
+
+/// Solves the listed rows and columns for the same rows of `right`, with the diagonal raised by a share; `None` where there is no solution.
+fn solve(hessian: &Array2<f64>, listed: &[usize], share: f64, right: &Array1<f64>) -> Option<Array1<f64>> {
+    if listed.is_empty() {
+        return None;
+    }
+    // In units of each unknown, so that newtons and metres weigh alike.
+    let scales: Vec<f64> = listed.iter().map(|i| hessian[[*i, *i]].sqrt().max(f64::MIN_POSITIVE)).collect();
+    let scaled = Array2::from_shape_fn((listed.len(), listed.len()), |(i, j)| {
+        let value = hessian[[listed[i], listed[j]]] / scales[i] / scales[j];
+        if i == j { 1.0 + share } else { value }
+    });
+    let right: Array1<f64> = listed.iter().zip(&scales).map(|(i, scale)| right[*i] / scale).collect();
+    let mut solution = Cholesky::factor(scaled).ok()?.solve(&right);
+    solution.iter_mut().zip(&scales).for_each(|(value, scale)| *value /= scale);
+    Some(solution)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cells::Cells;
+    use super::super::tests::{beam, clean};
+    use super::super::{LoadSensors, cumulative};
+    use super::*;
+    use palpate_mechanics::sensing::{Layout, SensorKind};
+
+    /// A deflection of a simple beam is a·F times a quadratic in a², a being the place of F on the near side of the sensor: it tells F·c and the mean
+    /// square c² + w²/4 of a³ over a, and no width apart from the centre. So the centre is from R/√2, where the load begins at the support, to
+    /// R = √(c² + w²/4), where it has no width, and the force from F·c/R on.
+    #[test]
+    fn loads_that_read_alike_are_in_the_interval() {
+        let beam = beam();
+        let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
+        layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 2e-6)).unwrap();
+        let sensors = LoadSensors::new(&beam, &layout).unwrap();
+        let table = cumulative::CumulativeInfluence::new(&sensors, &Cells::new(sensors.extent));
+        let load = UniformLoad::along(0.01, 0.03, 2000.0);
+        let y = clean(&sensors, &[load]).iter().map(|value| value / 2e-6).collect();
+        let even = EvenLoads::new(&table, &y, sensors.extent, &[load]).unwrap();
+        assert!(even.misfit() < 1.0, "{}", even.misfit());
+        let (moment, farthest_m) = (2000.0 * 0.02, (0.02_f64.powi(2) + 0.02_f64.powi(2) / 4.0).sqrt());
+        let near = |(low, high): (f64, f64), expected: (f64, f64)| {
+            let off = (low / expected.0 - 1.0).abs().max((high / expected.1 - 1.0).abs());
+            assert!(off < 0.02, "{low} to {high}, not {expected:?}");
+        };
+        let root = 2.0_f64.sqrt();
+        near(even.interval_95(Aim::Centre(0, 0)), (farthest_m / root, farthest_m));
+        near(even.interval_95(Aim::CentreOfPressure(0)), (farthest_m / root, farthest_m));
+        near(even.interval_95(Aim::Force(0)), (moment / farthest_m, moment / farthest_m * root));
+        near(even.interval_95(Aim::Total), (moment / farthest_m, moment / farthest_m * root));
+        let mean = even.mean_load(0);
+        assert!(
+            (mean.centre().x_m / 0.02 - 1.0).abs() < 0.15 && (mean.force_n() / 2000.0 - 1.0).abs() < 0.15,
+            "{mean:?}"
+        );
+    }
+}

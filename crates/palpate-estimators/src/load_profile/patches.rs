@@ -1,0 +1,252 @@
+//! The patches of a load: the connected parts of a surface that carry it.
+
+use super::cells::Cells;
+use super::even_loads::{Aim, EvenLoads};
+use crate::status::OUTSIDE_MODEL_RATE;
+use ndarray::Array2;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::{Extent, UniformLoad};
+use palpate_numerics::{normal_interval_95, normal_quantile};
+use serde::Serialize;
+
+/// A patch is where the load is above this share of its highest density.
+pub const PATCH_SHARE: f64 = 0.1;
+/// Cells between a patch and another that it may be part of.
+const REACH_CELLS: usize = 2;
+
+/// Centre of pressure: the mean position of a load.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CentreOfPressure {
+    /// The place.
+    pub position: Position,
+    /// Standard deviation along x, in metres, by the mixture.
+    pub sd_x_m: f64,
+    /// Standard deviation along y, in metres; 0 on a line.
+    pub sd_y_m: f64,
+    /// The ends of the 95 % interval along x, in metres.
+    pub x_95_m: (f64, f64),
+    /// The ends of the 95 % interval along y, in metres.
+    pub y_95_m: (f64, f64),
+}
+
+/// A connected part of the surface that carries load.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Patch {
+    /// Its left end, or lower left corner: where the load rises above the share of its highest density.
+    pub from: Position,
+    /// Its right end, or upper right corner.
+    pub to: Position,
+    /// Centre of its force.
+    pub centre: CentreOfPressure,
+    /// Its force in newtons, its flanks below the share included.
+    pub force_n: f64,
+    /// Standard deviation of the force, by the mixture.
+    pub force_sd_n: f64,
+    /// The ends of the force's 95 % interval, in newtons; the upper one is infinite where the reading does not bound it.
+    pub force_95_n: (f64, f64),
+}
+
+impl CentreOfPressure {
+    fn new(position: Position, (sd_x_m, sd_y_m): (f64, f64)) -> Self {
+        let (x_95_m, y_95_m) =
+            (normal_interval_95(position.x_m, sd_x_m), normal_interval_95(position.y_m, sd_y_m));
+        Self { position, sd_x_m, sd_y_m, x_95_m, y_95_m }
+    }
+
+    /// Gives it the intervals of even loads; true where they hold it.
+    pub(super) fn follow(&mut self, even: &EvenLoads, extent: Extent, aim: impl Fn(usize) -> Aim) -> bool {
+        self.x_95_m = even.interval_95(aim(0));
+        if extent.dimensions() > 1 {
+            self.y_95_m = even.interval_95(aim(1));
+        }
+        holds(self.x_95_m, self.position.x_m) && holds(self.y_95_m, self.position.y_m)
+    }
+
+    /// Moves it, and its intervals with it where they do not hold it there.
+    pub(super) fn move_to(&mut self, position: Position) {
+        self.position = position;
+        self.x_95_m = hull(self.x_95_m, position.x_m);
+        self.y_95_m = hull(self.y_95_m, position.y_m);
+    }
+}
+
+impl Patch {
+    /// Gives the patch the intervals of an even load in its place, and that load where they do not hold its own force or centre.
+    pub(super) fn follow(&mut self, even: &EvenLoads, number: usize, extent: Extent) {
+        self.force_95_n = even.interval_95(Aim::Force(number));
+        let is_held = self.centre.follow(even, extent, |axis| Aim::Centre(number, axis));
+        if !(is_held && holds(self.force_95_n, self.force_n)) {
+            let load = even.mean_load(number);
+            (self.from, self.to, self.force_n) = (load.from(), load.to(), load.force_n());
+            self.centre.move_to(load.centre());
+            self.force_95_n = hull(self.force_95_n, self.force_n);
+        }
+    }
+
+    /// An even load of its force and sizes around its centre, as far as the surface reaches: what its limit is of.
+    pub fn as_load(&self, extent: Extent) -> UniformLoad {
+        let Position { x_m, y_m } = self.centre.position;
+        let side = |centre: f64, (from, to): (f64, f64), size: f64| {
+            let half = (0.5 * (to - from)).min(centre).min(size - centre).max(0.0);
+            (centre - half, centre + half)
+        };
+        let (left, right) = side(x_m, (self.from.x_m, self.to.x_m), extent.length_m());
+        let (low, high) = side(y_m, (self.from.y_m, self.to.y_m), extent.width_m().unwrap_or(0.0));
+        let corner = |x_m, y_m| Position { x_m, y_m };
+        UniformLoad::new(corner(left, low), corner(right, high), self.force_n)
+    }
+}
+
+/// Whether an interval holds a value.
+pub(super) fn holds((low, high): (f64, f64), value: f64) -> bool {
+    (low..=high).contains(&value)
+}
+
+/// An interval with a value added.
+pub(super) fn hull((low, high): (f64, f64), value: f64) -> (f64, f64) {
+    (low.min(value), high.max(value))
+}
+
+/// The mean position of patches, by their forces.
+pub(super) fn mean_position(patches: &[(Part, Patch)]) -> Position {
+    let force_n: f64 = patches.iter().map(|(_, patch)| patch.force_n).sum();
+    let along = |coordinate: fn(Position) -> f64| {
+        patches.iter().map(|(_, patch)| patch.force_n * coordinate(patch.centre.position)).sum::<f64>()
+            / force_n
+    };
+    Position { x_m: along(|p| p.x_m), y_m: along(|p| p.y_m) }
+}
+
+/// The mean position of the force of some cells, with its standard deviation to first order; `None` where they have none.
+pub(super) fn centre_of(
+    cells: &Cells,
+    listed: &[usize],
+    forces_n: &[f64],
+    covariance: &Array2<f64>,
+) -> Option<CentreOfPressure> {
+    let force: f64 = listed.iter().map(|cell| forces_n[*cell]).sum();
+    if force <= 0.0 {
+        return None;
+    }
+    let along = |coordinate: fn(Position) -> f64| {
+        let at = |cell: &usize| coordinate(cells.centre(*cell));
+        let mean = listed.iter().map(|cell| at(cell) * forces_n[*cell]).sum::<f64>() / force;
+        let slopes: Vec<f64> = listed.iter().map(|cell| (at(cell) - mean) / force).collect();
+        (mean, sd_of_sum(listed, &slopes, covariance))
+    };
+    let ((x_m, sd_x_m), (y_m, sd_y_m)) = (along(|p| p.x_m), along(|p| p.y_m));
+    Some(CentreOfPressure::new(Position { x_m, y_m }, (sd_x_m, sd_y_m)))
+}
+
+/// Standard deviation of Σ slope·force over some cells.
+fn sd_of_sum(listed: &[usize], slopes: &[f64], covariance: &Array2<f64>) -> f64 {
+    let row = |(i, a): (&usize, &f64)| {
+        listed.iter().zip(slopes).map(|(j, b)| a * b * covariance[[*i, *j]]).sum::<f64>()
+    };
+    listed.iter().zip(slopes).map(row).sum::<f64>().max(0.0).sqrt()
+}
+
+/// A patch in the making: cells above the share, and all cells with its flanks.
+pub(super) struct Part {
+    pub core: Vec<usize>,
+    pub all: Vec<usize>,
+}
+
+/// The patches of a profile, along x.
+///
+/// Connected cells above the share of the highest are patches; each takes the cells downhill from it as its flanks, up to the
+/// valley to the next. A patch whose force does not stand out of its own uncertainty becomes a part of the one beside it, or,
+/// where there is none, is none.
+pub(super) fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<(Part, Patch)> {
+    let mut parts = grow(cells, forces_n, cores(cells, forces_n));
+    let least_ratio = normal_quantile(1.0 - OUTSIDE_MODEL_RATE);
+    let stands_out = |part: &Part| {
+        let (force, sd) = force_of(&part.all, forces_n, covariance);
+        force > least_ratio * sd
+    };
+    let force = |part: &Part| force_of(&part.all, forces_n, covariance).0;
+    let weakest = |parts: &[Part]| {
+        let weak = (0..parts.len()).filter(|number| !stands_out(&parts[*number]));
+        weak.min_by(|a, b| force(&parts[*a]).total_cmp(&force(&parts[*b])))
+    };
+    while let Some(weak) = weakest(&parts) {
+        let part = parts.swap_remove(weak);
+        if let Some(beside) = parts.iter_mut().find(|other| touches(cells, &part.all, &other.all)) {
+            beside.all.extend(part.all);
+        }
+    }
+    let of_part = |part: Part| patch(cells, &part, forces_n, covariance).map(|patch| (part, patch));
+    let mut patches: Vec<(Part, Patch)> = parts.into_iter().filter_map(of_part).collect();
+    patches.sort_by(|(_, a), (_, b)| a.centre.position.x_m.total_cmp(&b.centre.position.x_m));
+    patches
+}
+
+/// Connected cells above the share of the highest.
+fn cores(cells: &Cells, forces_n: &[f64]) -> Vec<Vec<usize>> {
+    let highest = forces_n.iter().fold(0.0, |most: f64, force| most.max(*force));
+    let mut open: Vec<bool> = forces_n.iter().map(|force| *force > PATCH_SHARE * highest).collect();
+    let mut cores = Vec::new();
+    for start in 0..cells.len() {
+        let mut core = Vec::new();
+        let mut edge = vec![start];
+        while let Some(cell) = edge.pop() {
+            if std::mem::replace(&mut open[cell], false) {
+                core.push(cell);
+                edge.extend(cells.neighbours(cell));
+            }
+        }
+        if !core.is_empty() {
+            cores.push(core);
+        }
+    }
+    cores
+}
+
+/// Gives each part the cells that lie downhill from it, the highest first.
+fn grow(cells: &Cells, forces_n: &[f64], cores: Vec<Vec<usize>>) -> Vec<Part> {
+    let mut owner = vec![None; cells.len()];
+    for (number, core) in cores.iter().enumerate() {
+        core.iter().for_each(|cell| owner[*cell] = Some(number));
+    }
+    let mut parts: Vec<Part> = cores.into_iter().map(|core| Part { all: core.clone(), core }).collect();
+    let mut flanks: Vec<usize> =
+        (0..cells.len()).filter(|cell| owner[*cell].is_none() && forces_n[*cell] > 0.0).collect();
+    flanks.sort_by(|a, b| forces_n[*b].total_cmp(&forces_n[*a]));
+    for cell in flanks {
+        let uphill = cells.neighbours(cell).filter(|beside| owner[*beside].is_some());
+        let uphill = uphill.max_by(|a, b| forces_n[*a].total_cmp(&forces_n[*b]));
+        if let Some(number) = uphill.and_then(|beside| owner[beside]) {
+            owner[cell] = Some(number);
+            parts[number].all.push(cell);
+        }
+    }
+    parts
+}
+
+/// Whether at most [`REACH_CELLS`] cells lie between two sets of cells.
+fn touches(cells: &Cells, one: &[usize], other: &[usize]) -> bool {
+    let place = |cell: usize| (cell % cells.columns, cell / cells.columns);
+    one.iter().any(|a| {
+        other.iter().any(|b| {
+            let ((ax, ay), (bx, by)) = (place(*a), place(*b));
+            ax.abs_diff(bx).max(ay.abs_diff(by)) <= REACH_CELLS + 1
+        })
+    })
+}
+
+fn force_of(listed: &[usize], forces_n: &[f64], covariance: &Array2<f64>) -> (f64, f64) {
+    let force = listed.iter().map(|cell| forces_n[*cell]).sum();
+    (force, sd_of_sum(listed, &vec![1.0; listed.len()], covariance))
+}
+
+fn patch(cells: &Cells, part: &Part, forces_n: &[f64], covariance: &Array2<f64>) -> Option<Patch> {
+    let centre = centre_of(cells, &part.all, forces_n, covariance)?;
+    let (force_n, force_sd_n) = force_of(&part.all, forces_n, covariance);
+    let corners = part.core.iter().map(|cell| cells.corners(*cell));
+    let (from, to) = corners.reduce(|(from, to), (low, high)| {
+        let least = Position { x_m: from.x_m.min(low.x_m), y_m: from.y_m.min(low.y_m) };
+        (least, Position { x_m: to.x_m.max(high.x_m), y_m: to.y_m.max(high.y_m) })
+    })?;
+    let (low_n, high_n) = normal_interval_95(force_n, force_sd_n);
+    Some(Patch { from, to, centre, force_n, force_sd_n, force_95_n: (low_n.max(0.0), high_n) })
+}
