@@ -388,6 +388,7 @@ impl Posterior<'_> {
         let channels = |x_m: f64, _: f64, channels: &mut Vec<[f64; 2]>| {
             channels.clear();
             channels.extend(self.reading.iter().zip(self.influence_at(x_m)).map(|(d, (f, _))| [*d, f]));
+            0.0
         };
         let strongest = found.iter().map(|at| at.force_n).fold(0.0, f64::max);
         let contacts = Contacts {

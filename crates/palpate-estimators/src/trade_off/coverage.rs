@@ -1,16 +1,18 @@
 //! Coverage of contacts by their distance from the end of the paper's beam.
 
 use super::PRIOR_FORCES;
+use crate::arrangement::Training;
 use crate::closed_form::ClosedForm;
 use crate::fit::{Fit, FitTask, Locate, NoCheck};
 use crate::fixtures::{Example, force_95_n, paper, readings};
-use crate::influence::Influence;
+use crate::influence::{Influence, InfluenceSource};
 use crate::simulate::clean_reading;
 use palpate_core::Status;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{ChannelErrors, measure};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
+use std::ops::RangeInclusive;
 
 /// Distances from the left end, in millimetres.
 const PLACES_MM: [f64; 11] = [0.5, 1.0, 2.0, 4.0, 7.0, 10.0, 15.0, 22.0, 25.0, 40.0, 100.0];
@@ -88,6 +90,7 @@ fn print_and_check(
     bench: &Example,
     locators: &[Box<dyn Locate<Check = NoCheck>>],
     forces_n: &[f64],
+    allowed_percent: RangeInclusive<f64>,
 ) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(15);
     let mut wrong = Vec::new();
@@ -108,8 +111,12 @@ fn print_and_check(
                 row.greatest_n,
                 row.percent(row.not_explained)
             );
-            let good = |percent: f64| (93.0..=97.0).contains(&percent) || row.found < readings;
-            if !good(place) || force < 93.0 || row.outside > 0 || row.greatest_n > PRIOR_FORCES * 3.0 {
+            let good = |percent: f64| allowed_percent.contains(&percent) || row.found < readings;
+            if !good(place)
+                || force < *allowed_percent.start()
+                || row.outside > 0
+                || row.greatest_n > PRIOR_FORCES * 3.0
+            {
                 wrong.push(format!("{force_n} N at {place_mm} mm: {row:?}"));
             }
         }
@@ -118,9 +125,18 @@ fn print_and_check(
 }
 
 fn influence(bench: &Example, calibrations: u64) -> Vec<Box<dyn Locate<Check = NoCheck>>> {
+    influence_of(InfluenceSource::Corrected, bench, calibrations)
+}
+
+fn influence_of(
+    source: InfluenceSource,
+    bench: &Example,
+    calibrations: u64,
+) -> Vec<Box<dyn Locate<Check = NoCheck>>> {
+    let influence = Influence { source, ..Influence::default() };
     let fit = |seed: u64| -> Box<dyn Locate<Check = NoCheck>> {
         let recording = bench.simulate(seed);
-        Box::new(Influence::default().fit_beam(FitTask::new(&bench.setup, &recording)).unwrap())
+        Box::new(influence.fit_beam(FitTask::new(&bench.setup, &recording)).unwrap())
     };
     (0..calibrations).map(fit).collect()
 }
@@ -164,23 +180,52 @@ fn a_greatest_force_that_is_said_bounds_estimates_and_intervals() {
 #[test]
 fn influence_covers_unknown_forces_at_every_distance_from_the_end() {
     let bench = bench(false);
-    print_and_check("influence, force unknown", &bench, &influence(&bench, 200), &[1.0, 3.0, 6.0]);
+    print_and_check(
+        "influence, force unknown",
+        &bench,
+        &influence(&bench, 200),
+        &[1.0, 3.0, 6.0],
+        93.0..=97.0,
+    );
 }
 
 #[test]
 fn the_closed_form_covers_unknown_forces_at_every_distance_from_the_end() {
     let bench = bench(false);
-    print_and_check("closed form, force unknown", &bench, &closed_form(&bench), &[1.0, 3.0, 6.0]);
+    print_and_check(
+        "closed form, force unknown",
+        &bench,
+        &closed_form(&bench),
+        &[1.0, 3.0, 6.0],
+        93.0..=97.0,
+    );
 }
 
 #[test]
 fn influence_covers_a_known_force_at_every_distance_from_the_end() {
     let bench = bench(true);
-    print_and_check("influence, force known", &bench, &influence(&bench, 200), &[3.0]);
+    print_and_check("influence, force known", &bench, &influence(&bench, 200), &[3.0], 93.0..=97.0);
 }
 
 #[test]
 fn the_closed_form_covers_a_known_force_at_every_distance_from_the_end() {
     let bench = bench(true);
-    print_and_check("closed form, force known", &bench, &closed_form(&bench), &[3.0]);
+    print_and_check("closed form, force known", &bench, &closed_form(&bench), &[3.0], 93.0..=97.0);
+}
+
+/// Without the logarithm of the determinant, 20 presses covered 68 to 88 % up to 40 mm from the end.
+#[test]
+fn influence_learnt_from_presses_alone_covers_unknown_forces_at_every_distance_from_the_end() {
+    let mut bench = bench(false);
+    for (count, repeats) in [(20, 1), (10, 10)] {
+        bench.training = Training::even(count).repeated(repeats).with_force(3.0);
+        let locators = influence_of(InfluenceSource::Recording, &bench, 200);
+        print_and_check(
+            &format!("influence from {count} places × {repeats}, force unknown"),
+            &bench,
+            &locators,
+            &[3.0, 6.0],
+            90.0..=99.0,
+        );
+    }
 }

@@ -101,10 +101,14 @@ fn not_excluded(search: &Search, whitened: &[[f64; 8]], minima: &[Minimum]) -> O
         let cell = table.cell(x_m);
         let weights = gauss_newton.weights_at(&cell, force_n);
         channels.clear();
+        let mut spread = 0.0;
         table.for_each(cell, |s, f, _| {
-            let root = weights(s).sqrt();
+            let weight = weights(s);
+            let root = weight.sqrt();
+            spread -= weight.ln();
             channels.push([root * whitened.as_flattened()[s], root * f]);
         });
+        spread
     };
     let reference_force_n = search.gauss_newton.reference_force_n();
     let contacts = Contacts {
