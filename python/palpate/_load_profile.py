@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
@@ -62,8 +63,8 @@ class LoadProfile(Result):
     kernels : ndarray of float64 or None
         Averaging kernels: row by row, what share of the force in each cell the profile has in one: of the shape (cells, cells).
     patches : list of dict
-        Parts that carry load, along x: "from", "to", "centre", "force", "force_sd", "force_95", and "limit", the least standard deviations of
-        evenly loaded patches like these: "x", "y", "force".
+        Parts that carry load, along x: "from", "to", "centre", "force", "force_sd", "force_95", whose upper end is None where the reading does not
+        bound it, as beside an edge, and "limit", the least standard deviations of evenly loaded patches like these: "x", "y", "force".
     loads : list of dict
         The loads that it was to be held beside, with their "limit".
     x, y : ndarray of float64
@@ -116,8 +117,7 @@ class LoadProfile(Result):
 
     def _notes(self) -> list[str]:
         return [
-            f"{in_mm(patch['from'])} to {in_mm(patch['to'])}: {patch['force']:.4g} N ({patch['force_95'][0]:.4g} to {patch['force_95'][1]:.4g} N)"
-            for patch in self.patches
+            f"{in_mm(patch['from'])} to {in_mm(patch['to'])}: {patch['force']:.4g} N ({_ends(*patch['force_95'])})" for patch in self.patches
         ]
 
     def __repr__(self) -> str:
@@ -125,8 +125,12 @@ class LoadProfile(Result):
             return f"<LoadProfile: {self.status}, no load>"
         at = self.centre["x"] if self.y is None else (self.centre["x"], self.centre["y"])
         patches = f"{len(self.patches)} patch" + ("" if len(self.patches) == 1 else "es")
-        low, high = self.total_95
-        return f"<LoadProfile: {self.status}, {self.total:.4g} N ({low:.4g} to {high:.4g} N), centre at {in_mm(at)}, {patches}>"
+        return f"<LoadProfile: {self.status}, {self.total:.4g} N ({_ends(*self.total_95)}), centre at {in_mm(at)}, {patches}>"
+
+
+def _ends(low: float, high: float | None) -> str:
+    """The ends of an interval of a force in words."""
+    return f"{low:.4g} N or more" if high is None or high == inf else f"{low:.4g} to {high:.4g} N"
 
 
 def simulate_loads(

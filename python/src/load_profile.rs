@@ -151,8 +151,7 @@ impl Told {
         fields.set("total_95", profile.bounds.total_95_n)?;
         fields.set("margin", profile.bounds.margin_m)?;
         fields.set("seen_95", profile.bounds.seen_95_n)?;
-        let centre = profile.centre.zip(profile.centre_95_m());
-        let centre = centre.map(|(centre, x_95_m)| of_centre(&centre, x_95_m, extent));
+        let centre = profile.centre.map(|centre| of_centre(&centre, extent));
         fields.json("centre", &json!(centre))?;
         fields.set("resolution", self.resolution.as_ref().map(Resolution::median_width_m))?;
         let widths = self.resolution.as_ref().map(|resolution| resolution.widths_m.to_pyarray(py));
@@ -183,14 +182,14 @@ impl Told {
 }
 
 /// A place, the standard deviations of its coordinates, and the ends of their 95 % intervals.
-fn of_centre(centre: &CentreOfPressure, x_95_m: (f64, f64), extent: Extent) -> Value {
+fn of_centre(centre: &CentreOfPressure, extent: Extent) -> Value {
     json!({
         "x": centre.position.x_m,
         "x_sd": centre.sd_x_m,
-        "x_95": x_95_m,
+        "x_95": centre.x_95_m,
         "y": extent.if_plane(centre.position.y_m),
         "y_sd": extent.if_plane(centre.sd_y_m),
-        "y_95": extent.if_plane(centre.y_95_m()),
+        "y_95": extent.if_plane(centre.y_95_m),
     })
 }
 
@@ -198,10 +197,10 @@ fn of_patch(patch: &Patch, limit: Option<PatchLimit>, extent: Extent) -> Value {
     json!({
         "from": place(patch.from, extent),
         "to": place(patch.to, extent),
-        "centre": of_centre(&patch.centre, patch.centre_95_m(extent), extent),
+        "centre": of_centre(&patch.centre, extent),
         "force": patch.force_n,
         "force_sd": patch.force_sd_n,
-        "force_95": patch.force_95_n(),
+        "force_95": patch.force_95_n,
         "limit": limit.map(|limit| of_limit(limit, extent)),
     })
 }

@@ -166,8 +166,8 @@ impl<M: Locate> Fitted<M> {
         if let Some(check) = &self.check {
             check.check_batch(readings, channels, estimates, extent);
         }
-        for estimate in estimates {
-            *estimate = told(*estimate, extent);
+        for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
+            *estimate = told(*estimate, reading, &self.setup);
         }
         Ok(())
     }

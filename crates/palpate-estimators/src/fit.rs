@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::fmt::Debug;
 
 use palpate_core::{ContactEstimate, Estimate, Position, Status, Uncertainty};
-use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::sensing::{Layout, Sensor};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
@@ -337,7 +337,7 @@ impl<M: Locate> Fitted<M> {
             Some(check) => check.checked(reading, estimate, extent),
             None => estimate,
         };
-        Ok(told(estimate, extent))
+        Ok(told(estimate, reading, &self.setup))
     }
 
     /// Checks what a file may have got wrong.
@@ -356,8 +356,16 @@ impl<M: Locate> Fitted<M> {
     }
 }
 
-/// An estimate as locators give it: in numbers, and `located` only where the reading tells something of the place.
-pub(crate) fn told(estimate: Estimate, extent: Extent) -> Estimate {
+/// Largest size of a number of a locator, and of a channel's reading that a contact may explain; its third power and products of that are numbers.
+pub(crate) const LARGEST: f64 = 1e60;
+
+/// An estimate of a reading as locators give it: in numbers, and `located` only where the reading tells something of the place.
+pub(crate) fn told(estimate: Estimate, reading: &[f64], setup: &Setup) -> Estimate {
+    let extent = setup.surface().extent();
+    let is_absurd = |(value, sensor): (&f64, &Sensor)| value.abs() > LARGEST && !sensor.channel.dead;
+    if reading.iter().zip(setup.layout().sensors()).any(is_absurd) {
+        return anywhere_on(extent);
+    }
     // Where no contact explains a reading, and all are infinitely far from it, none is excluded beside another.
     let is_point = estimate.status == Status::OutsideModel
         && estimate

@@ -199,6 +199,25 @@ pub enum PositionError {
         /// Least number.
         needed: usize,
     },
+    /// Presses of a small part of the surface, which do not tell the rest.
+    #[error(
+        "the presses reach over {:.1} mm of {:.1} mm along {axis}, and do not tell how readings change elsewhere",
+        reach_m * 1e3,
+        side_m * 1e3
+    )]
+    SmallPart {
+        /// The axis, `x` or `y`.
+        axis: char,
+        /// Length between the outermost presses, in metres.
+        reach_m: f64,
+        /// Length of the surface, in metres.
+        side_m: f64,
+    },
+    /// Presses of which every place reads alike.
+    #[error(
+        "readings at different positions differ by no more than noise; check the channels and the positions of the presses"
+    )]
+    NothingTold,
     /// Presses of forces that differ on a surface without a model, of whose readings without contact nothing is known.
     #[error(
         "the forces of the presses differ, and nothing says what the channels read while nothing touches"

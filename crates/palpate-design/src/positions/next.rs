@@ -15,6 +15,9 @@ const MOST_AHEAD: usize = 200;
 /// Positions of a recording that are looked at, at most: of more, that many drawn at random, which leave a little more to gain than all do.
 const MOST_PRESSED: usize = 1000;
 
+/// Share of a guess's error that endlessly many presses must go below; else what differs between positions is noise.
+const MOST_OF_A_GUESS: f64 = 0.5;
+
 /// A press to come.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NextPress {
@@ -100,8 +103,12 @@ pub fn next_press(
     OutOfRange::check("greater than 0 and less than 100", stop, |percent| percent > 0.0 && percent < 100.0)?;
     let contacts = design.weighted_contacts(extent)?;
     let presses = Presses::new(recording, setup)?;
+    presses.check_reach(extent)?;
     let forward = ForwardModel::from_presses(&presses, setup, watch)?;
     let mut expected = ExpectedError::new(&forward, &contacts, extent);
+    if expected.error_m(|_| 0.0) > MOST_OF_A_GUESS * expected.error_m(|_| f64::INFINITY) {
+        return Err(PositionError::NothingTold);
+    }
     let pressed = few_of(&presses.places);
     let first = expected.places.len();
     expected.places.extend(pressed.iter().map(|(position, _)| position));

@@ -8,11 +8,14 @@ use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean;
 use palpate_numerics::small::dot;
 
 /// Distinct positions without which nobody knows how smooth a function is.
 const FEWEST_POSITIONS: usize = 4;
+/// Share of a surface's side over which the presses must reach.
+const LEAST_REACH: f64 = 0.1;
 /// Rounds in which presses are brought to one amplitude.
 const AMPLITUDE_ROUNDS: usize = 8;
 /// Variance of the forces at one position, of their squared mean, below which they are one force.
@@ -50,7 +53,12 @@ impl Presses {
             return Err(PositionError::NoOffset);
         }
         let offsets = offsets.unwrap_or_default();
-        let living: Vec<usize> = living(layout).collect();
+        // A channel that never changes tells nothing.
+        let changes = |s: &usize| touched.iter().any(|row| row.reading[*s] != touched[0].reading[*s]);
+        let living: Vec<usize> = living(layout).filter(changes).collect();
+        if living.is_empty() {
+            return Err(PositionError::NothingTold);
+        }
         let stated: Vec<f64> = living.iter().map(|&s| layout.sensors()[s].channel.reading_sd()).collect();
         let mut readings = at_one_force(&touched, &living, &offsets);
         let places = groups.iter().map(|group| (touched[group[0]].position, group.len())).collect();
@@ -67,6 +75,24 @@ impl Presses {
         let variance = mean(sds.iter().zip(&reading_sds).map(|(press, sd)| (press / sd).powi(2)));
         let positions = touched.iter().map(|row| row.position).collect();
         Ok(Self { positions, readings, places, reading_sds, variance })
+    }
+}
+
+impl Presses {
+    /// Checks that the presses reach over enough of a surface to tell how readings change on it.
+    pub fn check_reach(&self, extent: Extent) -> Result<(), PositionError> {
+        let axes: [(char, fn(Position) -> f64, Option<f64>); 2] =
+            [('x', |at| at.x_m, Some(extent.length_m())), ('y', |at| at.y_m, extent.width_m())];
+        for (axis, coordinate, side_m) in axes {
+            let Some(side_m) = side_m else { continue };
+            let along = self.places.iter().map(|(position, _)| coordinate(*position));
+            let (low_m, high_m) =
+                along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
+            if high_m - low_m < LEAST_REACH * side_m {
+                return Err(PositionError::SmallPart { axis, reach_m: high_m - low_m, side_m });
+            }
+        }
+        Ok(())
     }
 }
 

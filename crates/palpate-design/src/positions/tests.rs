@@ -215,7 +215,7 @@ fn the_next_press_is_where_nobody_pressed_and_lowers_the_error() {
 fn the_expected_error_is_never_more_than_a_guess() {
     let guess_m = 0.4 / 12f64.sqrt();
     // Presses in the middle tell next to nothing of the readings near the ends.
-    let advice = advised(&[0.19, 0.195, 0.2, 0.205, 0.21], 5);
+    let advice = advised(&[0.175, 0.1875, 0.2, 0.2125, 0.225], 5);
     assert!(advice.error_m < guess_m && advice.error_m > 0.3 * guess_m, "{} {guess_m}", advice.error_m);
     let forward = forward(&noisy().setup);
     let contacts = WeightedContacts::from_prior(&ContactPrior::all_over(*BEAM), *BEAM).unwrap();
@@ -332,4 +332,38 @@ fn forces_that_differ_need_a_reading_without_contact() {
     let setup = Setup::measured(0.4, &["1", "2", "3", "4", "5", "6", "7", "8"]).unwrap();
     let refused = next_press(&setup, &recording, &PositionDesign::default(), Watch::NONE).unwrap_err();
     assert!(matches!(refused, PositionError::NoOffset), "{refused}");
+}
+
+#[test]
+fn presses_that_do_not_tell_places_apart_are_refused() {
+    let refused = |setup: &Setup, recording: &Recording| {
+        next_press(setup, recording, &PositionDesign::default(), Watch::NONE).unwrap_err()
+    };
+    let (setup, near) = begun(&[0.2, 0.201, 0.202, 0.203], 3);
+    let error = refused(&setup, &near);
+    assert!(matches!(error, PositionError::SmallPart { axis: 'x', .. }), "{error}");
+    assert!(error.to_string().contains("over 3.0 mm of 400.0 mm"), "{error}");
+    // Noise alone, of three draws.
+    for seed in 0..3 {
+        let positions: Vec<Position> = TEN_M.map(Position::along).to_vec();
+        let setup = noisy().setup.with_force(Some(1e-9)).unwrap();
+        let recording = simulate_at(&setup, &positions, 3, seed).unwrap();
+        let error = refused(&setup, &recording);
+        assert!(matches!(error, PositionError::NothingTold), "{error}");
+    }
+    let (setup, mut still) = begun(&TEN_M, 3);
+    still.rows.iter_mut().for_each(|row| row.reading.fill(5.0));
+    assert!(matches!(refused(&setup, &still), PositionError::NothingTold));
+}
+
+#[test]
+fn a_channel_that_never_changes_is_left_out() {
+    let (setup, mut recording) = begun(&TEN_M, 3);
+    let advice = |setup: &Setup, recording: &Recording| {
+        next_press(setup, recording, &PositionDesign::default(), Watch::NONE).unwrap()
+    };
+    recording.rows.iter_mut().for_each(|row| row.reading[2] = 7.0);
+    let mut dead = setup.clone();
+    dead.edit_sensors(|sensors| sensors[2].channel.dead = true).unwrap();
+    assert_eq!(advice(&setup, &recording), advice(&dead, &recording));
 }

@@ -79,6 +79,11 @@ fn a_batch_of_every_method_answers_as_readings_one_by_one_do() {
         let readings = readings(&presses);
         for locator in locators(&setup, &presses) {
             statuses.extend(assert_agree(&locator, &readings));
+            let absurd: Vec<f64> = [1e308, -1e308, 1e61]
+                .into_iter()
+                .flat_map(|value| vec![value; setup.layout().len()])
+                .collect();
+            assert_eq!(assert_agree(&locator, &absurd), [Status::OutsideModel; 3], "{}", locator.kind());
             kinds.push(locator.kind());
         }
     }

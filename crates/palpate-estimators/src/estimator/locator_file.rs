@@ -1,7 +1,7 @@
 //! The locator file: JSON with a format version.
 
 use super::Locator;
-use crate::fit::LocatorFault;
+use crate::fit::{LARGEST, LocatorFault};
 
 /// The `format` of every locator file.
 const FORMAT: &str = "palpate-locator";
@@ -54,9 +54,6 @@ pub enum LocatorFileError {
         place: (usize, usize),
     },
 }
-
-/// Largest size of a number; its third power and products of that are numbers.
-const LARGEST: f64 = 1e60;
 
 impl LocatorFileError {
     /// Line and column, from 1, where the JSON is at fault.

@@ -162,6 +162,8 @@ fn help(error: &PositionError) -> &'static str {
         PositionError::OutOfRange(_) => "check it on the command line, or in [design]",
         PositionError::Channels { .. } => "check `channels` in [recording], or the rig's sensors",
         PositionError::TooFewPresses { .. } => "begin with evenly spaced presses, ends included",
+        PositionError::SmallPart { .. } => "begin with evenly spaced presses, ends included",
+        PositionError::NothingTold => "press harder, or look at the recording with `palpate init`",
         PositionError::NoOffset => "add untouched rows, of force 0, or press some position with two forces",
         PositionError::NoNoise { .. } => "press some positions twice, or add `noise = \"5 um\"` to [sensors]",
     }
