@@ -81,18 +81,16 @@ impl Presses {
 impl Presses {
     /// Checks that the presses reach over enough of a surface to tell how readings change on it.
     pub fn check_reach(&self, extent: Extent) -> Result<(), PositionError> {
-        let axes: [(char, fn(Position) -> f64, Option<f64>); 2] =
-            [('x', |at| at.x_m, Some(extent.length_m())), ('y', |at| at.y_m, extent.width_m())];
-        for (axis, coordinate, side_m) in axes {
-            let Some(side_m) = side_m else { continue };
-            let along = self.places.iter().map(|(position, _)| coordinate(*position));
-            let (low_m, high_m) =
-                along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
-            if high_m - low_m < LEAST_REACH * side_m {
-                return Err(PositionError::SmallPart { axis, reach_m: high_m - low_m, side_m });
+        let check = |axis: char, coordinate: fn(Position) -> f64, side_m: f64| {
+            let along = || self.places.iter().map(|(position, _)| coordinate(*position));
+            let reach_m = along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min);
+            match reach_m < LEAST_REACH * side_m {
+                true => Err(PositionError::SmallPart { axis, reach_m, side_m }),
+                false => Ok(()),
             }
-        }
-        Ok(())
+        };
+        check('x', |at| at.x_m, extent.length_m())?;
+        extent.width_m().map_or(Ok(()), |width_m| check('y', |at| at.y_m, width_m))
     }
 }
 
