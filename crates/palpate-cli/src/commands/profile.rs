@@ -174,8 +174,9 @@ impl Printer<'_> {
 
 /// Prints a profile for people.
 fn print(told: &JsonProfile) -> Result<(), Failure> {
-    let interval =
-        |value: &Interval, unit: &str| format!("{:.3} {unit} ({})", value.value, ends(value.low, value.high));
+    let interval = |value: &Interval, unit: &str| {
+        format!("{:.3} {unit} ({})", value.value, ends(value.low, value.high, ""))
+    };
     let heading = match told.line {
         Some(line) => format!("line {line}: {}", told.status),
         None => format!("simulated: {}", told.status),
@@ -191,8 +192,8 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
     ))?;
     let Seen { margin_mm, low_n, high_n } = told.seen;
     output::say(format!(
-        "                    {} N where nothing lies within {margin_mm:.0} mm of an edge",
-        ends(low_n, high_n)
+        "                    {} where nothing lies within {margin_mm:.0} mm of an edge",
+        ends(low_n, high_n, " N")
     ))?;
     output::say(format!("centre of pressure  {}", interval(centre, "mm")))?;
     if let Some(across) = &told.centre_y_mm {
@@ -203,7 +204,7 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
             "resolution          {width_mm:.0} mm, the median width of the averaging kernels"
         ))?;
     }
-    let interval = |value: &Interval| format!("{:.3} ({})", value.value, ends(value.low, value.high));
+    let interval = |value: &Interval| format!("{:.3} ({})", value.value, ends(value.low, value.high, ""));
     output::say(format!("\n{}", JsonPatch::columns(&told.patches, "patch", told.extent, interval)))?;
     if told.loads.is_empty() {
         return Ok(());
@@ -213,8 +214,11 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
 }
 
 /// The ends of an interval in words.
-fn ends(low: f64, high: f64) -> String {
-    if high.is_finite() { format!("{low:.3} to {high:.3}") } else { format!("{low:.3} or more") }
+fn ends(low: f64, high: f64, unit: &str) -> String {
+    match high.is_finite() {
+        true => format!("{low:.3} to {high:.3}{unit}"),
+        false => format!("{low:.3}{unit} or more"),
+    }
 }
 
 /// Load profile of a reading as JSON; what the reading does not tell is null.

@@ -19,10 +19,8 @@ use palpate_numerics::Cholesky;
 
 /// 95 % quantile of χ² of one.
 const RATIO_95: f64 = 3.84;
-/// Widths along an axis, from the least to the widest, that a mean is over.
-const WIDTHS: usize = 5;
-/// Sum of their likelihoods, beside the greatest of all, below which they miss the width that is told.
-const LEAST_WEIGHT: f64 = 0.1;
+/// Values of an interval that a median is of.
+const LOOKED_AT: usize = 16;
 /// Misfit that does not matter.
 const NEGLIGIBLE: f64 = 1e-3;
 /// Steps of a minimisation; a dozen is usual.
@@ -97,25 +95,43 @@ impl<'a> EvenLoads<'a> {
         self.best.misfit
     }
 
-    /// One of the loads, the mean over widths of the likeliest of each width, by their likelihoods: of widths that the reading does not tell apart, the
-    /// likeliest is as good as drawn by lot.
-    pub fn mean_load(&self, number: usize) -> UniformLoad {
-        let first = number * self.each();
-        let shares: Vec<usize> = (0..self.dimensions).map(|axis| first + 2 + 2 * axis).collect();
-        let (mut sum, mut weights) = (vec![0.0; self.each()], 0.0);
-        for i in 0..WIDTHS.pow(self.dimensions as u32) {
-            let mut unknowns = self.best.unknowns.clone();
-            for (axis, share) in shares.iter().enumerate() {
-                unknowns[*share] = (i / WIDTHS.pow(axis as u32) % WIDTHS) as f64 / (WIDTHS - 1) as f64;
-            }
-            let found = self.minimum(unknowns, None, &shares);
-            let weight = (0.5 * (self.best.misfit - found.misfit)).exp();
-            weights += weight;
-            sum.iter_mut().zip(&found.unknowns[first..]).for_each(|(sum, value)| *sum += weight * value);
+    /// One of the loads, in the middle of those that the reading does not tell apart: the likeliest at the posterior median of its centre along each axis,
+    /// the prior being flat over the 95 % interval and everything else the likeliest there. (The likeliest of all is as good as drawn by lot where
+    /// force and place trade off.)
+    pub fn middle_load(&self, number: usize) -> UniformLoad {
+        let mut middle = self.best.unknowns.clone();
+        let centres: Vec<usize> =
+            (0..self.dimensions).map(|axis| number * self.each() + 1 + 2 * axis).collect();
+        for (axis, centre) in centres.iter().enumerate() {
+            middle[*centre] = self.median(*centre, self.interval_95(Aim::Centre(number, axis)));
         }
-        let mean: Vec<f64> = sum.into_iter().map(|sum| sum / weights).collect();
-        let is_sound = weights > LEAST_WEIGHT && mean.iter().all(|value| value.is_finite());
-        self.load(if is_sound { &mean } else { &self.best.unknowns[first..][..self.each()] })
+        let found = self.minimum(middle, None, &centres);
+        self.load(&found.unknowns[number * self.each()..][..self.each()])
+    }
+
+    /// The posterior median of an unknown over its interval.
+    fn median(&self, unknown: usize, (low, high): (f64, f64)) -> f64 {
+        let (least, most) = self.range(unknown);
+        let step = (high - low) / LOOKED_AT as f64;
+        let values = (0..LOOKED_AT).map(|i| (low + (i as f64 + 0.5) * step).clamp(least, most));
+        let mut unknowns = self.best.unknowns.clone();
+        let likelihoods: Vec<f64> = values
+            .map(|value| {
+                unknowns[unknown] = value;
+                let found = self.minimum(unknowns.clone(), None, &[unknown]);
+                unknowns.clone_from(&found.unknowns);
+                (0.5 * (self.best.misfit - found.misfit)).exp()
+            })
+            .collect();
+        let half = 0.5 * likelihoods.iter().sum::<f64>();
+        let mut below = 0.0;
+        for (i, likelihood) in likelihoods.iter().enumerate() {
+            if below + likelihood >= half {
+                return low + step * (i as f64 + (half - below) / likelihood);
+            }
+            below += likelihood;
+        }
+        self.best.unknowns[unknown]
     }
 
     /// The load of some unknowns.
@@ -458,10 +474,10 @@ mod tests {
         near(even.interval_95(Aim::CentreOfPressure(0)), (farthest_m / root, farthest_m));
         near(even.interval_95(Aim::Force(0)), (moment / farthest_m, moment / farthest_m * root));
         near(even.interval_95(Aim::Total), (moment / farthest_m, moment / farthest_m * root));
-        let mean = even.mean_load(0);
+        let middle = even.middle_load(0);
         assert!(
-            (mean.centre().x_m / 0.02 - 1.0).abs() < 0.15 && (mean.force_n() / 2000.0 - 1.0).abs() < 0.15,
-            "{mean:?}"
+            (middle.centre().x_m / 0.02 - 1.0).abs() < 0.15 && (middle.force_n() / 2000.0 - 1.0).abs() < 0.15,
+            "{middle:?}"
         );
     }
 }

@@ -158,7 +158,7 @@ pub struct Profiler<'a> {
     cells: Cells,
     problem: Problem,
     cumulative: CumulativeInfluence,
-    /// Bound of the misfit, exceeded by noise at [`OUTSIDE_MODEL_RATE`].
+    /// Bound of the misfit, exceeded by noise in one of a thousand readings.
     worst_misfit: f64,
 }
 
@@ -190,7 +190,7 @@ pub struct LoadProfile {
     pub residuals: Vec<Option<f64>>,
     /// The least sum of squared residuals that any smoothness leaves, or even loads in the places of the patches.
     pub misfit: f64,
-    /// Bound of the misfit, exceeded by noise in [`OUTSIDE_MODEL_RATE`] of all readings, whatever the load.
+    /// Bound of the misfit, exceeded by noise in one of a thousand readings, whatever the load.
     pub worst_misfit: f64,
     /// λ of the most probable smoothness, in 1/N²; `None` without load.
     pub smoothness: Option<f64>,

@@ -76,7 +76,7 @@ impl Patch {
         self.force_95_n = even.interval_95(Aim::Force(number));
         let is_held = self.centre.follow(even, extent, |axis| Aim::Centre(number, axis));
         if !(is_held && holds(self.force_95_n, self.force_n)) {
-            let load = even.mean_load(number);
+            let load = even.middle_load(number);
             (self.from, self.to, self.force_n) = (load.from(), load.to(), load.force_n());
             self.centre.move_to(load.centre());
             self.force_95_n = hull(self.force_95_n, self.force_n);
