@@ -112,7 +112,13 @@ impl<'a> ProfileReport<'a> {
             BandPoint { x: *x, low: low * PER_THOUSAND, high: high * PER_THOUSAND }
         };
         let band = load.iter().enumerate().map(interval).collect();
-        let mut series = vec![Series::band("95 % interval", 0, band), Series::line("load", 0, load)];
+        let foot = 0.02 * load.iter().fold(0.0, |most: f64, point| most.max(point.1));
+        let centres = profile.patches.iter().map(|patch| (patch.centre.position.x_m * 1e3, foot)).collect();
+        let mut series = vec![
+            Series::band("95 % interval", 0, band),
+            Series::line("load", 0, load),
+            Series::markers("centres of the patches", 2, centres, Marker::Triangle),
+        ];
         if !self.truth.is_empty() {
             series.push(Series::dashes("true load", 1, self.truth_steps()));
         }
@@ -124,7 +130,8 @@ impl<'a> ProfileReport<'a> {
         let chart =
             Chart::new("The load along the surface", x, y, series).with_marks(centre.into_iter().collect());
         let caption = html! {
-            "The load that the reading tells, with its 95 % interval cell by cell."
+            "The load that the reading tells, with its 95 % interval cell by cell. Beside an edge, where force and place trade off, it is the lightest; the \
+             patches of Table 1 are not."
             @if !self.truth.is_empty() { " Dashes: the load that was simulated." }
             " Neighbouring cells share their uncertainty: where one is too high, the next is too low, and their sum is told better than \
              either."
