@@ -63,12 +63,12 @@ describe("history", () => {
     expect([0, 106, 106.5, 109, 200].map((time) => history.firstFrom(time))).toEqual([0, 0, 1, 3, 4]);
   });
 
-  test("a position stands only where something was located, and no contact has no force", () => {
+  test("a position stands only where something was located, no contact has no force, and of what nothing explains none is known", () => {
     const history = new History(2, 9);
     (["located", "no_contact", "outside_model", "ambiguous"] as const).forEach((status, i) => history.push(sample(i, i, status)));
     expect([0, 1, 2, 3].map((row) => history.at(X, row))).toEqual([0, NaN, NaN, 30]);
     expect([0, 1, 2, 3].map((row) => history.at(X_LOW, row))).toEqual([-1, NaN, NaN, 29]);
-    expect([0, 1].map((row) => history.at(FORCE, row))).toEqual([2, 0]);
+    expect([0, 1, 2, 3].map((row) => history.at(FORCE, row))).toEqual([2, 0, NaN, 2]);
   });
 });
 

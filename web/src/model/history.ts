@@ -56,7 +56,8 @@ export class History {
     set(Y, placed ? sample.y_mm : NaN);
     set(Y_LOW, placed ? sample.y_95_mm?.[0] : NaN);
     set(Y_HIGH, placed ? sample.y_95_mm?.[1] : NaN);
-    const force = placed ? sample.force_n : 0;
+    // Of a reading that no contact explains nothing is known of the force; 0 would look like a release.
+    const force = placed ? sample.force_n : sample.status === "no_contact" ? 0 : NaN;
     const half = Z_95 * (sample.sd_force_n ?? NaN);
     set(FORCE, force);
     set(FORCE_LOW, placed ? (sample.force_95_n?.[0] ?? (force ?? NaN) - half) : NaN);

@@ -107,11 +107,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     pipeline::run(&mut session, clock, &from, &mut sinks);
     drop((source, stop, sinks));
     let status = recording.end().unwrap_or_default();
-    finish(arguments, &status, session.counters())
+    let labels = session.channels().iter().map(|channel| channel.label.as_str());
+    finish(arguments, &status, session.counters(), labels)
 }
 
 /// Says what was recorded.
-fn finish(arguments: &Arguments, status: &RecordingStatus, counters: &Counters) -> Result<(), Failure> {
+fn finish<'a>(
+    arguments: &Arguments,
+    status: &RecordingStatus,
+    counters: &Counters,
+    labels: impl IntoIterator<Item = &'a str>,
+) -> Result<(), Failure> {
     let bad: u64 = counters.bad_frames.values().sum();
     let summary = format!(
         "{}: {} readings in {:.1} s, {:.2} MB; {} bad frames, {} lost by the board's count, {} gaps",
@@ -123,12 +129,18 @@ fn finish(arguments: &Arguments, status: &RecordingStatus, counters: &Counters) 
         format_count(counters.lost_frames),
         format_count(counters.gaps),
     );
-    if let Some(problem) = &status.problem {
-        return Err(Failure::DataLost(format!("{summary}; {problem}")));
+    let lost = format!("{} readings could not be recorded", format_count(status.lost));
+    match &status.problem {
+        Some(problem) if status.lost > 0 => {
+            return Err(Failure::DataLost(format!("{summary}; {lost}: {problem}")));
+        }
+        Some(problem) => return Err(Failure::DataLost(format!("{summary}; {problem}"))),
+        None if status.lost > 0 => return Err(Failure::DataLost(format!("{summary}; {lost}"))),
+        None => {}
     }
-    if status.lost > 0 {
-        let lost = format_count(status.lost);
-        return Err(Failure::DataLost(format!("{summary}; {lost} readings could not be recorded")));
+    let most_often = counters.bad_frames.iter().max_by_key(|(_, count)| **count);
+    if let (0, Some((cause, _))) = (status.readings, most_often) {
+        return Err(Failure::DataLost(format!("{summary}; {}", cause.of_all(bad, labels))));
     }
     if interrupted() {
         return Err(Failure::Interrupted(summary));

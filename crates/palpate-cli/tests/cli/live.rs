@@ -146,3 +146,14 @@ fn outlets_are_refused_with_what_is_wrong_or_how_to_build_them() {
     }
     assert!(!folder.path().join("never.mcap").exists());
 }
+
+#[test]
+fn a_board_of_other_channels_is_no_recording_and_says_why() {
+    let folder = bench();
+    fs::write(folder.path().join("other.toml"), NOISY_BEAM.replace("count = 8 ", "count = 5 ")).unwrap();
+    let board = "simulated:other.toml?rate=500";
+    let record = ["record", "locator.json", "--from", board, "--out", "none.mcap", "--seconds", "0.5"];
+    let told = complained(&run(folder.path(), &record), 3);
+    assert!(told.contains("0 readings") && told.contains("frames is a reading of the channels"), "{told}");
+    assert!(told.contains("columns= of the source"), "{told}");
+}

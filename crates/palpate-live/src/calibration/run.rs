@@ -196,12 +196,7 @@ impl Calibration {
     /// A note where the last of many frames was no reading either, for this cause.
     fn unread(&self, cause: BadFrame) -> Option<Note> {
         let is_time = self.readings == 0 && self.bad.values().sum::<u64>() == UNREAD;
-        let labels = self.labels.join("`, `");
-        let words = format!(
-            "none of {UNREAD} frames is a reading of the channels `{labels}`: {}; name them in the rig as the board does, or in columns= of the source",
-            cause.describe()
-        );
-        is_time.then_some(Note::Unread(words))
+        is_time.then(|| Note::Unread(cause.of_all(UNREAD, self.labels.iter().map(String::as_str))))
     }
 
     fn add(&mut self, at: Duration, reading: &[f64], notes: &mut Vec<Note>) -> Result<(), CalibrationError> {

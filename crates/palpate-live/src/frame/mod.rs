@@ -68,6 +68,16 @@ impl BadFrame {
             Self::Malformed => "not a frame",
         }
     }
+
+    /// What to say where this is the cause why none of so many frames was a reading of the channels of these labels.
+    pub fn of_all<'a>(self, frames: u64, labels: impl IntoIterator<Item = &'a str>) -> String {
+        let labels: Vec<&str> = labels.into_iter().collect();
+        format!(
+            "none of {frames} frames is a reading of the channels `{}`: {}; name them in the rig as the board does, or in columns= of the source",
+            labels.join("`, `"),
+            self.describe()
+        )
+    }
 }
 
 #[cfg(test)]

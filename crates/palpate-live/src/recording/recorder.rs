@@ -162,6 +162,8 @@ struct Recording<'a> {
     sequence: u32,
     scratch: Vec<u8>,
     times_ns: Option<(u64, u64)>,
+    /// Readings that were encoded; those in the file are of the status.
+    encoded_readings: u64,
     status: Arc<Mutex<RecordingStatus>>,
     reports: SyncSender<Input>,
     /// Instant from which it is tried again to write, and to look for the file.
@@ -203,6 +205,7 @@ impl<'a> Recording<'a> {
             sequence: 0,
             scratch: Vec::new(),
             times_ns: None,
+            encoded_readings: 0,
             status,
             reports,
             look_at: Instant::now() + LOOK_EVERY,
@@ -254,8 +257,8 @@ impl<'a> Recording<'a> {
                 self.message(estimate, sample.unix_ns, &message)?;
                 let (first, _) = self.times_ns.unwrap_or((sample.unix_ns, 0));
                 self.times_ns = Some((first, sample.unix_ns));
+                self.encoded_readings += 1;
                 let mut status = lock(&self.status);
-                status.readings += 1;
                 status.seconds = sample.unix_ns.saturating_sub(first) as f64 * 1e-9;
                 Ok(())
             }
@@ -312,10 +315,20 @@ impl<'a> Recording<'a> {
             }
             _ => {}
         }
-        lock(&self.status).bytes = self.tail.bytes();
+        let mut status = lock(&self.status);
+        status.bytes = self.tail.bytes();
+        if self.health == Health::Well {
+            status.readings = self.encoded_readings;
+        }
     }
 
     fn finish(&mut self) {
+        self.finish_file();
+        let mut status = lock(&self.status);
+        status.lost += self.encoded_readings - status.readings;
+    }
+
+    fn finish_file(&mut self) {
         if self.health == Health::Gone {
             return;
         }
