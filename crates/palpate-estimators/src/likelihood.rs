@@ -4,6 +4,15 @@ use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
 
+/// Variance of a contact that calibration leaves, and no further reading takes away.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CalibrationVariance {
+    /// Covariance of the position, xx, xy and yy in m²; on a line xx alone.
+    pub position_m2: [f64; 3],
+    /// Variance of the force in N², where it is not known.
+    pub force_n2: f64,
+}
+
 /// A fitted method that can say how well contacts explain a reading.
 pub trait Likelihood: Send + Sync {
     /// The fits of contacts on this surface.
@@ -19,9 +28,8 @@ pub trait Likelihood: Send + Sync {
     /// Signal-to-noise ratio of a contact in balance: the sum of (W·f)² over the noise's variance, of all channels.
     fn signal(&self, contact: Contact) -> f64;
 
-    /// Covariance of the position of each contact, xx, xy and yy in m², that calibration leaves and no further reading takes
-    /// away; on a line xx alone.
-    fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2];
+    /// Variance of each contact that calibration leaves.
+    fn calibration_variance(&self, contacts: &[Contact]) -> [CalibrationVariance; 2];
 
     /// Whitened reading of contacts in balance, with its derivatives and the variance that calibration leaves.
     fn linearised(&self, contacts: &[Contact]) -> Linearisation;

@@ -32,7 +32,7 @@ mod tracker;
 pub use slow::{Creep, Drift};
 pub use tracker::{SmoothTracker, Tracker};
 
-use crate::likelihood::Likelihood;
+use crate::likelihood::{CalibrationVariance, Likelihood};
 use belief::Moments;
 use palpate_core::{ContactEstimate, Estimate, Uncertainty};
 use palpate_mechanics::contact::Position;
@@ -116,11 +116,14 @@ pub struct Tracked {
     pub speed_m_per_s: f64,
     /// Force, in newtons.
     pub force_n: f64,
-    /// Standard deviations of the three, the position's with what calibration leaves.
+    /// Standard deviations of the three, those of position and force with what calibration leaves.
     pub sd: [f64; 3],
     /// The 95 % interval of the position, in metres.
     pub x_95_m: (f64, f64),
-    /// The same across a plane; nothing on a line.
+    /// The 95 % interval of the force in newtons, where calibration leaves more of it open than the readings do: beside an end force and place
+    /// trade off, so that the logarithm of the force is told, not the force; `None` where that is normal.
+    pub force_95_n: Option<(f64, f64)>,
+    /// Position and speed across a plane; nothing on a line.
     pub across: Option<Across>,
 }
 
@@ -170,7 +173,12 @@ impl Tracked {
         ContactEstimate {
             position: Position { x_m: self.x_m, y_m },
             force_n: Some(self.force_n),
-            uncertainty: Some(Uncertainty { covariance, x_95_m: self.x_95_m, y_95_m, force_95_n: None }),
+            uncertainty: Some(Uncertainty {
+                covariance,
+                x_95_m: self.x_95_m,
+                y_95_m,
+                force_95_n: self.force_95_n,
+            }),
         }
     }
 
@@ -198,12 +206,13 @@ impl Tracked {
     /// The contacts of one belief.
     fn from_belief(belief: &[Moments], likelihood: &dyn Likelihood) -> Vec<Self> {
         let contacts: Vec<_> = belief.iter().map(Moments::contact).collect();
-        let floors_m2 = likelihood.calibration_m2(&contacts);
+        let left = likelihood.calibration_variance(&contacts);
         let extent = likelihood.extent();
-        let tracked = |(moments, [xx, xy, yy]): (&Moments, [f64; 3])| {
+        let tracked = |(moments, left): (&Moments, CalibrationVariance)| {
+            let [xx, xy, yy] = left.position_m2;
             let [x_m, speed_m_per_s, force_n, y_m, speed_across] = moments.mean;
             let [along, speed, force, across, across_speed] = moments.variance;
-            let sd = [(along + xx).sqrt(), speed.sqrt(), force.sqrt()];
+            let sd = [(along + xx).sqrt(), speed.sqrt(), (force + left.force_n2).sqrt()];
             let across = |width_m: f64| {
                 let sd = [(across + yy).sqrt(), across_speed.sqrt()];
                 Across {
@@ -215,9 +224,13 @@ impl Tracked {
                 }
             };
             let x_95_m = clamped_interval(normal_interval_95(x_m, sd[0]), extent.length_m());
-            Self { x_m, speed_m_per_s, force_n, sd, x_95_m, across: extent.width_m().map(across) }
+            let force_95_n = (left.force_n2 > force && force_n > 0.0).then(|| {
+                let (low, high) = normal_interval_95(0.0, sd[2] / force_n);
+                (force_n * low.exp(), force_n * high.exp())
+            });
+            Self { x_m, speed_m_per_s, force_n, sd, x_95_m, force_95_n, across: extent.width_m().map(across) }
         };
-        belief.iter().zip(floors_m2).map(tracked).collect()
+        belief.iter().zip(left).map(tracked).collect()
     }
 }
 

@@ -568,8 +568,8 @@ mod tests {
             0.0
         }
 
-        fn calibration_m2(&self, _: &[Contact]) -> [[f64; 3]; 2] {
-            [[0.0; 3]; 2]
+        fn calibration_variance(&self, _: &[Contact]) -> [crate::likelihood::CalibrationVariance; 2] {
+            [crate::likelihood::CalibrationVariance::default(); 2]
         }
 
         fn linearised(&self, _: &[Contact]) -> Linearisation {

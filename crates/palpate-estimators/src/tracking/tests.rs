@@ -333,3 +333,38 @@ fn a_baseline_that_moves_moves_no_contact() {
         }
     }
 }
+
+/// What calibration leaves of a force beside an end, where force and place trade off, no number of readings takes away: without it, the force of no
+/// calibration was held at 10 mm.
+#[test]
+fn the_force_of_a_held_contact_is_within_what_calibration_leaves() {
+    let mut rig = crate::fixtures::paper(5e-6, 10);
+    rig.training = rig.training.with_force(3.0);
+    let setup = rig.setup.clone().unknown_force();
+    let influence =
+        Influence { source: crate::influence::InfluenceSource::Recording, ..Influence::default() };
+    let sensors = CleanSensors::new(setup.surface().model().unwrap(), setup.layout());
+    let errors = ChannelErrors::none(setup.layout());
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    for x_m in [0.01, 0.02, 0.03, 0.04, 0.2] {
+        let clean = sensors.reading(Contact { position: Position::along(x_m), force_n: 3.0 });
+        let (mut place, mut force) = (0, 0);
+        for seed in 0..20 {
+            let recording = rig.simulate(seed);
+            let locator = influence.fit_beam(FitTask::new(&setup, &recording)).unwrap();
+            let likelihood = Arc::new(BeamLikelihood::new(&locator));
+            let mut tracker = Tracker::new(likelihood, TrackerConfig::default());
+            let mut found = None;
+            for i in 0..200 {
+                let reading = measure(setup.layout(), &clean, &errors, &mut rng);
+                found = tracker.follow(f64::from(i) * 0.01, &reading).unwrap().contacts.first().copied();
+            }
+            let Some(tracked) = found else { continue };
+            place += usize::from((tracked.x_95_m.0..=tracked.x_95_m.1).contains(&x_m));
+            let normal = (tracked.force_n - 1.96 * tracked.sd[2], tracked.force_n + 1.96 * tracked.sd[2]);
+            let (least_n, most_n) = tracked.force_95_n.unwrap_or(normal);
+            force += usize::from((least_n..=most_n).contains(&3.0));
+        }
+        assert!(place >= 17 && force >= 17, "{x_m} m: place {place} of 20, force {force} of 20");
+    }
+}

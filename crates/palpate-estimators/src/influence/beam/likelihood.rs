@@ -11,7 +11,9 @@ use super::locator::BeamLocator;
 use super::multi_contact::{contact_fit, first_mode};
 use super::table::InfluenceTable;
 use crate::fit::Locate;
-use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood, Linearisation};
+use crate::likelihood::{
+    CalibrationVariance, ContactFit, Geometry, Likelihood, LineLikelihood, Linearisation,
+};
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -108,7 +110,7 @@ impl Likelihood for BeamLikelihood {
 
     /// A⁻¹·B·A⁻¹ with A = Σ w·j·jᵀ and B = Σ (w·j)·var·(w·j)ᵀ, j the derivatives by places and unknown forces in balance
     /// and var = Σ W²·v.
-    fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2] {
+    fn calibration_variance(&self, contacts: &[Contact]) -> [CalibrationVariance; 2] {
         let force_is_free = self.known_force_n().is_none();
         let cells: Vec<_> = contacts.iter().map(|contact| self.table().cell(contact.position.x_m)).collect();
         let (mut a, mut b) = ([[0.0; 4]; 4], [[0.0; 4]; 4]);
@@ -124,12 +126,13 @@ impl Likelihood for BeamLikelihood {
             add_outer(&mut a, weight, &j);
             add_outer(&mut b, weight * weight * variance, &j);
         }
-        let mut left = [[0.0; 3]; 2];
+        let mut left = [CalibrationVariance::default(); 2];
         let free = std::array::from_fn(|i| i / 2 < contacts.len() && (i % 2 == 0 || force_is_free));
         if let Some(factors) = Ldl::of_free(&a, free) {
             let inverse = factors.inverse();
             for (left, place) in left.iter_mut().zip([0, 2]) {
-                left[0] = form(&inverse[place], &b, &inverse[place]);
+                left.position_m2[0] = form(&inverse[place], &b, &inverse[place]);
+                left.force_n2 = form(&inverse[place + 1], &b, &inverse[place + 1]);
             }
         }
         left

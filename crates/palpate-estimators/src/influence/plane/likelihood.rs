@@ -6,7 +6,9 @@ use super::locator::PlaneLocator;
 use super::search::Search;
 use crate::fit::Locate;
 use crate::influence::config::ForceBelief;
-use crate::likelihood::{ContactFit, Geometry, Likelihood, Linearisation, PlaneLikelihood};
+use crate::likelihood::{
+    CalibrationVariance, ContactFit, Geometry, Likelihood, Linearisation, PlaneLikelihood,
+};
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -54,14 +56,17 @@ impl Likelihood for PlateLikelihood {
     }
 
     /// A⁻¹·B·A⁻¹ with A = Σ w·j·jᵀ and B = Σ w²·v·j·jᵀ, j the derivatives of W·f by place and unknown force.
-    fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2] {
-        let mut left = [[0.0; 3]; 2];
+    fn calibration_variance(&self, contacts: &[Contact]) -> [CalibrationVariance; 2] {
+        let mut left = [CalibrationVariance::default(); 2];
         let free = [true, true, self.known_force_n().is_none()];
         for (left, contact) in left.iter_mut().zip(contacts) {
             let [a, b] = self.search.calibration(*contact);
             if let Some(factors) = Ldl::of_free(&a, free) {
-                let [x, y, _] = factors.inverse();
-                *left = [form(&x, &b, &x), form(&x, &b, &y), form(&y, &b, &y)];
+                let [x, y, force] = factors.inverse();
+                *left = CalibrationVariance {
+                    position_m2: [form(&x, &b, &x), form(&x, &b, &y), form(&y, &b, &y)],
+                    force_n2: form(&force, &b, &force),
+                };
             }
         }
         left

@@ -3,7 +3,7 @@
 use crate::fit::{Fit, FitTask};
 use crate::fixtures::{Example, moving_plate, over_the_plate};
 use crate::influence::{Influence, InfluenceLocator, InfluenceSource, PlateLikelihood};
-use crate::likelihood::{Likelihood, PlaneLikelihood};
+use crate::likelihood::{CalibrationVariance, Likelihood, PlaneLikelihood};
 use crate::tracking::tests::{
     Timed, assert_closer_than_readings, assert_linearised, assert_numbers_after_absurd_readings,
     assert_scores_are_slopes, timed_readings, wrongly_touching,
@@ -75,8 +75,10 @@ fn what_calibration_leaves_falls_with_its_repeats() {
         rig.training.repeats = repeats;
         // Mechanics that is right leaves nothing uncertain; a recording alone does.
         let likelihood = likelihood_from(InfluenceSource::Recording, &rig, Some(5.0));
-        let [[xx, xy, yy], second] = likelihood.calibration_m2(&[contact]);
-        assert!(xx > 0.0 && yy > 0.0 && xy * xy < xx * yy && second == [0.0; 3]);
+        let [first, second] = likelihood.calibration_variance(&[contact]);
+        let [xx, xy, yy] = first.position_m2;
+        assert!(xx > 0.0 && yy > 0.0 && xy * xy < xx * yy && first.force_n2 == 0.0);
+        assert_eq!(second, CalibrationVariance::default());
         xx + yy
     };
     let (few, many) = (left_m2(5), left_m2(50));
