@@ -129,18 +129,14 @@ fn finish<'a>(
         format_count(counters.lost_frames),
         format_count(counters.gaps),
     );
-    let lost = format!("{} readings could not be recorded", format_count(status.lost));
-    match &status.problem {
-        Some(problem) if status.lost > 0 => {
-            return Err(Failure::DataLost(format!("{summary}; {lost}: {problem}")));
-        }
-        Some(problem) => return Err(Failure::DataLost(format!("{summary}; {problem}"))),
-        None if status.lost > 0 => return Err(Failure::DataLost(format!("{summary}; {lost}"))),
-        None => {}
-    }
+    let lost =
+        (status.lost > 0).then(|| format!("{} readings could not be recorded", format_count(status.lost)));
     let most_often = counters.bad_frames.iter().max_by_key(|(_, count)| **count);
-    if let (0, Some((cause, _))) = (status.readings, most_often) {
-        return Err(Failure::DataLost(format!("{summary}; {}", cause.of_all(bad, labels))));
+    let unread =
+        most_often.filter(|_| status.readings == 0).map(|(cause, _)| cause.explain_no_reading(bad, labels));
+    let faults: Vec<String> = [lost, status.problem.clone(), unread].into_iter().flatten().collect();
+    if !faults.is_empty() {
+        return Err(Failure::DataLost(format!("{summary}; {}", faults.join("; "))));
     }
     if interrupted() {
         return Err(Failure::Interrupted(summary));

@@ -76,9 +76,7 @@ impl Presses {
         let positions = touched.iter().map(|row| row.position).collect();
         Ok(Self { positions, readings, places, reading_sds, variance })
     }
-}
 
-impl Presses {
     /// Checks that the presses reach over enough of a surface to tell how readings change on it.
     pub fn check_reach(&self, extent: Extent) -> Result<(), PositionError> {
         let check = |axis: char, coordinate: fn(Position) -> f64, side_m: f64| {

@@ -2,6 +2,7 @@
 
 use super::cells::Cells;
 use super::{LoadChannel, LoadSensors};
+use ndarray::Array2;
 
 /// Nodes that an interpolation goes by along an axis.
 const STENCIL: usize = 4;
@@ -55,6 +56,21 @@ impl CumulativeInfluence {
             }
         }
         Self { channels, sides_m, nodes, sums }
+    }
+
+    /// The means over the cells whose points the table was made from, in 1/N: a channel a row, a cell a column.
+    pub fn over_cells(&self, cells: &Cells) -> Array2<f64> {
+        let [along, across] = cells.points_a_side();
+        let sum =
+            |x: usize, y: usize, channel: usize| self.sums[(y * self.nodes[0] + x) * self.channels + channel];
+        let measure = self.side_m(0) * self.side_m(1) / cells.len() as f64;
+        Array2::from_shape_fn((self.channels, cells.len()), |(channel, cell)| {
+            let (left, low) = (along * (cell % cells.columns), across * (cell / cells.columns));
+            let (right, high) = (left + along, low + across);
+            let upper = sum(right, high, channel) - sum(left, high, channel);
+            let lower = sum(right, low, channel) - sum(left, low, channel);
+            (upper - lower) / measure
+        })
     }
 
     /// The length of a part of the grid along an axis, in metres.
@@ -128,12 +144,16 @@ struct Stencil {
 }
 
 impl Stencil {
+    /// Those of nodes at which the sums are not 0, as they are at the first one.
     fn terms(&self) -> impl Iterator<Item = (usize, (f64, f64))> {
-        (self.first..).zip(self.terms.into_iter().take(self.count))
+        (self.first..).zip(self.terms.into_iter().take(self.count)).filter(|(node, _)| *node > 0)
     }
 }
 
 fn add(sum: &mut [f64], weight: f64, values: &[f64]) {
+    if weight == 0.0 {
+        return;
+    }
     sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
 }
 
@@ -180,8 +200,9 @@ mod tests {
 
     #[test]
     fn means_are_those_of_loads_summed_point_by_point() {
+        let (beam, layout) = (beam(), layout(false));
         for ends_m in [[0.0, 0.01], [0.0033, 0.0047], [0.1, 0.31], [0.377, 0.4]] {
-            check(&beam(), &layout(false), [ends_m, [0.0, 1.0]], 1e-4);
+            check(&beam, &layout, [ends_m, [0.0, 1.0]], 1e-4);
         }
         check(&Foam, &foam_layout(), [[0.03, 0.11], [0.0, 0.04]], 2e-3);
         check(&Foam, &foam_layout(), [[0.187, 0.2], [0.061, 0.077]], 2e-3);

@@ -87,7 +87,7 @@ impl<'a> EvenLoads<'a> {
                 loads.best = found;
             }
         }
-        loads.best.misfit.is_finite().then_some(loads)
+        (!starts.is_empty() && loads.best.misfit.is_finite()).then_some(loads)
     }
 
     /// The misfit that they leave.
@@ -396,7 +396,8 @@ impl<'a> EvenLoads<'a> {
         (!self.is_at_edge(aim, &inside.1.unknowns)).then_some(low.1 + share * (high.1 - low.1))
     }
 
-    /// Whether a load that a value is of is as near to an edge as it can be: a narrower one would be nearer, and harder.
+    /// True for a value of a load whose centre is at an end of its range. The value has no bound then: a narrower load could be nearer to the edge, and
+    /// harder.
     fn is_at_edge(&self, aim: Aim, unknowns: &[f64]) -> bool {
         let is_at_end = |i: usize| {
             let (least, most) = self.range(i);

@@ -32,7 +32,7 @@ use ndarray::{Array1, Array2, Axis};
 use serde::Serialize;
 use std::sync::Arc;
 
-use crate::fit::ReadingError;
+use crate::fit::{LARGEST, ReadingError};
 use crate::setup::Setup;
 use crate::status::misfit_bound;
 use bounds::Bounds;
@@ -46,9 +46,6 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{Cholesky, median, normal_interval_95};
 use patches::{Part, centre_of, find_patches, holds, hull, mean_position};
 use smoothness::{Mixture, Problem};
-
-/// Reading over its noise beyond which it makes no difference how far.
-const LOUDEST: f64 = 1e60;
 
 /// One channel of a reading.
 #[derive(Clone)]
@@ -219,15 +216,10 @@ impl<'a> Profiler<'a> {
     /// A profiler for readings of these sensors.
     pub fn new(sensors: LoadSensors<'a>) -> Self {
         let cells = Cells::new(sensors.extent);
-        let alive: Vec<&LoadChannel> = sensors.alive().collect();
-        let influence = Array2::from_shape_fn((alive.len(), cells.len()), |(i, cell)| {
-            let points = cells.points(cell);
-            let sum = points.iter().map(|point| alive[i].influence.at(*point)).sum::<f64>();
-            sum / points.len() as f64 / alive[i].noise_sd
-        });
-        let worst_misfit = misfit_bound(alive.len());
+        let worst_misfit = misfit_bound(sensors.alive().count());
         let cumulative = CumulativeInfluence::new(&sensors, &cells);
-        Self { sensors, cells, problem: Problem::new(influence, cells.roughness()), cumulative, worst_misfit }
+        let problem = Problem::new(cumulative.over_cells(&cells), cells.roughness());
+        Self { sensors, cells, problem, cumulative, worst_misfit }
     }
 
     /// The cells of its profiles.
@@ -250,7 +242,7 @@ impl<'a> Profiler<'a> {
         let whitened = channels.filter_map(|(channel, value)| {
             let channel = channel.as_ref()?;
             // Of values beyond all bounds the squares are still numbers.
-            Some(((value - channel.offset) / channel.noise_sd).clamp(-LOUDEST, LOUDEST))
+            Some(((value - channel.offset) / channel.noise_sd).clamp(-LARGEST, LARGEST))
         });
         let y: Array1<f64> = whitened.collect();
         let silent = y.dot(&y) <= self.worst_misfit;

@@ -97,7 +97,7 @@ impl Patch {
     }
 }
 
-/// Whether an interval holds a value.
+/// True for a value within an interval.
 pub(super) fn holds((low, high): (f64, f64), value: f64) -> bool {
     (low..=high).contains(&value)
 }
@@ -223,7 +223,7 @@ fn grow(cells: &Cells, forces_n: &[f64], cores: Vec<Vec<usize>>) -> Vec<Part> {
     parts
 }
 
-/// Whether at most [`REACH_CELLS`] cells lie between two sets of cells.
+/// True for two sets of cells with at most [`REACH_CELLS`] cells between them.
 fn touches(cells: &Cells, one: &[usize], other: &[usize]) -> bool {
     let place = |cell: usize| (cell % cells.columns, cell / cells.columns);
     one.iter().any(|a| {

@@ -459,6 +459,7 @@ impl Model {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::likelihood::CalibrationVariance;
 
     /// A channel by itself, without a rate: the steady variance of a random walk in noise is (√(q² + 4·q·r) − q)/2.
     #[test]
@@ -568,8 +569,8 @@ mod tests {
             0.0
         }
 
-        fn calibration_variance(&self, _: &[Contact]) -> [crate::likelihood::CalibrationVariance; 2] {
-            [crate::likelihood::CalibrationVariance::default(); 2]
+        fn calibration_variance(&self, _: &[Contact]) -> [CalibrationVariance; 2] {
+            [CalibrationVariance::default(); 2]
         }
 
         fn linearised(&self, _: &[Contact]) -> Linearisation {

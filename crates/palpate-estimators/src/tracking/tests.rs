@@ -334,8 +334,7 @@ fn a_baseline_that_moves_moves_no_contact() {
     }
 }
 
-/// What calibration leaves of a force beside an end, where force and place trade off, no number of readings takes away: without it, the force of no
-/// calibration was held at 10 mm.
+/// Force and place of a contact that is held beside an end trade off by what calibration leaves of them, however many readings there are.
 #[test]
 fn the_force_of_a_held_contact_is_within_what_calibration_leaves() {
     let mut rig = crate::fixtures::paper(5e-6, 10);

@@ -196,7 +196,8 @@ impl Calibration {
     /// A note where the last of many frames was no reading either, for this cause.
     fn unread(&self, cause: BadFrame) -> Option<Note> {
         let is_time = self.readings == 0 && self.bad.values().sum::<u64>() == UNREAD;
-        is_time.then(|| Note::Unread(cause.of_all(UNREAD, self.labels.iter().map(String::as_str))))
+        is_time
+            .then(|| Note::Unread(cause.explain_no_reading(UNREAD, self.labels.iter().map(String::as_str))))
     }
 
     fn add(&mut self, at: Duration, reading: &[f64], notes: &mut Vec<Note>) -> Result<(), CalibrationError> {

@@ -69,8 +69,8 @@ impl BadFrame {
         }
     }
 
-    /// What to say where this is the cause why none of so many frames was a reading of the channels of these labels.
-    pub fn of_all<'a>(self, frames: u64, labels: impl IntoIterator<Item = &'a str>) -> String {
+    /// Words about a source of whose frames none is a reading: their number, the labels of the channels, this cause, and what to do.
+    pub fn explain_no_reading<'a>(self, frames: u64, labels: impl IntoIterator<Item = &'a str>) -> String {
         let labels: Vec<&str> = labels.into_iter().collect();
         format!(
             "none of {frames} frames is a reading of the channels `{}`: {}; name them in the rig as the board does, or in columns= of the source",
