@@ -37,7 +37,9 @@ def run(path: Path, folder: Path, **environment: str) -> nbformat.NotebookNode:
     package = str(Path(pp.__file__).parents[1])
     environment |= {"PYTHONPATH": package, "MPLBACKEND": "module://matplotlib_inline.backend_inline", "TQDM_DISABLE": "1"}
     os.environ.update(environment)
-    NotebookClient(notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(folder)}}).execute()
+    # What a cell prints comes in one message or in several, as time has it.
+    resources = {"metadata": {"path": str(folder)}}
+    NotebookClient(notebook, timeout=600, kernel_name="python3", resources=resources, coalesce_streams=True).execute()
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
     notebook.metadata = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
