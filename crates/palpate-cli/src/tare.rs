@@ -94,7 +94,9 @@ pub struct Taring<'a> {
     tare: Tare<Vec<f64>>,
     /// Readings that have made the baseline, or, where it is followed, untouched readings that were found.
     count: u64,
-    /// The first of them, to see whether they are untouched ones.
+    /// Readings that are `outside_model` by a baseline that is followed.
+    unexplained: u64,
+    /// The first of the baseline's readings, to see whether they are untouched ones.
     kept: Vec<Vec<f64>>,
     tared: Vec<f64>,
 }
@@ -113,7 +115,8 @@ impl<'a> Taring<'a> {
             )
         })?;
         let tared = tare.learnt().to_vec();
-        let mut taring = Self { locator, source: source.clone(), tare, count: 0, kept: Vec::new(), tared };
+        let mut taring =
+            Self { locator, source: source.clone(), tare, count: 0, unexplained: 0, kept: Vec::new(), tared };
         match source {
             Source::File(path) => taring.read(&path, no_header)?,
             Source::First(_) => {}
@@ -164,6 +167,7 @@ impl<'a> Taring<'a> {
                 let method = &self.locator.method;
                 let estimate = self.tare.follow(reading, &mut self.tared, |tared| method.locate(tared))?;
                 self.count += u64::from(estimate.status == Status::NoContact);
+                self.unexplained += u64::from(estimate.status == Status::OutsideModel);
             }
         }
         reading.copy_from_slice(&self.tared);
@@ -219,12 +223,19 @@ impl<'a> Taring<'a> {
         if self.count > 0 {
             self.say();
         }
-        if self.count < u64::from(Tare::<Vec<f64>>::SETTLED) {
+        let settled = u64::from(Tare::<Vec<f64>>::SETTLED);
+        if self.count < settled {
             let found = if self.count == 0 { "no".to_owned() } else { format!("only {}", self.count) };
             remark!(
                 "palpate: warning: --tare auto found {found} untouched reading{} in {source}, and so the baseline may be that of a touch; \
                  leave the surface alone for a moment, or tare by --tare N or --tare FILE",
                 if self.count > 1 { "s" } else { "" }
+            );
+        } else if !self.tare.is_confirmed() && self.unexplained >= settled {
+            remark!(
+                "palpate: warning: --tare auto: {} readings of {source} are no contact by the baseline, and none has come and gone by it: \
+                 was the surface touched when the readings began? --tare N or --tare FILE takes readings that are known to be untouched",
+                format_count(self.unexplained)
             );
         }
     }

@@ -75,6 +75,9 @@ pub struct Mode {
     pub probability: f64,
 }
 
+/// Largest size of a channel's reading that a contact may explain; its third power and products of that are numbers.
+pub const LARGEST_READING: f64 = 1e60;
+
 /// Status of an estimate: how far it is to be believed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {

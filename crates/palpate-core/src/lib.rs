@@ -32,6 +32,6 @@ mod tare;
 
 pub use activation::{Activation, Logistic};
 pub use contact::{Contact, Position};
-pub use estimate::{BoundedList, ContactEstimate, Estimate, Mode, Status, Uncertainty};
+pub use estimate::{BoundedList, ContactEstimate, Estimate, LARGEST_READING, Mode, Status, Uncertainty};
 pub use network::{BufferMismatch, Network};
 pub use tare::{Tare, TareError};

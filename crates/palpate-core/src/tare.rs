@@ -4,7 +4,7 @@
 //! reading, b its baseline (what the channel reads untouched today) and o what calibration learnt that it reads untouched, the tared
 //! reading is r − b + o.
 
-use crate::{Estimate, Status};
+use crate::{Estimate, LARGEST_READING, Status};
 
 /// Baseline of the channels of a surface, kept in arrays, vectors or slices `B` of the caller's.
 ///
@@ -26,12 +26,30 @@ use crate::{Estimate, Status};
 pub struct Tare<B> {
     /// Untouched reading of each channel, as calibration learnt it.
     learnt: B,
-    baseline: B,
-    /// Readings that the baseline is the mean of, at most the time constant; 0 while it is what calibration learnt.
-    weight: u32,
     time_constant: u32,
+    current: Baseline<B>,
+    /// True for a baseline that is known to be that of the untouched surface.
+    is_confirmed: bool,
+    /// Another baseline: the one that readings fit which nothing explains by an unconfirmed baseline, or the one that was left for the current.
+    other: Option<Baseline<B>>,
+    /// Readings in a row that are `outside_model` by the other baseline too.
+    strange: u32,
     /// Readings in a row that look let go.
     let_go: u32,
+    /// Readings in a row that are untouched by what calibration learnt, and `outside_model` by the baseline.
+    as_learnt: u32,
+}
+
+/// A baseline, and what is known for it.
+#[derive(Clone, Debug, PartialEq)]
+struct Baseline<B> {
+    values: B,
+    /// Readings that it is the mean of, at most the time constant; 0 while it is what calibration learnt.
+    weight: u32,
+    /// Readings in a row that are a contact by it; kept once they are a touch.
+    touched: u32,
+    /// Readings in a row that are untouched by it.
+    untouched: u32,
 }
 
 /// A reading that does not go with a tare.
@@ -84,11 +102,14 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     pub fn new(learnt: B) -> Result<Self, TareError> {
         check(learnt.as_ref(), learnt.as_ref().len())?;
         Ok(Self {
-            baseline: learnt.clone(),
+            current: Baseline::new(learnt.clone(), 0),
             learnt,
-            weight: 0,
             time_constant: Self::TIME_CONSTANT,
+            is_confirmed: false,
+            other: None,
+            strange: 0,
             let_go: 0,
+            as_learnt: 0,
         })
     }
 
@@ -100,12 +121,17 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
 
     /// Untouched reading of each channel today, as far as is known.
     pub fn baseline(&self) -> &[f64] {
-        self.baseline.as_ref()
+        self.current.values.as_ref()
     }
 
     /// Untouched reading of each channel, as calibration learnt it.
     pub fn learnt(&self) -> &[f64] {
         self.learnt.as_ref()
+    }
+
+    /// False while a followed baseline may be that of a touch: what calibration learnt does not fit, and no contact has yet come and gone by it.
+    pub fn is_confirmed(&self) -> bool {
+        self.is_confirmed
     }
 
     /// Adds a reading that is known to be untouched to the mean that is the baseline; the first takes the place of what calibration learnt.
@@ -114,8 +140,9 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// [`TareError`] for another number of channels or a value that is not finite.
     pub fn add_untouched(&mut self, reading: &[f64]) -> Result<(), TareError> {
         check(reading, self.learnt.as_ref().len())?;
-        self.weight = self.weight.saturating_add(1);
-        self.step(reading, 1.0 / f64::from(self.weight));
+        self.is_confirmed = true;
+        self.other = None;
+        self.current.average(reading, u32::MAX);
         Ok(())
     }
 
@@ -129,10 +156,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         if tared.len() != needed {
             return Err(TareError::Channels { needed, found: tared.len() });
         }
-        let baselines = self.baseline.as_ref().iter().zip(self.learnt.as_ref());
-        for ((tared, value), (baseline, learnt)) in tared.iter_mut().zip(reading).zip(baselines) {
-            *tared = value - baseline + learnt;
-        }
+        self.current.take_off(reading, self.learnt(), tared);
         // Immense readings may be finite, and their difference not.
         check(tared, needed)
     }
@@ -144,13 +168,19 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// - a contact, whether held for a second or an hour: the baseline stays. It is not tared away, and the drift in the meantime is not
     ///   made up for;
     /// - `outside_model`, which no contact explains: while the baseline is not yet the mean of [`Tare::SETTLED`] readings the surface has
-    ///   moved since its calibration, and the reading is the new baseline. Later the baseline stays, as a palm is no contact of
-    ///   the model either, unless the opposite of the reading, and of the [`Tare::LET_GO`] − 1 before it, is a contact: then the
-    ///   surface was touched when it was tared, has been let go, and the reading is the new baseline.
+    ///   moved since its calibration, and the reading is the new baseline, unless a value of it is beyond ±[`LARGEST_READING`]. Later the
+    ///   baseline stays, as a palm is no contact of the model either, but for three cases, each of [`Tare::LET_GO`] readings in a row:
+    ///   - the opposite of the readings is a contact: the surface was touched when it was tared and has been let go, and the reading
+    ///     is the new baseline;
+    ///   - by what calibration learnt nothing touches: that is the baseline again;
+    ///   - the baseline is not confirmed, and by another one, which such readings are the mean of, a contact has come and gone: that is the
+    ///     baseline. The one that was left is kept, and comes back when a contact has come and gone by it.
     ///
-    /// So a board that is touched while it starts is right from the moment it is let go. Contacts lighter than those that are told from
-    /// noise go into the baseline. A drift of d a reading is d times the time constant ahead of the baseline, which has to be less than
-    /// the noise.
+    /// A baseline is confirmed where calibration learnt the same, where readings known to be untouched made it, or once a contact has come and gone
+    /// by it. So a board that is touched while it starts is right from the moment it is let go; where it has moved and what touched it is no contact
+    /// (a palm, another force than the known one), it is right from the end of the first touch that is one. Contacts lighter than
+    /// those that are told from noise go into the baseline. A drift of d a reading is d times the time constant ahead of the baseline, which
+    /// has to be less than the noise.
     ///
     /// # Errors
     /// [`TareError`] as for [`Tare::apply`].
@@ -162,50 +192,154 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     ) -> Result<Estimate, TareError> {
         self.apply(reading, tared)?;
         let estimate = locate(tared);
-        let is_settled = self.weight >= Self::SETTLED;
-        let looks_let_go =
-            estimate.status == Status::OutsideModel && is_settled && self.is_let_go(tared, &mut locate);
-        self.let_go = if looks_let_go { self.let_go + 1 } else { 0 };
-        match estimate.status {
-            Status::NoContact => {
-                if self.weight == 0 {
-                    // The surface has not moved: what calibration learnt counts as a settled baseline.
-                    self.weight = Self::SETTLED;
-                }
-                self.weight = (self.weight + 1).min(self.time_constant);
-                self.step(reading, 1.0 / f64::from(self.weight));
+        let status = estimate.status;
+        if status == Status::OutsideModel {
+            if self.current.weight >= Self::SETTLED {
+                self.doubt(reading, tared, &mut locate);
+            } else {
+                self.begin_at(reading);
             }
-            Status::OutsideModel if !is_settled || self.let_go >= Self::LET_GO => {
-                self.let_go = 0;
-                self.weight = 1;
-                self.step(reading, 1.0);
-            }
-            Status::OutsideModel | Status::Located | Status::Ambiguous | Status::OutsideSurface => {}
+            return Ok(estimate);
+        }
+        (self.let_go, self.as_learnt, self.strange) = (0, 0, 0);
+        if let Some(other) = &mut self.other {
+            other.untouched = 0;
+        }
+        if status == Status::NoContact && self.current.weight == 0 {
+            // The surface has not moved: what calibration learnt counts as a settled baseline.
+            self.current.weight = Self::SETTLED;
+            self.is_confirmed = true;
+        }
+        self.current.add(reading, status, self.time_constant);
+        if !self.is_confirmed && self.current.saw_a_whole_touch() {
+            self.is_confirmed = true;
+            self.other = None;
         }
         Ok(estimate)
     }
 
-    /// Whether the opposite of a tared reading is a contact.
-    fn is_let_go(&self, tared: &mut [f64], locate: &mut impl FnMut(&[f64]) -> Estimate) -> bool {
-        let mirror = |tared: &mut [f64]| {
-            tared
-                .iter_mut()
-                .zip(self.learnt.as_ref())
-                .for_each(|(value, learnt)| *value = 2.0 * learnt - *value);
+    /// Looks whether a reading that is `outside_model` by a settled baseline, `tared` by it, tells another one.
+    fn doubt(&mut self, reading: &[f64], tared: &[f64], locate: &mut impl FnMut(&[f64]) -> Estimate) {
+        let mut scratch = self.learnt.clone();
+        let mut status_of = |values: &[f64]| {
+            let is_finite = values.iter().all(|value| value.is_finite());
+            if is_finite { locate(values).status } else { Status::OutsideModel }
         };
-        mirror(tared);
-        let is_finite = tared.iter().all(|value| value.is_finite());
-        let opposite = if is_finite { locate(tared).status } else { Status::OutsideModel };
-        mirror(tared);
-        matches!(opposite, Status::Located | Status::Ambiguous)
+        for ((opposite, value), learnt) in scratch.as_mut().iter_mut().zip(tared).zip(self.learnt.as_ref()) {
+            *opposite = 2.0 * learnt - value;
+        }
+        self.let_go = if is_contact(status_of(scratch.as_ref())) { self.let_go + 1 } else { 0 };
+        self.as_learnt = if status_of(reading) == Status::NoContact { self.as_learnt + 1 } else { 0 };
+        if self.as_learnt >= LET_GO {
+            self.current = Baseline::new(self.learnt.clone(), Self::SETTLED);
+            (self.is_confirmed, self.other) = (true, None);
+            self.as_learnt = 0;
+            return;
+        }
+        if self.let_go >= LET_GO {
+            self.begin_at(reading);
+            return;
+        }
+        let status = self.other.as_ref().map_or(Status::OutsideModel, |other| {
+            other.take_off(reading, self.learnt.as_ref(), scratch.as_mut());
+            status_of(scratch.as_ref())
+        });
+        self.weigh_other(reading, status);
     }
 
-    /// Moves the baseline by a share of the way to a reading.
-    fn step(&mut self, reading: &[f64], share: f64) {
-        for (baseline, value) in self.baseline.as_mut().iter_mut().zip(reading) {
+    /// Holds a reading that is `outside_model` by the baseline, and of a status by the other one, against both.
+    fn weigh_other(&mut self, reading: &[f64], status: Status) {
+        if let Some(other) = &mut self.other {
+            self.strange = if status == Status::OutsideModel { self.strange + 1 } else { 0 };
+            other.add(reading, status, self.time_constant);
+            if other.saw_a_whole_touch() {
+                core::mem::swap(&mut self.current, other);
+                other.forget_touch();
+                (self.is_confirmed, self.let_go, self.as_learnt) = (true, 0, 0);
+            }
+        }
+        let is_wanting = self.other.as_ref().is_none_or(|other| {
+            status == Status::OutsideModel && (other.weight < Self::SETTLED || self.strange >= LET_GO)
+        });
+        if !self.is_confirmed && is_wanting && self.is_possible(reading) {
+            self.other = Some(self.baseline_at(reading));
+            self.strange = 0;
+        }
+    }
+
+    /// Takes a reading for the baseline, which nothing confirms yet.
+    fn begin_at(&mut self, reading: &[f64]) {
+        if !self.is_possible(reading) {
+            return;
+        }
+        self.current = self.baseline_at(reading);
+        (self.is_confirmed, self.other) = (false, None);
+        (self.let_go, self.as_learnt) = (0, 0);
+    }
+
+    fn baseline_at(&self, reading: &[f64]) -> Baseline<B> {
+        let mut baseline = Baseline::new(self.learnt.clone(), 0);
+        baseline.average(reading, self.time_constant);
+        baseline
+    }
+
+    fn is_possible(&self, reading: &[f64]) -> bool {
+        reading.iter().all(|value| value.abs() <= LARGEST_READING)
+    }
+}
+
+/// [`Tare::LET_GO`], whatever the baselines are kept in.
+const LET_GO: u32 = Tare::<[f64; 0]>::LET_GO;
+
+impl<B: AsRef<[f64]> + AsMut<[f64]>> Baseline<B> {
+    fn new(values: B, weight: u32) -> Self {
+        Self { values, weight, touched: 0, untouched: 0 }
+    }
+
+    /// Writes the reading less the baseline, and what calibration learnt added, over `tared`.
+    fn take_off(&self, reading: &[f64], learnt: &[f64], tared: &mut [f64]) {
+        let baselines = self.values.as_ref().iter().zip(learnt);
+        for ((tared, value), (baseline, learnt)) in tared.iter_mut().zip(reading).zip(baselines) {
+            *tared = value - baseline + learnt;
+        }
+    }
+
+    /// Adds a reading that has a status by this baseline.
+    fn add(&mut self, reading: &[f64], status: Status, time_constant: u32) {
+        if status == Status::NoContact {
+            self.average(reading, time_constant);
+            self.untouched = self.untouched.saturating_add(1);
+        } else {
+            self.untouched = 0;
+        }
+        if is_contact(status) {
+            self.touched = self.touched.saturating_add(1);
+        } else if self.touched < LET_GO {
+            self.touched = 0;
+        }
+    }
+
+    /// True once readings in a row were a contact, and readings in a row afterwards untouched.
+    fn saw_a_whole_touch(&self) -> bool {
+        self.touched >= LET_GO && self.untouched >= LET_GO
+    }
+
+    fn forget_touch(&mut self) {
+        (self.touched, self.untouched) = (0, 0);
+    }
+
+    /// Adds a reading to the mean that the baseline is.
+    fn average(&mut self, reading: &[f64], time_constant: u32) {
+        self.weight = self.weight.saturating_add(1).min(time_constant);
+        let share = 1.0 / f64::from(self.weight);
+        for (baseline, value) in self.values.as_mut().iter_mut().zip(reading) {
             *baseline += share * (value - *baseline);
         }
     }
+}
+
+fn is_contact(status: Status) -> bool {
+    matches!(status, Status::Located | Status::Ambiguous)
 }
 
 fn check(reading: &[f64], needed: usize) -> Result<(), TareError> {
@@ -315,6 +449,92 @@ mod tests {
         assert!(is_right(&tare, MOVED), "{:?}", tare.baseline());
     }
 
+    /// So many readings of a palm, a newton or more at either end.
+    fn follow_palm(tare: &mut Tare<[f64; 4]>, numbers: core::ops::Range<u32>, moved: [f64; 4]) -> Estimate {
+        let mut estimate = None;
+        for number in numbers {
+            let palm: [f64; 4] =
+                core::array::from_fn(|c| reading(number, moved, 2.0, 0.0)[c] + 2.0 * influence(1.0)[c]);
+            estimate = Some(follow(tare, palm));
+        }
+        estimate.unwrap()
+    }
+
+    #[test]
+    fn a_palm_while_a_board_starts_that_has_not_moved_is_forgotten_once_it_is_gone() {
+        let mut tare = Tare::new(LEARNT).unwrap();
+        assert_eq!(follow_palm(&mut tare, 0..300, [0.0; 4]).status, Status::NoContact);
+        assert!(!tare.is_confirmed());
+        for number in 0..10 {
+            follow(&mut tare, reading(number, [0.0; 4], 0.0, 0.0));
+        }
+        assert!(is_right(&tare, [0.0; 4]) && tare.is_confirmed(), "{:?}", tare.baseline());
+    }
+
+    #[test]
+    fn a_palm_while_a_moved_board_starts_is_forgotten_once_a_contact_has_come_and_gone() {
+        let mut tare = Tare::new(LEARNT).unwrap();
+        follow_palm(&mut tare, 0..300, MOVED);
+        // Nothing tells this from a palm on an untouched board.
+        follow_many(&mut tare, 0..100, (0.0, 0.0));
+        assert_eq!(follow(&mut tare, reading(1, MOVED, 0.0, 0.0)).status, Status::OutsideModel);
+        follow_many(&mut tare, 0..20, (1.5, 0.6));
+        follow_many(&mut tare, 0..20, (0.0, 0.0));
+        assert!(is_right(&tare, MOVED) && tare.is_confirmed(), "{:?}", tare.baseline());
+        assert_eq!(follow_palm(&mut tare, 0..3000, MOVED).status, Status::OutsideModel);
+    }
+
+    #[test]
+    fn what_lies_on_a_moved_board_from_its_start_on_may_be_touched_and_taken_off() {
+        let mut tare = Tare::new(LEARNT).unwrap();
+        follow_many(&mut tare, 0..60, (0.0, 0.0));
+        // The finger presses on the thing before it has ever pressed on the board: that confirms the wrong baseline.
+        follow_palm(&mut tare, 0..60, MOVED);
+        let mut on_top = MOVED;
+        for (c, moved) in on_top.iter_mut().enumerate() {
+            *moved += 2.0 * (influence(0.0)[c] + influence(1.0)[c]);
+        }
+        for (number, force) in
+            [(0..20, 1.5), (20..40, 0.0)].into_iter().flat_map(|(r, f)| r.map(move |n| (n, f)))
+        {
+            follow(&mut tare, reading(number, on_top, force, 0.6));
+        }
+        assert!(is_right(&tare, on_top), "{:?}", tare.baseline());
+        follow_many(&mut tare, 0..20, (0.0, 0.0));
+        follow_many(&mut tare, 0..20, (1.5, 0.3));
+        follow_many(&mut tare, 0..20, (0.0, 0.0));
+        assert!(is_right(&tare, MOVED), "{:?}", tare.baseline());
+    }
+
+    #[test]
+    fn two_contacts_of_which_one_comes_and_goes_are_not_tared_away() {
+        let mut tare = Tare::new(LEARNT).unwrap();
+        follow_many(&mut tare, 0..60, (0.0, 0.0));
+        follow_many(&mut tare, 0..20, (1.5, 0.3));
+        follow_many(&mut tare, 0..20, (0.0, 0.0));
+        for i in 0..3000 {
+            let further = if i % 100 < 50 { 1.5 } else { 0.0 };
+            let palm: [f64; 4] = core::array::from_fn(|c| {
+                reading(i, MOVED, 2.0, 0.0)[c] + 2.0 * influence(1.0)[c] + further * influence(0.4)[c]
+            });
+            follow(&mut tare, palm);
+        }
+        assert!(is_right(&tare, MOVED), "{:?}", tare.baseline());
+    }
+
+    #[test]
+    fn immense_readings_are_no_baseline() {
+        let mut tare = Tare::new([0.0; 4]).unwrap();
+        let mut tared = [0.0; 4];
+        for _ in 0..100 {
+            let estimate = tare.follow(&[1e308; 4], &mut tared, |_| {
+                Estimate::of_position(Position::along(0.5), Status::OutsideModel)
+            });
+            assert_eq!(estimate.unwrap().status, Status::OutsideModel);
+        }
+        assert_eq!(tare, Tare::new([0.0; 4]).unwrap());
+    }
+
     #[test]
     fn one_loud_reading_is_not_taken_for_a_surface_that_was_let_go() {
         let mut tare = Tare::new(LEARNT).unwrap();
@@ -334,9 +554,7 @@ mod tests {
         let mut tare = Tare::new(LEARNT).unwrap();
         follow_many(&mut tare, 0..60, (0.0, 0.0));
         for i in 0..3000 {
-            let palm: [f64; 4] =
-                core::array::from_fn(|c| reading(i, MOVED, 2.0, 0.0)[c] + 2.0 * influence(1.0)[c]);
-            assert_eq!(follow(&mut tare, palm).status, Status::OutsideModel);
+            assert_eq!(follow_palm(&mut tare, i..i + 1, MOVED).status, Status::OutsideModel);
         }
         assert!(is_right(&tare, MOVED), "{:?}", tare.baseline());
     }

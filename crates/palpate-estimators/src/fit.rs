@@ -356,8 +356,8 @@ impl<M: Locate> Fitted<M> {
     }
 }
 
-/// Largest size of a number of a locator, and of a channel's reading that a contact may explain; its third power and products of that are numbers.
-pub(crate) const LARGEST: f64 = 1e60;
+/// Largest size of a number of a locator, as of a reading.
+pub(crate) const LARGEST: f64 = palpate_core::LARGEST_READING;
 
 /// An estimate of a reading as locators give it: in numbers, and `located` only where the reading tells something of the place.
 pub(crate) fn told(estimate: Estimate, reading: &[f64], setup: &Setup) -> Estimate {

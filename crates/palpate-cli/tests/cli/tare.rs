@@ -96,24 +96,92 @@ fn what_a_tare_takes_is_said_and_its_rows_stay_in_their_places() {
     assert!(told.contains("40 of 40 readings of the tare are not within the noise"), "{told}");
 }
 
+/// What no contact explains.
+const PALM: [Touch; 3] = [
+    Touch { position_mm: 60.0, force_n: 3.0 },
+    Touch { position_mm: 130.0, force_n: 3.0 },
+    Touch { position_mm: 240.0, force_n: 3.0 },
+];
+
+/// Statuses and positions of readings with an automatic tare: a palm, the board let go, a touch, let go, and a touch.
+fn after_a_palm(folder: &Path, board: &mut Board) -> Vec<Vec<(String, String)>> {
+    let touch = |position_mm: f64| Touch { position_mm, force_n: 2.0 };
+    let stretches =
+        [(60, Touch::NONE), (60, Touch::NONE), (20, touch(100.0)), (20, Touch::NONE), (20, touch(200.0))];
+    let mut csv = String::new();
+    for (i, (count, touch)) in stretches.into_iter().enumerate() {
+        board.lay_on(if i == 0 { &PALM } else { &[] });
+        let rows = board.recording(&vec![touch; count]);
+        csv += if i == 0 { &rows } else { rows.split_once('\n').unwrap().1 };
+    }
+    fs::write(folder.join("palm.csv"), csv).unwrap();
+    let located = said(&run(folder, &["locate", "board.json", "palm.csv", "--tare", "auto"]));
+    let row = |line: &str| {
+        let fields: Vec<&str> = line.split(',').collect();
+        (fields.last().unwrap().to_string(), fields[1].to_owned())
+    };
+    let mut rows = located.lines().skip(1).map(row);
+    stretches.map(|(count, _)| rows.by_ref().take(count).collect()).to_vec()
+}
+
+/// Readings of a status.
+fn count(rows: &[(String, String)], status: &str) -> usize {
+    rows.iter().filter(|(found, _)| found == status).count()
+}
+
+#[test]
+fn a_palm_while_a_session_starts_is_no_baseline_for_good() {
+    let (folder, mut board) = fitted();
+    let [_, let_go, touched, untouched, last] = &after_a_palm(folder.path(), &mut board)[..] else {
+        panic!()
+    };
+    assert!(count(let_go, "no_contact") >= 50, "{let_go:?}");
+    assert!(
+        count(touched, "located") >= 19 && count(untouched, "no_contact") >= 18,
+        "{touched:?} {untouched:?}"
+    );
+    assert!(count(last, "located") >= 19, "{last:?}");
+
+    // On a board that has moved the first touch decides, which comes and goes.
+    board.move_offsets(50.0);
+    let [_, let_go, touched, untouched, last] = &after_a_palm(folder.path(), &mut board)[..] else {
+        panic!()
+    };
+    assert_eq!(count(let_go, "located") + count(touched, "located"), 0, "{let_go:?} {touched:?}");
+    assert!(count(untouched, "no_contact") >= 12, "{untouched:?}");
+    assert!(count(last, "located") >= 19, "{last:?}");
+    for (_, position_mm) in last {
+        assert!((position_mm.parse::<f64>().unwrap() - 200.0).abs() < 20.0, "{last:?}");
+    }
+}
+
 #[test]
 fn an_automatic_tare_says_how_many_untouched_readings_it_found() {
     let (folder, mut board) = fitted();
     let touch = Touch { position_mm: 150.0, force_n: 2.0 };
-    let mut told = |touches: &[Touch]| {
+    let told = |board: &mut Board, touches: &[Touch]| {
         fs::write(folder.path().join("few.csv"), board.recording(touches)).unwrap();
         let output = run(folder.path(), &["locate", "board.json", "few.csv", "--tare", "auto"]);
         said(&output);
         String::from_utf8_lossy(&output.stderr).into_owned()
     };
-    let touched = told(&[touch; 30]);
+    let touched = told(&mut board, &[touch; 30]);
     assert!(touched.contains("found no untouched reading in few.csv"), "{touched}");
     assert!(!touched.contains("moved most"), "{touched}");
-    let short = told(&[[Touch::NONE; 5].as_slice(), &[touch; 30]].concat());
+    let short = told(&mut board, &[[Touch::NONE; 5].as_slice(), &[touch; 30]].concat());
     assert!(short.contains("found only 5 untouched readings") && short.contains("moved most"), "{short}");
-    let enough = told(&[[Touch::NONE; 60].as_slice(), &[touch; 30]].concat());
+    let enough = told(&mut board, &[[Touch::NONE; 60].as_slice(), &[touch; 30]].concat());
     assert!(enough.contains("tare from 60 untouched readings that were found"), "{enough}");
     assert!(!enough.contains("warning"), "{enough}");
+    board.move_offsets(50.0);
+    board.lay_on(&PALM);
+    let mut csv = board.recording(&[Touch::NONE; 60]);
+    board.lay_on(&[]);
+    csv += board.recording(&[Touch::NONE; 60]).split_once('\n').unwrap().1;
+    fs::write(folder.path().join("palm.csv"), csv).unwrap();
+    let output = run(folder.path(), &["locate", "board.json", "palm.csv", "--tare", "auto"]);
+    let doubted = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(doubted.contains("readings of palm.csv are no contact by the baseline"), "{doubted}");
 }
 
 #[test]

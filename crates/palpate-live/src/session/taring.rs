@@ -45,10 +45,7 @@ impl Taring {
         if self.follows {
             // A locator refuses no tared reading: its channels and values were checked by the tare.
             let mut refused = false;
-            // The first is that of the reading; the baseline may ask for others, and its way back is not exact to the last bit.
-            let mut located = None;
             let estimate = tare.follow(reading, tared, |tared| {
-                located.get_or_insert_with(|| tared.to_vec());
                 locator.locate(tared).unwrap_or_else(|_| {
                     refused = true;
                     Estimate::of_position(
@@ -57,9 +54,6 @@ impl Taring {
                     )
                 })
             });
-            if let Some(located) = located {
-                tared.copy_from_slice(&located);
-            }
             return estimate.ok().filter(|_| !refused).map(|estimate| (estimate, tares));
         }
         tare.apply(reading, tared).ok()?;

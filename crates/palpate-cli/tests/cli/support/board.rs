@@ -27,6 +27,8 @@ const SENSORS: usize = 6;
 /// Sensors with offsets and a count of noise each.
 pub struct Board {
     offsets: [f64; SENSORS],
+    /// Loads that lie on it.
+    loads: Vec<Touch>,
     state: u64,
 }
 
@@ -43,7 +45,7 @@ impl Touch {
 
 impl Board {
     pub fn new(seed: u64) -> Self {
-        let mut board = Self { offsets: [0.0; SENSORS], state: seed };
+        let mut board = Self { offsets: [0.0; SENSORS], loads: Vec::new(), state: seed };
         board.move_offsets(300.0);
         board
     }
@@ -62,6 +64,11 @@ impl Board {
         });
     }
 
+    /// Lays loads on the board, in place of those that lie there.
+    pub fn lay_on(&mut self, loads: &[Touch]) {
+        self.loads = loads.to_vec();
+    }
+
     /// A number between 0 and 1 (D. Knuth's linear congruential generator, its upper half).
     pub fn uniform(&mut self) -> f64 {
         self.state =
@@ -78,7 +85,9 @@ impl Board {
         std::array::from_fn(|c| {
             let sensor_mm = LENGTH_MM * (c as f64 + 0.7) / (SENSORS as f64 + 0.4);
             let gain = 40.0 + 3.0 * c as f64;
-            self.offsets[c] + touch.force_n * gain * deflection(sensor_mm, touch.position_mm) + self.noise()
+            let load = |load: &Touch| load.force_n * gain * deflection(sensor_mm, load.position_mm);
+            let loads: f64 = self.loads.iter().map(load).sum();
+            self.offsets[c] + loads + load(&touch) + self.noise()
         })
     }
 
