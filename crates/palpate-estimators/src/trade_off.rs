@@ -10,6 +10,8 @@
 //!   an end, where the place has a boundary, it falls to 2.71, such that 95 % of the readings of every place are covered (Feldman and
 //!   Cousins, Physical Review D 57, 1998). The intervals of place and force are the region's projections, and hold the best contact
 //!   whatever the reading;
+//! - where influences are extrapolated beyond the outermost press, their variances are hardly more than a guess, and too large ones would exclude what they
+//!   leave open: there the determinant counts up to that of the best contact ([`Contacts::extrapolates`]);
 //! - where a stretch of places in the region reaches an end, the estimate is their posterior median, the prior being flat in the place
 //!   and in the size of the signal, with the best force there. Of all estimates it has the least mean error over the places.
 //!
@@ -78,6 +80,8 @@ pub(crate) struct Contacts<'a> {
     pub widening: f64,
     /// The force at which channels are weighed first, in newtons.
     pub reference_force_n: f64,
+    /// True where influences near the ends are extrapolated: contacts whose reading they leave open are not excluded for that.
+    pub extrapolates: bool,
     /// d and f of every channel.
     pub channels: &'a Channels<'a>,
 }
@@ -146,8 +150,8 @@ struct Best {
     /// 1/variance of the force.
     precision: f64,
     misfit: f64,
-    /// χ² and the logarithm of the determinant.
-    cost: f64,
+    /// The logarithm of the determinant.
+    spread: f64,
     /// q.
     bound: f64,
     /// True where a greater force than the greatest would explain the reading better.
@@ -155,9 +159,30 @@ struct Best {
 }
 
 impl Best {
-    /// True where the cost is at most `least` + q, q being at least `floor`.
-    fn is_in(&self, least: f64, floor: f64) -> bool {
-        self.cost - least <= self.bound.max(floor)
+    fn cost(&self) -> f64 {
+        self.misfit + self.spread
+    }
+}
+
+/// The rule by which places are not excluded.
+#[derive(Clone, Copy, Debug)]
+struct Region {
+    /// The least cost of all places.
+    least: f64,
+    /// The logarithm of the determinant counts up to this.
+    most_spread: f64,
+    /// The least q.
+    floor: f64,
+}
+
+impl Region {
+    /// What is left of q at a place; less than 0 where it is excluded.
+    fn left(&self, at: &Best) -> f64 {
+        at.bound.max(self.floor) - (at.misfit + at.spread.min(self.most_spread) - self.least)
+    }
+
+    fn holds(&self, at: &Best) -> bool {
+        self.left(at) >= 0.0
     }
 }
 
@@ -182,18 +207,21 @@ impl Contacts<'_> {
         if !misfit.is_finite() {
             return None;
         }
-        let least = looked.iter().map(|at| at.cost).fold(f64::INFINITY, f64::min);
+        let best = looked.iter().min_by(|a, b| a.cost().total_cmp(&b.cost()))?;
+        let most_spread = if self.extrapolates { best.spread } else { f64::INFINITY };
+        let region = Region { least: best.cost(), most_spread, floor: 0.0 };
         let mut stretches = Vec::new();
         let mut from = 0;
-        let around_best = self.around_best(&looked, least);
+        let around_best = self.around_best(&looked, &region);
         while from < looked.len() {
             let floor = if around_best.contains(&from) { 0.0 } else { self.widening * BEYOND_A_BARRIER };
-            let run_len = looked[from..].iter().take_while(|at| at.is_in(least, floor)).count();
+            let region = Region { floor, ..region };
+            let run_len = looked[from..].iter().take_while(|at| region.holds(at)).count();
             if run_len > 0 {
                 let beside = [from.checked_sub(1), Some(from + run_len)];
                 let beside = beside.map(|i| i.and_then(|i| looked.get(i).copied()));
                 let run = &looked[from..from + run_len];
-                stretches.push(self.stretch(run, beside, (least, floor), &mut look));
+                stretches.push(self.stretch(run, beside, &region, &mut look));
             }
             from += run_len.max(1);
         }
@@ -233,9 +261,10 @@ impl Contacts<'_> {
     }
 
     /// Indices of the places around the best, up to barriers that are higher than what is not excluded behind them.
-    fn around_best(&self, looked: &[Best], least: f64) -> std::ops::Range<usize> {
-        let is_barrier = |at: &Best| at.cost - least > self.widening * BEYOND_A_BARRIER;
-        let best = looked.iter().position(|at| at.cost == least).unwrap_or(0);
+    fn around_best(&self, looked: &[Best], region: &Region) -> std::ops::Range<usize> {
+        let barrier = Region { floor: self.widening * BEYOND_A_BARRIER, ..*region };
+        let is_barrier = |at: &Best| !barrier.holds(at);
+        let best = looked.iter().position(|at| at.cost() == region.least).unwrap_or(0);
         let from = looked[..best].iter().rposition(is_barrier).map_or(0, |i| i + 1);
         let to = looked[best..].iter().position(is_barrier).map_or(looked.len(), |i| best + i);
         from..to
@@ -246,12 +275,12 @@ impl Contacts<'_> {
         &self,
         run: &[Best],
         [before, after]: [Option<Best>; 2],
-        (least, floor): (f64, f64),
+        region: &Region,
         look: &mut impl FnMut(f64) -> Best,
     ) -> Stretch {
         let mut end = |inside: &Best, outside: Option<Best>| match outside {
             None => *inside,
-            Some(outside) => edge(inside, &outside, Self::EDGE_HALVINGS, look, |at| at.is_in(least, floor)),
+            Some(outside) => edge(inside, &outside, Self::EDGE_HALVINGS, look, |at| region.holds(at)),
         };
         let (first, last) = (end(&run[0], before), end(&run[run.len() - 1], after));
         // Where nothing but the greatest force ends a stretch, it reaches the end as far as a place can be told.
@@ -259,8 +288,8 @@ impl Contacts<'_> {
         let way_m = last.x_m - first.x_m;
         let step = |i: usize| first.x_m + way_m * (i as f64 + 0.5) / Self::WITHIN as f64;
         let mut within: Vec<Best> = (0..Self::WITHIN).map(|i| look(step(i))).collect();
-        let weighed = Weighed::new(&within, least);
-        let lowest = run.iter().copied().min_by(|a, b| a.cost.total_cmp(&b.cost)).unwrap_or(first);
+        let weighed = Weighed::new(&within, region.least);
+        let lowest = run.iter().copied().min_by(|a, b| a.cost().total_cmp(&b.cost())).unwrap_or(first);
         let at = if weighed.weight > 0.0 && (reaches(&first, before) || reaches(&last, after)) {
             look(first.x_m + way_m * weighed.median())
         } else {
@@ -270,7 +299,7 @@ impl Contacts<'_> {
         within.extend([first, last, lowest, at]);
         Stretch {
             x_95_m: (first.x_m, last.x_m),
-            force_95_n: self.forces(&within, (least, floor)),
+            force_95_n: self.forces(&within, region),
             x_m: at.x_m,
             force_n: at.force_n,
             covariance,
@@ -279,11 +308,11 @@ impl Contacts<'_> {
     }
 
     /// The least and the greatest force in the region at these places.
-    fn forces(&self, within: &[Best], (least, floor): (f64, f64)) -> (f64, f64) {
+    fn forces(&self, within: &[Best], region: &Region) -> (f64, f64) {
         let most = if let Force::AtMost(most) = self.force { most } else { f64::INFINITY };
         let mut forces = (f64::INFINITY, 0.0f64);
         for at in within {
-            let left = (at.bound.max(floor) - (at.cost - least)).max(0.0);
+            let left = region.left(at).max(0.0);
             // At the end itself no force has an effect, and any is possible.
             let half = if at.precision > 0.0 { (left / at.precision).sqrt() } else { 0.0 };
             forces = (forces.0.min(at.force_n - half), forces.1.max(at.force_n + half));
@@ -319,7 +348,7 @@ impl Contacts<'_> {
         });
         let bound = self.widening * likelihood_bound(across.fold(f64::INFINITY, f64::min));
         let precision = if let Force::Known(_) = self.force { f64::INFINITY } else { ff };
-        Best { x_m, force_n, precision, misfit, cost: misfit + spread, bound, is_held }
+        Best { x_m, force_n, precision, misfit, spread, bound, is_held }
     }
 
     /// The best force at a place, whether a greater one than the greatest would be better, and the sum of the logarithms of the variances; leaves d
@@ -381,7 +410,7 @@ struct Weighed {
 
 impl Weighed {
     fn new(within: &[Best], least: f64) -> Self {
-        let densities: Vec<f64> = within.iter().map(|at| (-0.5 * (at.cost - least)).exp()).collect();
+        let densities: Vec<f64> = within.iter().map(|at| (-0.5 * (at.cost() - least)).exp()).collect();
         let sum: f64 = densities.iter().sum();
         Self { weight: sum / within.len() as f64, densities, sum }
     }
@@ -495,6 +524,7 @@ mod tests {
             force: Force::AtMost(30.0),
             widening: 1.0,
             reference_force_n: 3.0,
+            extrapolates: false,
             channels: &channels,
         };
         let found = contacts.not_excluded(&[0.3]).unwrap();

@@ -396,6 +396,7 @@ impl Posterior<'_> {
             force,
             widening: 1.0,
             reference_force_n: self.greatest_force_n.unwrap_or(strongest),
+            extrapolates: false,
             channels: &channels,
         };
         let minima_m: Vec<f64> = found.iter().map(|at| at.position_m).collect();

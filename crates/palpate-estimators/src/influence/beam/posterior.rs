@@ -119,6 +119,7 @@ fn not_excluded(search: &Search, whitened: &[[f64; 8]], minima: &[Minimum]) -> O
         },
         widening: CALIBRATED,
         reference_force_n,
+        extrapolates: false,
         channels: &channels,
     };
     let minima_m: Vec<f64> = minima.iter().map(|minimum| minimum.x_m).collect();

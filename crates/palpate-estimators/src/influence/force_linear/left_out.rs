@@ -7,7 +7,7 @@
 
 use super::presses::FEW;
 use super::{ForceLinearLocator, MOST_PRESSES, fit_condensed};
-use crate::fit::{FitTask, Locate};
+use crate::fit::FitTask;
 use crate::influence::config::Structure;
 use crate::influence::measured::MeasuredError;
 use crate::recording::Row;
@@ -62,7 +62,7 @@ pub(super) fn factor(
 
 /// z² of a press, the mean of both coordinates on a plane; `None` where its reading has no interval, or one of no length.
 fn square(locator: &ForceLinearLocator, row: &Row, extent: Extent) -> Option<f64> {
-    let contact = locator.locate(&row.reading).contact;
+    let contact = locator.posterior(&row.reading).contact;
     let told = contact.uncertainty?;
     let (at, true_at) = (contact.position, row.position);
     let square = |at_m: f64, true_m: f64, (low_m, high_m): (f64, f64)| {

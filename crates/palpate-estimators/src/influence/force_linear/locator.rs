@@ -86,6 +86,9 @@ impl Tables {
 pub(super) struct Stored {
     pub x: Axis,
     pub y: Axis,
+    /// Positions of the outermost presses along a line, in metres; nothing on a plane, and in files that were written before they were kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outermost_m: Option<(f64, f64)>,
     /// Channels of a reading, and those of them that are in use, from 0.
     pub channels: usize,
     pub live: Vec<usize>,
@@ -133,7 +136,7 @@ fn is_one(value: &f64) -> bool {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct ForceLinearLocator {
-    stored: Stored,
+    pub(super) stored: Stored,
     /// Expected φ of a contact, and its precision.
     expected: [f64; 2],
     /// f, v and β, eight channels side by side.
@@ -222,6 +225,8 @@ impl Stored {
             LocatorFault::check_count(what, places.saturating_mul(live), list.len())?;
         }
         numbers("offset", offsets, |_| true, "a finite number")?;
+        let outermost_m = self.outermost_m.into_iter().flat_map(|(first_m, last_m)| [first_m, last_m]);
+        LocatorFault::check_numbers("outermost press", outermost_m, |_| true, "a finite number")?;
         numbers("mean force", &[self.mean_force_n], |_| true, "a finite number")?;
         numbers("influence value", values, |_| true, "a finite number")?;
         numbers("influence covariance", covariances, |_| true, "a finite number")?;
@@ -440,7 +445,7 @@ impl ForceLinearLocator {
         values.as_flattened()[..self.stored.live.len()].to_vec()
     }
 
-    fn axes(&self) -> [Axis; 2] {
+    pub(super) fn axes(&self) -> [Axis; 2] {
         [self.stored.x, self.stored.y]
     }
 
@@ -625,7 +630,7 @@ impl ForceLinearLocator {
     }
 
     /// A reading, less offsets and over the noise, ready to be explained.
-    fn seen(&self, relative: &[f64]) -> Seen<'_> {
+    pub(super) fn seen(&self, relative: &[f64]) -> Seen<'_> {
         Seen {
             locator: self,
             reading: in_lanes(relative),
@@ -648,6 +653,11 @@ impl ForceLinearLocator {
         Inversion::new(self.seen(relative)).estimate(self.told_force(), limits)
     }
 
+    /// The posterior of a reading, whose intervals near the ends are by what is expected beforehand.
+    pub(super) fn posterior(&self, reading: &[f64]) -> Estimate {
+        self.estimate(&self.relative(reading))
+    }
+
     /// True for a reading that noise alone explains.
     #[cfg(test)]
     pub fn is_noise(&self, reading: &[f64]) -> bool {
@@ -663,7 +673,7 @@ impl ForceLinearLocator {
 
 /// A relative reading, and room for what is interpolated to explain it.
 #[derive(Debug)]
-struct Seen<'a> {
+pub(super) struct Seen<'a> {
     locator: &'a ForceLinearLocator,
     reading: Vec<Lanes>,
     /// Variance of the noise at the place that is looked at over that of an untouched board.
@@ -743,6 +753,21 @@ impl Seen<'_> {
             ff: share * weighed.ff,
             log_determinant: share * (weighed.log_determinant + of_place),
         }
+    }
+}
+
+impl Seen<'_> {
+    /// Writes d and f of every channel over its standard deviation for a contact; the logarithm of the determinant, less a constant.
+    pub(super) fn whiten(&mut self, at: Unknowns, channels: &mut Vec<[f64; 2]>) -> f64 {
+        self.weigh(at);
+        let ForceLinearLocator { layers, stored, .. } = self.locator;
+        layers.interpolate([at[0], at[1]], VALUES..VALUES + 1, &mut self.between);
+        let [weights, reading, values] =
+            [&self.weights, &self.reading, &self.between].map(|lanes| lanes.as_flattened());
+        let live = stored.live.len();
+        channels.clear();
+        channels.extend((0..live).map(|c| [reading[c], values[c]].map(|value| weights[c].sqrt() * value)));
+        -weights[..live].iter().map(|weight| weight.ln()).sum::<f64>() / stored.channels_as_one
     }
 }
 
@@ -911,11 +936,12 @@ impl Locate for ForceLinearLocator {
 
     fn locate(&self, reading: &[f64]) -> Estimate {
         let relative = self.relative(reading);
-        let estimate = self.estimate(&relative);
+        let mut estimate = self.estimate(&relative);
         if self.is_no_contact(&relative) {
             // The most probable place of a contact that would be too light to be told from noise.
             return Estimate::of_contact(estimate.contact, Status::NoContact);
         }
+        self.tell_near_ends(&relative, &mut estimate);
         estimate
     }
 

@@ -28,6 +28,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::rc::Rc;
 
 mod drift;
+mod ends;
 mod few;
 mod noise;
 mod scatter;
@@ -134,6 +135,10 @@ impl Bench {
     /// A contact of some force, with one count of noise on every gauge.
     fn touch(&mut self, position: Position) -> Row {
         let force_n = self.rng.random_range(FORCES_N);
+        self.row(position, force_n)
+    }
+
+    fn row(&mut self, position: Position, force_n: f64) -> Row {
         let reading = self.counts(position, force_n);
         Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading }
     }
