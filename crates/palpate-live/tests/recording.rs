@@ -86,7 +86,7 @@ fn readings_and_estimates_are_read_again_to_the_last_bit() {
     assert_eq!((status.readings, status.lost, status.problem), (2000, 0, None));
 
     let recorded = all(&path);
-    let attached = Locator::from_json(&Playback::open(&path).unwrap().head().locator).unwrap();
+    let attached = Locator::from_json(Playback::open(&path).unwrap().locator().unwrap()).unwrap();
     let factors: Vec<f64> = palpate_live::frame::Channel::all_of(&locator.setup)
         .iter()
         .map(|channel| channel.unit.factor())
@@ -276,7 +276,7 @@ fn damaged_files_are_read_without_a_panic() {
     session(&rig, &locator, 200, &mut switch);
     switch.end().unwrap();
     let bytes = std::fs::read(&path).unwrap();
-    let chunks_at = 1000 + Playback::open(&path).unwrap().head().locator.len();
+    let chunks_at = 1000 + Playback::open(&path).unwrap().locator().unwrap().len();
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(9);
     let (mut opened, mut refused) = (0, 0);
     for round in 0..300 {

@@ -53,6 +53,32 @@ fn a_recording_is_located_again_to_the_last_bit() {
 }
 
 #[test]
+fn a_recording_whose_locator_is_damaged_or_cut_off_is_read_by_another() {
+    let folder = bench();
+    let record = ["record", "locator.json", "--from", BOARD, "--out", "whole.mcap", "--seconds", "0.5"];
+    said(&run(folder.path(), &record));
+    let whole = fs::read(folder.path().join("whole.mcap")).unwrap();
+    let rows = said(&run(folder.path(), &["replay", "whole.mcap", "--locator", "locator.json"]));
+    let at = whole.windows(14).position(|bytes| bytes == b"format_version").expect("it is attached");
+    let mut damaged = whole.clone();
+    damaged[at] ^= 1;
+    fs::write(folder.path().join("damaged.mcap"), &damaged).unwrap();
+    fs::write(folder.path().join("cut.mcap"), &whole[..at]).unwrap();
+    for (name, what, expected) in [
+        ("damaged.mcap", "`locator.json` is damaged", rows.as_str()),
+        ("cut.mcap", "cut off before its attached `locator.json`", rows.lines().next().unwrap()),
+    ] {
+        let told = complained(&run(folder.path(), &["replay", name]), 2);
+        assert!(told.contains(name) && told.contains(what) && told.contains("--locator FILE"), "{told}");
+        let again = said(&run(folder.path(), &["replay", name, "--locator", "locator.json"]));
+        assert_eq!(again.trim_end(), expected.trim_end(), "{name}");
+    }
+    let again = ["record", "locator.json", "--from", "file:damaged.mcap?speed=0", "--out", "again.mcap"];
+    said(&run(folder.path(), &again));
+    assert_eq!(said(&run(folder.path(), &["replay", "again.mcap"])).lines().count(), rows.lines().count());
+}
+
+#[test]
 fn a_killed_process_loses_the_last_tenth_of_a_second_at_most() {
     let folder = bench();
     let mut record = palpate(folder.path());

@@ -254,9 +254,17 @@ impl Playback {
         Ok(Self { file, chunk: 0, messages: Vec::new().into_iter(), bad_messages: 0 })
     }
 
-    /// Its head: version, source, channels, locator.
+    /// Its head: version, source, channels.
     pub fn head(&self) -> &Head {
         &self.file.head
+    }
+
+    /// The locator that is attached, as its file has it.
+    ///
+    /// # Errors
+    /// [`RecordingError::Locator`] where there is none that can be read; the readings are there all the same.
+    pub fn locator(&self) -> Result<&str, RecordingError> {
+        self.file.locator()
     }
 
     /// True where its end is there.
