@@ -86,8 +86,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     for open in &outlets {
         sinks.push(open(session.channels(), session.extent(), to.clone()).map_err(Complaint::new)?);
     }
+    let mut unprinted = None;
     if arguments.json {
-        sinks.push(Box::new(JsonLines::new(std::io::stdout(), session.channels(), session.extent())));
+        let lines = JsonLines::new(std::io::stdout(), session.channels(), session.extent(), to.clone());
+        unprinted = Some(lines.failed());
+        sinks.push(Box::new(lines));
     }
     let source = Source::open(&arguments.from, Path::new(""), clock, to.clone()).map_err(Complaint::new)?;
     if !commanding.as_slice().is_empty() {
@@ -108,7 +111,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     drop((source, stop, sinks));
     let status = recording.end().unwrap_or_default();
     let labels = session.channels().iter().map(|channel| channel.label.as_str());
-    finish(arguments, &status, session.counters(), labels)
+    let unprinted = unprinted.as_ref().and_then(|unprinted| unprinted.get());
+    finish(arguments, &status, session.counters(), labels, unprinted)
 }
 
 /// Says what was recorded.
@@ -117,6 +121,7 @@ fn finish<'a>(
     status: &RecordingStatus,
     counters: &Counters,
     labels: impl IntoIterator<Item = &'a str>,
+    unprinted: Option<&std::io::Error>,
 ) -> Result<(), Failure> {
     let bad: u64 = counters.bad_frames.values().sum();
     let summary = format!(
@@ -137,6 +142,11 @@ fn finish<'a>(
     let faults: Vec<String> = [lost, status.problem.clone(), unread].into_iter().flatten().collect();
     if !faults.is_empty() {
         return Err(Failure::DataLost(format!("{summary}; {}", faults.join("; "))));
+    }
+    // A reader that has left has what it wants; the recording is what was asked for beside.
+    if let Some(error) = unprinted.filter(|error| error.kind() != std::io::ErrorKind::BrokenPipe) {
+        remark!("{summary}");
+        return Err(output::unprinted(error));
     }
     if interrupted() {
         return Err(Failure::Interrupted(summary));
