@@ -12,10 +12,12 @@ use crate::target::{Inputs, Target};
 use palpate_estimators::estimator::{Estimator, Locator};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::calibration::{DepthKnowledge, Journal, plan};
+use palpate_live::rules::Rules;
 use palpate_live::server::{Access, AccessError, CalibrationPlan, Live, LiveError, Server, ServerError};
 use palpate_live::simulated_board::BoardConfig;
 use palpate_live::source::SourceUrl;
 use palpate_live::stage::StageUrl;
+use palpate_mechanics::surface::Extent;
 use palpate_rig::Rig;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -88,10 +90,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(from) = &arguments.from {
         arguments.session.check_source(from)?;
     }
-    let (publishing, commanding) = rules::read(arguments.rules.as_deref())?;
-    if let Some(path) = &arguments.rules {
-        rules::refuse_publishing(&publishing, path, "`palpate record --mqtt` has one")?;
-    }
     let token = match arguments.token.as_deref() {
         Some("auto") => Some(made_up_token()?),
         given => given.map(str::to_owned),
@@ -100,10 +98,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Access::new(arguments.listen, token.clone(), arguments.host_name.clone()).map_err(refused)?;
     let sinks = arguments.outlets.open()?;
     let live = match calibration(arguments)? {
-        Some(plan) => configured(Live::calibrating(plan, PathBuf::new()), arguments),
+        Some(plan) => {
+            let commanding = commands(arguments, plan.rig.setup.surface().extent())?;
+            configured(Live::calibrating(plan, PathBuf::new()), arguments).with_commands(commanding)
+        }
         None => live(arguments)?,
     };
-    let live = Arc::new(live.with_commands(commanding).with_sinks(sinks));
+    let live = Arc::new(live.with_sinks(sinks));
     let server =
         Server::start(arguments.listen, access, Arc::clone(&live)).map_err(|error| match &error {
             ServerError::Listen { .. } => {
@@ -132,6 +133,8 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
         None => RigOrLocator::Rig(Box::new(input::parse_rig(path, DEMO)?)),
         Some(path) => RigOrLocator::read(path)?,
     };
+    // Read before a fit, which may take its time.
+    let commanding = commands(arguments, read.setup().surface().extent())?;
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (locator, simulated) = match read {
         RigOrLocator::Locator(locator) => {
@@ -154,7 +157,17 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
     // A locator that does not go with the options is refused before anything is served.
     arguments.session.session(&locator, path)?;
     // URLs name paths as the command line does: from the folder it was started in.
-    Ok(configured(Live::new(locator, &name, simulated, PathBuf::new()), arguments))
+    let live = Live::new(locator, &name, simulated, PathBuf::new()).with_commands(commanding);
+    Ok(configured(live, arguments))
+}
+
+/// The rules of the arguments, which send commands to the board.
+fn commands(arguments: &Arguments, extent: Extent) -> Result<Rules, Failure> {
+    let (publishing, commanding) = rules::read(arguments.rules.as_deref(), extent)?;
+    if let Some(path) = &arguments.rules {
+        rules::refuse_publishing(&publishing, path, "`palpate record --mqtt` has one")?;
+    }
+    Ok(commanding)
 }
 
 /// The same with the recordings and sessions of the arguments.

@@ -141,6 +141,14 @@ fn bad_input_is_refused_with_its_place() {
     let rules = ["simulated:rig.toml", "--mqtt", "mqtt://127.0.0.1:1/a", "--rules", "rules.toml"];
     let told = refused(&[&record[..], &rules].concat());
     assert!(told.contains("rules.toml:5:"), "{told}");
+    for band in ["x = [\"500 mm\", \"600 mm\"]", "y = [\"0 mm\", \"9 mm\"]"] {
+        let rule = format!("[[rule]]\ncommand = \"a\"\n{band}\n");
+        fs::write(folder.path().join("rules.toml"), rule).unwrap();
+        let told = refused(&[&record[..], &rules].concat());
+        assert!(told.contains("rules.toml:3:5") && told.contains(&band[..3]), "{told}");
+        let serve = ["serve", "rig.toml", "--listen", "127.0.0.1:0", "--rules", "rules.toml"];
+        assert!(refused(&serve).contains("rules.toml:3:5"));
+    }
     fs::write(folder.path().join("no.mcap"), "no recording").unwrap();
     let told = refused(&["replay", "no.mcap"]);
     assert!(told.contains("no.mcap"), "{told}");
