@@ -166,6 +166,21 @@ fn a_file_that_is_cut_off_anywhere_is_read_up_to_there() {
 }
 
 #[test]
+fn recordings_without_an_instant_are_listed_last() {
+    let folder = folder("recording-order");
+    let (rig, locator) = bench();
+    let (mut switch, _reports) = switch(&locator);
+    for (name, readings) in [("a.mcap", 0), ("b.mcap", 20), ("c.mcap", 0)] {
+        switch.begin(&folder.join(name)).unwrap();
+        session(&rig, &locator, readings, &mut switch);
+        switch.end().unwrap();
+    }
+    let listed = recording::list(&folder).unwrap();
+    let told: Vec<_> = listed.iter().map(|one| (one.name.as_str(), one.start_s.is_some())).collect();
+    assert_eq!(told, [("b.mcap", true), ("a.mcap", false), ("c.mcap", false)]);
+}
+
+#[test]
 fn nothing_is_written_over_and_names_get_a_number() {
     let folder = folder("recording-names");
     let (_, locator) = bench();

@@ -39,7 +39,7 @@ pub struct Excerpt {
     pub events: Vec<Value>,
 }
 
-/// Recordings in a folder, newest first; files that are none are left out. A folder that is not there has none.
+/// Recordings in a folder, newest first, and at the end those of which nothing tells when they were begun; files that are none are left out. A folder that is not there has none.
 ///
 /// # Errors
 /// [`RecordingError::File`] for a folder that cannot be read.
@@ -57,7 +57,7 @@ pub fn list(folder: &Path) -> Result<Vec<RecordingSummary>, RecordingError> {
         .filter_map(|path| summary(&path).ok())
         .collect();
     found.sort_by(|a, b| {
-        let start = |summary: &RecordingSummary| summary.start_s.unwrap_or(f64::INFINITY);
+        let start = |summary: &RecordingSummary| summary.start_s.unwrap_or(f64::NEG_INFINITY);
         start(b).total_cmp(&start(a)).then_with(|| a.name.cmp(&b.name))
     });
     Ok(found)

@@ -263,7 +263,7 @@ impl Live {
         Ok(self.switch().ok_or(LiveError::NoSession)?.end())
     }
 
-    /// Recordings in the folder, newest first.
+    /// Recordings in the folder, as [`recording::list`] has them.
     ///
     /// # Errors
     /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a folder that cannot be read.
