@@ -121,7 +121,12 @@ async fn send_all<T: Clone>(
             },
             // Nothing that a browser sends means anything; pings are answered by the socket.
             received = socket.recv() => match received {
-                Some(Ok(Message::Close(_))) | Some(Err(_)) | None => return,
+                // The answer to it goes out with the next read, which is the last.
+                Some(Ok(Message::Close(_))) => {
+                    let _ = tokio::time::timeout(PATIENCE, socket.recv()).await;
+                    return;
+                }
+                Some(Err(_)) | None => return,
                 Some(Ok(Message::Pong(_))) => {
                     if let Some(live) = page_of {
                         live.attend();

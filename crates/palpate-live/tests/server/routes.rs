@@ -217,6 +217,20 @@ fn a_browser_that_never_reads_costs_the_others_nothing() {
 }
 
 #[test]
+fn a_browser_that_says_goodbye_is_answered() {
+    let (live, server) = served(None);
+    for query in ["", "?form=binary"] {
+        let mut socket = follow(&server, query, None).unwrap();
+        live.begin_simulated().unwrap();
+        socket.read().unwrap();
+        socket.close(None).unwrap();
+        let end = std::iter::repeat_with(|| socket.read()).find_map(Result::err).unwrap();
+        assert!(matches!(end, tungstenite::Error::ConnectionClosed), "{end}");
+    }
+    live.end();
+}
+
+#[test]
 fn servers_end_at_once_with_browsers_on() {
     let (live, server) = served(None);
     live.begin_simulated().unwrap();
