@@ -54,7 +54,7 @@ pub struct Arguments {
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(seconds),
-        _ => Err(format!("`{text}` must be a number of seconds greater than 0")),
+        _ => Err(format!("`{text}` must be a number of seconds greater than 0, and at most 1e9")),
     }
 }
 

@@ -141,6 +141,12 @@ fn bad_input_is_refused_with_its_place() {
     let rules = ["simulated:rig.toml", "--mqtt", "mqtt://127.0.0.1:1/a", "--rules", "rules.toml"];
     let told = refused(&[&record[..], &rules].concat());
     assert!(told.contains("rules.toml:5:"), "{told}");
+    for seconds in ["1e308", "0", "NaN"] {
+        let told = refused(&[&record[..], &["simulated:rig.toml", "--seconds", seconds]].concat());
+        assert!(told.contains(&format!("`{seconds}`")) && told.contains("at most 1e9"), "{told}");
+    }
+    let board = ["simulated-board", "rig.toml", "--to", "-", "--for-time", "1e308 s"];
+    assert!(refused(&board).contains("at most 1e9 s"));
     for band in ["x = [\"500 mm\", \"600 mm\"]", "y = [\"0 mm\", \"9 mm\"]"] {
         let rule = format!("[[rule]]\ncommand = \"a\"\n{band}\n");
         fs::write(folder.path().join("rules.toml"), rule).unwrap();
