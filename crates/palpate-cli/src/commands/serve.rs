@@ -90,6 +90,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(from) = &arguments.from {
         arguments.session.check_source(from)?;
     }
+    if let Some(folder) = &arguments.record {
+        check_folder(folder)?;
+    }
     let token = match arguments.token.as_deref() {
         Some("auto") => Some(made_up_token()?),
         given => given.map(str::to_owned),
@@ -124,6 +127,20 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     live.end();
     drop(server);
     Err(Failure::Interrupted("the server was ended".to_owned()))
+}
+
+/// Refuses a folder of recordings that is none, and one that cannot be made; it is made with the first recording.
+fn check_folder(folder: &Path) -> Result<(), Failure> {
+    // The last ancestor of a relative path is the folder that the command was started in, and has no name.
+    let is_there = |path: &&Path| path.as_os_str().is_empty() || path.symlink_metadata().is_ok();
+    match folder.ancestors().find(is_there) {
+        Some(found) if !found.as_os_str().is_empty() && !found.is_dir() => {
+            let complaint =
+                Complaint::new(format!("--record {}: {} is no folder", folder.display(), found.display()));
+            Err(complaint.help("name the folder that recordings go into").into())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The locator of the arguments, without a session.
