@@ -84,6 +84,7 @@ struct Source {
 }
 
 async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBody<Source>) -> Answer {
+    live.check_source_is_free().map_err(|error| refusal(&error))?;
     if url != "simulated" {
         return Err(Refusal::new(
             StatusCode::FORBIDDEN,
@@ -167,6 +168,10 @@ fn refusal(error: &LiveError) -> Refusal {
         LiveError::Calibrator(_) => (StatusCode::CONFLICT, "GET /api/calibration says how far it is"),
         LiveError::NoSession => (StatusCode::CONFLICT, "choose a source first"),
         LiveError::Behind => (StatusCode::SERVICE_UNAVAILABLE, "try it again"),
+        LiveError::Calibrates { .. } => (
+            StatusCode::CONFLICT,
+            "start `palpate serve RIG --calibrate` with another --from URL, or leave --calibrate out",
+        ),
         LiveError::NotSimulated => (StatusCode::CONFLICT, "start `palpate serve` with a rig"),
         LiveError::Source(_) | LiveError::Columns(_) | LiveError::Pace(_) | LiveError::OneWay(_) => {
             (StatusCode::BAD_REQUEST, "start `palpate serve` with another source")
