@@ -77,9 +77,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let (None, Some(path)) = (&arguments.mqtt, &arguments.rules) {
         rules::refuse_publishing(&publishing, path, "--mqtt mqtt://host/topic names a broker")?;
     }
+    let mut unpublished = None;
     if let Some(url) = &arguments.mqtt {
         let sink = MqttSink::new(url, session.channels(), session.extent(), publishing, to.clone());
-        sinks.push(Box::new(sink.map_err(Complaint::new)?));
+        let sink = sink.map_err(Complaint::new)?;
+        unpublished = Some((url, sink.lost_counter()));
+        sinks.push(Box::new(sink));
     }
     // Kept until the end, as Foxglove's server lives in its outlet.
     let outlets = arguments.outlets.open()?;
@@ -110,6 +113,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     pipeline::run(&mut session, clock, &from, &mut sinks);
     drop((source, stop, sinks));
     let status = recording.end().unwrap_or_default();
+    if let Some((url, lost)) = unpublished {
+        match lost.load(Ordering::Relaxed) {
+            0 => {}
+            lost => remark!("{} messages did not reach the broker {url}", format_count(lost)),
+        }
+    }
     let labels = session.channels().iter().map(|channel| channel.label.as_str());
     let unprinted = unprinted.as_ref().and_then(|unprinted| unprinted.get());
     finish(arguments, &status, session.counters(), labels, unprinted)

@@ -207,3 +207,20 @@ fn a_board_of_other_channels_is_no_recording_and_says_why() {
     assert!(told.contains("0 readings") && told.contains("frames is a reading of the channels"), "{told}");
     assert!(told.contains("columns= of the source"), "{told}");
 }
+
+#[test]
+fn a_broker_that_is_not_there_is_told_with_what_is_lost() {
+    let folder = bench();
+    let record = ["record", "locator.json", "--from", BOARD, "--out", "press.mcap", "--seconds", "0.5"];
+    let output = run(folder.path(), &[&record[..], &["--mqtt", "mqtt://127.0.0.1:1/bench"]].concat());
+    said(&output);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(told.contains("the broker mqtt://127.0.0.1:1/bench cannot be reached"), "{told}");
+    assert!(told.contains(" messages did not reach the broker mqtt://127.0.0.1:1/bench"), "{told}");
+    let board = ["simulated-board", "rig.toml", "--to", "mqtt://127.0.0.1:1/bench", "--for-time", "1 s"];
+    let output = run(folder.path(), &board);
+    said(&output);
+    let told = String::from_utf8_lossy(&output.stderr);
+    let remarks = told.matches("the broker 127.0.0.1:1 cannot be reached").count();
+    assert!(remarks == 1 && told.contains("see that it runs there"), "{told}");
+}
