@@ -113,14 +113,15 @@ export interface RecordingState {
 export interface RecordingInfo {
   name: string;
   bytes: number;
-  start_s: number;
+  /** Seconds since 1970; null where nothing was recorded. */
+  start_s: number | null;
   seconds: number;
   readings: number;
 }
 
 export interface RecordingContent {
   channels: ChannelInfo[];
-  start_s: number;
+  start_s: number | null;
   seconds: number;
   samples: SampleRecord[];
   events: EventRecord[];

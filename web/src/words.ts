@@ -158,6 +158,12 @@ export function clock(time_s: number): string {
   return `${two(date.getHours())}:${two(date.getMinutes())}:${two(date.getSeconds())}.${tenth}`;
 }
 
+/** Date and time of day of an instant, or that nothing tells it. */
+export function begun(time_s: number | null): string {
+  if (time_s === null) return "empty";
+  return `${new Date(time_s * 1000).toLocaleDateString("en-GB")} ${clock(time_s)}`;
+}
+
 /** Units as people write them. */
 export function unit(symbol: string): string {
   return symbol.replace(/^u(?=[a-z])/, "µ");

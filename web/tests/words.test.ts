@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 import type { EstimateRecord, EventRecord } from "../src/protocol";
-import { badFrameWords, bytes, contactWords, eventWords, hertz, number, seconds, size, statusWords, unit } from "../src/words";
+import { badFrameWords, begun, bytes, contactWords, eventWords, hertz, number, seconds, size, statusWords, unit } from "../src/words";
 
 describe("numbers", () => {
   test("a standard deviation says how many decimals mean something", () => {
@@ -22,6 +22,13 @@ describe("numbers", () => {
     expect([999, 1500, 2_340_000].map(bytes)).toEqual(["999 B", "1.5 kB", "2.3 MB"]);
     expect([1.5, 99.7, 20_000].map(hertz)).toEqual(["1.5 Hz", "100 Hz", "20,000 Hz"]);
     expect(["um", "mm", "N", "u", ""].map(unit)).toEqual(["µm", "mm", "N", "u", ""]);
+  });
+});
+
+describe("instants", () => {
+  test("a recording of nothing has no date", () => {
+    expect(begun(null)).toBe("empty");
+    expect(begun(new Date(2026, 10, 24, 9, 5, 7, 300).getTime() / 1000)).toBe("24/11/2026 09:05:07.3");
   });
 });
 

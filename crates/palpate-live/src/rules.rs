@@ -26,7 +26,8 @@ use crate::event::EventRecord;
 use crate::sample::Sample;
 use crate::session::Output;
 use palpate_core::{ContactEstimate, Status};
-use palpate_mechanics::units::{Dimension, Quantity};
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::{Dimension, Quantity, format_length_mm};
 use serde::Deserialize;
 use std::ops::Range;
 use std::time::Duration;
@@ -135,11 +136,11 @@ struct RuleIn {
 }
 
 impl Rules {
-    /// The rules of a file's text.
+    /// The rules of a file's text, for contacts on a surface of this extent.
     ///
     /// # Errors
-    /// [`RuleError`] for the first thing that is wrong, with its place.
-    pub fn from_toml(text: &str) -> Result<Self, RuleError> {
+    /// [`RuleError`] for the first thing that is wrong, with its place; also for a band that no contact on the surface is in.
+    pub fn from_toml(text: &str, extent: Extent) -> Result<Self, RuleError> {
         let file: FileIn = toml::from_str(text)
             .map_err(|error| RuleError { problem: error.message().to_owned(), span: error.span() })?;
         if file.rule.is_empty() {
@@ -148,7 +149,7 @@ impl Rules {
         if let Some(beyond) = file.rule.get(MOST) {
             return Err(error_at(beyond.span(), format!("there are more than {MOST} rules")));
         }
-        let rules = file.rule.into_iter().enumerate().map(|(i, rule)| Rule::read(i + 1, rule));
+        let rules = file.rule.into_iter().enumerate().map(|(i, rule)| Rule::read(i + 1, rule, extent));
         rules.collect::<Result<_, _>>().map(Self)
     }
 
@@ -166,7 +167,7 @@ impl Rules {
 }
 
 impl Rule {
-    fn read(number: usize, given: Spanned<RuleIn>) -> Result<Self, RuleError> {
+    fn read(number: usize, given: Spanned<RuleIn>, extent: Extent) -> Result<Self, RuleError> {
         let span = given.span();
         let given = given.into_inner();
         let hold = match &given.hold {
@@ -176,6 +177,7 @@ impl Rule {
         let x_m = band("x", Dimension::Length, given.x.as_ref())?;
         let y_m = band("y", Dimension::Length, given.y.as_ref())?;
         let force_n = band("force", Dimension::Force, given.force.as_ref())?;
+        check_on_surface(&given, x_m, y_m, extent)?;
         let of_contact = [&given.x, &given.y, &given.force].into_iter().flatten().next();
         let event_at = given.event.as_ref().map(Spanned::span);
         let condition = match (given.event, of_contact) {
@@ -294,6 +296,38 @@ fn band(
     ))
 }
 
+/// Refuses bands in which no contact can be: on a line `y`, and those beside the surface.
+fn check_on_surface(
+    given: &RuleIn,
+    x_m: Option<(f64, f64)>,
+    y_m: Option<(f64, f64)>,
+    extent: Extent,
+) -> Result<(), RuleError> {
+    let beside = |key: &str, ends: &Option<Spanned<[Spanned<String>; 2]>>, band, most_m: f64| {
+        let (Some(ends), Some((low, high))) = (ends, band) else { return Ok(()) };
+        if low <= most_m && high >= 0.0 {
+            return Ok(());
+        }
+        let [low, high] = ends.get_ref();
+        let (low, high) = (low.get_ref(), high.get_ref());
+        let most = format_length_mm(most_m);
+        let problem = format!(
+            "`{key}` is from {low} to {high}, and the surface from 0 mm to {most}: name a band on it"
+        );
+        Err(error_at(ends.span(), problem))
+    };
+    beside("x", &given.x, x_m, extent.length_m())?;
+    match (extent.width_m(), &given.y) {
+        (Some(width_m), _) => beside("y", &given.y, y_m, width_m),
+        (None, Some(y)) => Err(error_at(
+            y.span(),
+            "`y` does not go with a surface that is a line: contacts differ by `x` alone; leave it out"
+                .to_owned(),
+        )),
+        (None, None) => Ok(()),
+    }
+}
+
 /// Watch over the rules in the course of a session.
 #[derive(Debug)]
 pub struct RuleWatch {
@@ -381,6 +415,10 @@ mod tests {
     use super::*;
     use palpate_core::{Estimate, Position};
 
+    fn beam() -> Extent {
+        Extent::line(0.4).unwrap()
+    }
+
     const FILE: &str = r#"
         [[rule]]
         name = "near the clamp"
@@ -412,7 +450,7 @@ mod tests {
 
     #[test]
     fn a_band_acts_once_it_holds_and_again_only_after_it_was_left_for_as_long() {
-        let mut watch = RuleWatch::new(Rules::from_toml(FILE).unwrap());
+        let mut watch = RuleWatch::new(Rules::from_toml(FILE, beam()).unwrap());
         let mut acted = Vec::new();
         // Bounces at 5 and 43 ms; there from 10, left from 50 to 80, there again from 90.
         let course = [
@@ -437,7 +475,7 @@ mod tests {
 
     #[test]
     fn an_event_acts_by_its_name() {
-        let mut watch = RuleWatch::new(Rules::from_toml(FILE).unwrap());
+        let mut watch = RuleWatch::new(Rules::from_toml(FILE, beam()).unwrap());
         let mut acted = 0;
         for event in [
             crate::event::Event::SourceEnded,
@@ -469,16 +507,37 @@ mod tests {
         ];
         for (line, meant) in cases {
             let text = format!("[[rule]]\n{line}\ntopic = \"t\"\nmessage = \"\"\n");
-            let error = Rules::from_toml(&text).unwrap_err();
+            let error = Rules::from_toml(&text, beam()).unwrap_err();
             assert_eq!(&text[error.span.clone().unwrap()], meant, "{error}");
         }
-        assert!(Rules::from_toml("").is_err());
+        assert!(Rules::from_toml("", beam()).is_err());
+    }
+
+    #[test]
+    fn bands_that_no_contact_is_in_are_refused() {
+        let plane = Extent::plane(0.3, 0.2).unwrap();
+        for (band, extent, problem) in [
+            (r#"x = ["401 mm", "1 m"]"#, beam(), "the surface from 0 mm to 400 mm"),
+            (r#"x = ["-2 mm", "-1 mm"]"#, beam(), "from -2 mm to -1 mm"),
+            (r#"y = ["0 mm", "5 mm"]"#, beam(), "a line"),
+            (r#"x = ["0.31 m", "0.4 m"]"#, plane, "to 300 mm"),
+            (r#"y = ["201 mm", "0.4 m"]"#, plane, "to 200 mm"),
+        ] {
+            let text = format!("[[rule]]\n{band}\ntopic = \"t\"\nmessage = \"\"\n");
+            let error = Rules::from_toml(&text, extent).unwrap_err();
+            assert!(error.problem.contains(problem), "{error}");
+            assert_eq!(&text[error.span.clone().unwrap()], &band[4..], "{error}");
+        }
+        for (band, extent) in [(r#"x = ["400 mm", "1 m"]"#, beam()), (r#"y = ["-1 mm", "0 mm"]"#, plane)] {
+            let text = format!("[[rule]]\n{band}\ntopic = \"t\"\nmessage = \"\"\n");
+            Rules::from_toml(&text, extent).unwrap();
+        }
     }
 
     #[test]
     fn a_rule_publishes_or_commands_and_its_mistakes_are_named_at_their_place() {
         let rules = "[[rule]]\nevent = \"mark\"\ncommand = \"led on\"\n".to_owned() + FILE;
-        let (publishing, commanding) = Rules::from_toml(&rules).unwrap().by_action();
+        let (publishing, commanding) = Rules::from_toml(&rules, beam()).unwrap().by_action();
         assert_eq!(publishing.as_slice().len(), 2);
         assert_eq!(commanding.as_slice()[0].action, Action::Command("led on".to_owned()));
         let long = format!("command = \"{}\"", "x".repeat(201));
@@ -493,12 +552,12 @@ mod tests {
             ("topic = \"t/#\"\nmessage = \"m\"", "\"t/#\""),
         ] {
             let text = format!("[[rule]]\nevent = \"mark\"\n{lines}\n");
-            let error = Rules::from_toml(&text).unwrap_err();
+            let error = Rules::from_toml(&text, beam()).unwrap_err();
             assert_eq!(&text[error.span.clone().unwrap()], meant, "{error}");
         }
         let text = "[[rule]]\nevent = \"source_lost\"\ncommand = \"a\"\n";
-        let error = Rules::from_toml(text).unwrap_err();
+        let error = Rules::from_toml(text, beam()).unwrap_err();
         assert_eq!(&text[error.span.clone().unwrap()], "\"source_lost\"", "{error}");
-        assert!(Rules::from_toml("[[rule]]\nevent = \"mark\"\n").is_err());
+        assert!(Rules::from_toml("[[rule]]\nevent = \"mark\"\n", beam()).is_err());
     }
 }

@@ -86,7 +86,7 @@ fn readings_and_estimates_are_read_again_to_the_last_bit() {
     assert_eq!((status.readings, status.lost, status.problem), (2000, 0, None));
 
     let recorded = all(&path);
-    let attached = Locator::from_json(&Playback::open(&path).unwrap().head().locator).unwrap();
+    let attached = Locator::from_json(Playback::open(&path).unwrap().locator().unwrap()).unwrap();
     let factors: Vec<f64> = palpate_live::frame::Channel::all_of(&locator.setup)
         .iter()
         .map(|channel| channel.unit.factor())
@@ -163,6 +163,21 @@ fn a_file_that_is_cut_off_anywhere_is_read_up_to_there() {
     assert!(opened > 10 && last < 4000, "{opened} {last}");
     std::fs::write(&cut, &bytes[..5]).unwrap();
     assert!(matches!(recording::summary(&cut), Err(RecordingError::NotMcap { .. })));
+}
+
+#[test]
+fn recordings_without_an_instant_are_listed_last() {
+    let folder = folder("recording-order");
+    let (rig, locator) = bench();
+    let (mut switch, _reports) = switch(&locator);
+    for (name, readings) in [("a.mcap", 0), ("b.mcap", 20), ("c.mcap", 0)] {
+        switch.begin(&folder.join(name)).unwrap();
+        session(&rig, &locator, readings, &mut switch);
+        switch.end().unwrap();
+    }
+    let listed = recording::list(&folder).unwrap();
+    let told: Vec<_> = listed.iter().map(|one| (one.name.as_str(), one.start_s.is_some())).collect();
+    assert_eq!(told, [("b.mcap", true), ("a.mcap", false), ("c.mcap", false)]);
 }
 
 #[test]
@@ -276,7 +291,7 @@ fn damaged_files_are_read_without_a_panic() {
     session(&rig, &locator, 200, &mut switch);
     switch.end().unwrap();
     let bytes = std::fs::read(&path).unwrap();
-    let chunks_at = 1000 + Playback::open(&path).unwrap().head().locator.len();
+    let chunks_at = 1000 + Playback::open(&path).unwrap().locator().unwrap().len();
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(9);
     let (mut opened, mut refused) = (0, 0);
     for round in 0..300 {

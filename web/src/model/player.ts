@@ -20,7 +20,7 @@ export class Player {
     private content: RecordingContent,
   ) {
     const { samples, events } = content;
-    this.start_s = samples[0]?.time_s ?? content.start_s;
+    this.start_s = samples[0]?.time_s ?? content.start_s ?? 0;
     this.seconds = Math.max(0, (samples.at(-1)?.time_s ?? this.start_s) - this.start_s);
     this.history = new History(content.channels.length, Math.max(1, samples.length + events.length));
     const gaps = events.filter((event) => event.event === "gap");

@@ -3,9 +3,9 @@
 import { api } from "../api";
 import { element, need } from "../dom";
 import type { RecordingInfo, SessionInfo } from "../protocol";
-import { bytes, clock, seconds } from "../words";
+import { begun, bytes, seconds } from "../words";
 
-/** Asks for the recordings and lists them, newest first. */
+/** Asks for the recordings and lists them as the server does, newest first. */
 export async function listRecordings(session: SessionInfo, replay: (name: string) => void): Promise<void> {
   const note = need("recordings-note");
   if (session.recording === null) {
@@ -15,7 +15,6 @@ export async function listRecordings(session: SessionInfo, replay: (name: string
   }
   const all = (await api.recordings()).filter((recording) => recording.name !== session.recording?.name);
   note.textContent = all.length === 0 ? `None in ${session.recording.folder} yet.` : `In ${session.recording.folder}:`;
-  all.sort((one, other) => other.start_s - one.start_s);
   need("recordings").replaceChildren(...all.map((recording) => item(recording, replay)));
 }
 
@@ -28,8 +27,7 @@ function item(recording: RecordingInfo, replay: (name: string) => void): HTMLLIE
   file.href = api.recordingFile(recording.name);
   file.download = "";
   file.setAttribute("aria-label", `Download ${recording.name}`);
-  const date = new Date(recording.start_s * 1000).toLocaleDateString("en-GB");
-  const facts = `${date} ${clock(recording.start_s)}, ${seconds(recording.seconds)}, ${recording.readings.toLocaleString("en-GB")} readings, ${bytes(recording.bytes)}`;
+  const facts = `${begun(recording.start_s)}, ${seconds(recording.seconds)}, ${recording.readings.toLocaleString("en-GB")} readings, ${bytes(recording.bytes)}`;
   const words = element("div", "", element("div", "name", recording.name), element("div", "quiet", facts));
   return element("li", "recording", words, element("div", "row", button, file));
 }

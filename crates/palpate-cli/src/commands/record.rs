@@ -54,7 +54,7 @@ pub struct Arguments {
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(seconds),
-        _ => Err(format!("`{text}` must be a number of seconds greater than 0")),
+        _ => Err(format!("`{text}` must be a number of seconds greater than 0, and at most 1e9")),
     }
 }
 
@@ -73,21 +73,27 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .set_columns(arguments.from.columns())
         .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
     let mut sinks: Vec<Box<dyn Sink>> = vec![Box::new(Words)];
-    let (publishing, commanding) = rules::read(arguments.rules.as_deref())?;
+    let (publishing, commanding) = rules::read(arguments.rules.as_deref(), session.extent())?;
     if let (None, Some(path)) = (&arguments.mqtt, &arguments.rules) {
         rules::refuse_publishing(&publishing, path, "--mqtt mqtt://host/topic names a broker")?;
     }
+    let mut unpublished = None;
     if let Some(url) = &arguments.mqtt {
         let sink = MqttSink::new(url, session.channels(), session.extent(), publishing, to.clone());
-        sinks.push(Box::new(sink.map_err(Complaint::new)?));
+        let sink = sink.map_err(Complaint::new)?;
+        unpublished = Some((url, sink.lost_counter()));
+        sinks.push(Box::new(sink));
     }
     // Kept until the end, as Foxglove's server lives in its outlet.
     let outlets = arguments.outlets.open()?;
     for open in &outlets {
         sinks.push(open(session.channels(), session.extent(), to.clone()).map_err(Complaint::new)?);
     }
+    let mut unprinted = None;
     if arguments.json {
-        sinks.push(Box::new(JsonLines::new(std::io::stdout(), session.channels(), session.extent())));
+        let lines = JsonLines::new(std::io::stdout(), session.channels(), session.extent(), to.clone());
+        unprinted = Some(lines.failed());
+        sinks.push(Box::new(lines));
     }
     let source = Source::open(&arguments.from, Path::new(""), clock, to.clone()).map_err(Complaint::new)?;
     if !commanding.as_slice().is_empty() {
@@ -107,8 +113,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     pipeline::run(&mut session, clock, &from, &mut sinks);
     drop((source, stop, sinks));
     let status = recording.end().unwrap_or_default();
+    if let Some((url, lost)) = unpublished {
+        match lost.load(Ordering::Relaxed) {
+            0 => {}
+            lost => remark!("{} messages did not reach the broker {url}", format_count(lost)),
+        }
+    }
     let labels = session.channels().iter().map(|channel| channel.label.as_str());
-    finish(arguments, &status, session.counters(), labels)
+    let unprinted = unprinted.as_ref().and_then(|unprinted| unprinted.get());
+    finish(arguments, &status, session.counters(), labels, unprinted)
 }
 
 /// Says what was recorded.
@@ -117,6 +130,7 @@ fn finish<'a>(
     status: &RecordingStatus,
     counters: &Counters,
     labels: impl IntoIterator<Item = &'a str>,
+    unprinted: Option<&std::io::Error>,
 ) -> Result<(), Failure> {
     let bad: u64 = counters.bad_frames.values().sum();
     let summary = format!(
@@ -137,6 +151,11 @@ fn finish<'a>(
     let faults: Vec<String> = [lost, status.problem.clone(), unread].into_iter().flatten().collect();
     if !faults.is_empty() {
         return Err(Failure::DataLost(format!("{summary}; {}", faults.join("; "))));
+    }
+    // A reader that has left has what it wants; the recording is what was asked for beside.
+    if let Some(error) = unprinted.filter(|error| error.kind() != std::io::ErrorKind::BrokenPipe) {
+        remark!("{summary}");
+        return Err(output::unprinted(error));
     }
     if interrupted() {
         return Err(Failure::Interrupted(summary));

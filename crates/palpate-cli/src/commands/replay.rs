@@ -56,7 +56,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (path, locator) = match &arguments.locator {
         None => {
             let path = &arguments.recording;
-            (path, input::parse_locator(path, &playback.head().locator)?)
+            let locator = playback.locator().map_err(|error| {
+                Complaint::new(error).help("--locator FILE locates its readings by another locator")
+            })?;
+            (path, input::parse_locator(path, locator)?)
         }
         Some(path) => {
             let locator = input::read_locator(path)?;

@@ -12,10 +12,12 @@ use crate::target::{Inputs, Target};
 use palpate_estimators::estimator::{Estimator, Locator};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::calibration::{DepthKnowledge, Journal, plan};
+use palpate_live::rules::Rules;
 use palpate_live::server::{Access, AccessError, CalibrationPlan, Live, LiveError, Server, ServerError};
 use palpate_live::simulated_board::BoardConfig;
 use palpate_live::source::SourceUrl;
 use palpate_live::stage::StageUrl;
+use palpate_mechanics::surface::Extent;
 use palpate_rig::Rig;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -88,9 +90,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(from) = &arguments.from {
         arguments.session.check_source(from)?;
     }
-    let (publishing, commanding) = rules::read(arguments.rules.as_deref())?;
-    if let Some(path) = &arguments.rules {
-        rules::refuse_publishing(&publishing, path, "`palpate record --mqtt` has one")?;
+    if let Some(folder) = &arguments.record {
+        check_folder(folder)?;
     }
     let token = match arguments.token.as_deref() {
         Some("auto") => Some(made_up_token()?),
@@ -100,10 +101,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Access::new(arguments.listen, token.clone(), arguments.host_name.clone()).map_err(refused)?;
     let sinks = arguments.outlets.open()?;
     let live = match calibration(arguments)? {
-        Some(plan) => configured(Live::calibrating(plan, PathBuf::new()), arguments),
+        Some(plan) => {
+            let commanding = commands(arguments, plan.rig.setup.surface().extent())?;
+            configured(Live::calibrating(plan, PathBuf::new()), arguments).with_commands(commanding)
+        }
         None => live(arguments)?,
     };
-    let live = Arc::new(live.with_commands(commanding).with_sinks(sinks));
+    let live = Arc::new(live.with_sinks(sinks));
     let server =
         Server::start(arguments.listen, access, Arc::clone(&live)).map_err(|error| match &error {
             ServerError::Listen { .. } => {
@@ -125,6 +129,20 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Err(Failure::Interrupted("the server was ended".to_owned()))
 }
 
+/// Refuses a folder of recordings that is none, and one that cannot be made; it is made with the first recording.
+fn check_folder(folder: &Path) -> Result<(), Failure> {
+    // The last ancestor of a relative path is the folder that the command was started in, and has no name.
+    let is_there = |path: &&Path| path.as_os_str().is_empty() || path.symlink_metadata().is_ok();
+    match folder.ancestors().find(is_there) {
+        Some(found) if !found.as_os_str().is_empty() && !found.is_dir() => {
+            let complaint =
+                Complaint::new(format!("--record {}: {} is no folder", folder.display(), found.display()));
+            Err(complaint.help("name the folder that recordings go into").into())
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The locator of the arguments, without a session.
 fn live(arguments: &Arguments) -> Result<Live, Failure> {
     let path = arguments.locator.as_deref().unwrap_or(Path::new(DEMO_NAME));
@@ -132,6 +150,8 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
         None => RigOrLocator::Rig(Box::new(input::parse_rig(path, DEMO)?)),
         Some(path) => RigOrLocator::read(path)?,
     };
+    // Read before a fit, which may take its time.
+    let commanding = commands(arguments, read.setup().surface().extent())?;
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (locator, simulated) = match read {
         RigOrLocator::Locator(locator) => {
@@ -154,7 +174,17 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
     // A locator that does not go with the options is refused before anything is served.
     arguments.session.session(&locator, path)?;
     // URLs name paths as the command line does: from the folder it was started in.
-    Ok(configured(Live::new(locator, &name, simulated, PathBuf::new()), arguments))
+    let live = Live::new(locator, &name, simulated, PathBuf::new()).with_commands(commanding);
+    Ok(configured(live, arguments))
+}
+
+/// The rules of the arguments, which send commands to the board.
+fn commands(arguments: &Arguments, extent: Extent) -> Result<Rules, Failure> {
+    let (publishing, commanding) = rules::read(arguments.rules.as_deref(), extent)?;
+    if let Some(path) = &arguments.rules {
+        rules::refuse_publishing(&publishing, path, "`palpate record --mqtt` has one")?;
+    }
+    Ok(commanding)
 }
 
 /// The same with the recordings and sessions of the arguments.

@@ -217,6 +217,9 @@ impl Plugged<'_> {
                 return self.finish(unsent);
             }
             self.obey()?;
+            while let Some(news) = self.link.news() {
+                remark!("{news}");
+            }
             if let Some(machine) = &mut self.machine {
                 machine.work().map_err(Complaint::new)?;
                 self.board.finger_mut().hold(machine.machine.contact());

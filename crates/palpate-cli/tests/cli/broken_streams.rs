@@ -80,6 +80,27 @@ fn a_full_stdout_is_an_error() {
 }
 
 #[test]
+fn a_recording_is_kept_whole_where_its_samples_cannot_be_printed() {
+    let bench = bench();
+    let board = "simulated:rig.toml?rate=500";
+    let record = ["record", "influence.json", "--from", board, "--seconds", "0.5", "--json", "--out"];
+    let to_full = palpate(bench.path()).args(record).arg("full.mcap").stdout(full()).output().unwrap();
+    let stderr = String::from_utf8_lossy(&to_full.stderr);
+    assert_eq!(to_full.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("cannot write to stdout: No space left"), "{stderr}");
+    assert!(stderr.contains("printed no more") && stderr.contains("full.mcap: "), "{stderr}");
+    let mut head = palpate(bench.path());
+    let mut left = head.args(record).arg("left.mcap").stdout(Stdio::piped()).spawn().unwrap();
+    drop(left.stdout.take());
+    assert_eq!(left.wait().unwrap().code(), Some(0));
+    for kept in ["full.mcap", "left.mcap"] {
+        let replayed = run(bench.path(), &["replay", kept]);
+        assert!(said(&replayed).lines().count() > 100, "{kept}");
+        assert!(!String::from_utf8_lossy(&replayed.stderr).contains("cut off"), "{kept}");
+    }
+}
+
+#[test]
 fn a_full_or_closed_stderr_changes_nothing() {
     let bench = bench();
     for arguments in VERBS.into_iter().chain(COMPLAINTS) {

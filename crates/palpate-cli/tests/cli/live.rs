@@ -53,6 +53,32 @@ fn a_recording_is_located_again_to_the_last_bit() {
 }
 
 #[test]
+fn a_recording_whose_locator_is_damaged_or_cut_off_is_read_by_another() {
+    let folder = bench();
+    let record = ["record", "locator.json", "--from", BOARD, "--out", "whole.mcap", "--seconds", "0.5"];
+    said(&run(folder.path(), &record));
+    let whole = fs::read(folder.path().join("whole.mcap")).unwrap();
+    let rows = said(&run(folder.path(), &["replay", "whole.mcap", "--locator", "locator.json"]));
+    let at = whole.windows(14).position(|bytes| bytes == b"format_version").expect("it is attached");
+    let mut damaged = whole.clone();
+    damaged[at] ^= 1;
+    fs::write(folder.path().join("damaged.mcap"), &damaged).unwrap();
+    fs::write(folder.path().join("cut.mcap"), &whole[..at]).unwrap();
+    for (name, what, expected) in [
+        ("damaged.mcap", "`locator.json` is damaged", rows.as_str()),
+        ("cut.mcap", "cut off before its attached `locator.json`", rows.lines().next().unwrap()),
+    ] {
+        let told = complained(&run(folder.path(), &["replay", name]), 2);
+        assert!(told.contains(name) && told.contains(what) && told.contains("--locator FILE"), "{told}");
+        let again = said(&run(folder.path(), &["replay", name, "--locator", "locator.json"]));
+        assert_eq!(again.trim_end(), expected.trim_end(), "{name}");
+    }
+    let again = ["record", "locator.json", "--from", "file:damaged.mcap?speed=0", "--out", "again.mcap"];
+    said(&run(folder.path(), &again));
+    assert_eq!(said(&run(folder.path(), &["replay", "again.mcap"])).lines().count(), rows.lines().count());
+}
+
+#[test]
 fn a_killed_process_loses_the_last_tenth_of_a_second_at_most() {
     let folder = bench();
     let mut record = palpate(folder.path());
@@ -115,10 +141,34 @@ fn bad_input_is_refused_with_its_place() {
     let rules = ["simulated:rig.toml", "--mqtt", "mqtt://127.0.0.1:1/a", "--rules", "rules.toml"];
     let told = refused(&[&record[..], &rules].concat());
     assert!(told.contains("rules.toml:5:"), "{told}");
+    for seconds in ["1e308", "0", "NaN"] {
+        let told = refused(&[&record[..], &["simulated:rig.toml", "--seconds", seconds]].concat());
+        assert!(told.contains(&format!("`{seconds}`")) && told.contains("at most 1e9"), "{told}");
+    }
+    let board = ["simulated-board", "rig.toml", "--to", "-", "--for-time", "1e308 s"];
+    assert!(refused(&board).contains("at most 1e9 s"));
+    for band in ["x = [\"500 mm\", \"600 mm\"]", "y = [\"0 mm\", \"9 mm\"]"] {
+        let rule = format!("[[rule]]\ncommand = \"a\"\n{band}\n");
+        fs::write(folder.path().join("rules.toml"), rule).unwrap();
+        let told = refused(&[&record[..], &rules].concat());
+        assert!(told.contains("rules.toml:3:5") && told.contains(&band[..3]), "{told}");
+        let serve = ["serve", "rig.toml", "--listen", "127.0.0.1:0", "--rules", "rules.toml"];
+        assert!(refused(&serve).contains("rules.toml:3:5"));
+    }
     fs::write(folder.path().join("no.mcap"), "no recording").unwrap();
     let told = refused(&["replay", "no.mcap"]);
     assert!(told.contains("no.mcap"), "{told}");
     assert!(!folder.path().join("never.mcap").exists());
+}
+
+#[test]
+fn a_folder_of_recordings_that_is_none_is_refused_before_anything_is_served() {
+    let folder = bench();
+    for (given, what) in [("rig.toml", "rig.toml is no folder"), ("rig.toml/new", "rig.toml is no folder")] {
+        let serve = ["serve", "locator.json", "--listen", "127.0.0.1:0", "--record", given];
+        let told = complained(&run(folder.path(), &serve), 2);
+        assert!(told.contains(&format!("--record {given}")) && told.contains(what), "{told}");
+    }
 }
 
 #[test]
@@ -156,4 +206,21 @@ fn a_board_of_other_channels_is_no_recording_and_says_why() {
     let told = complained(&run(folder.path(), &record), 3);
     assert!(told.contains("0 readings") && told.contains("frames is a reading of the channels"), "{told}");
     assert!(told.contains("columns= of the source"), "{told}");
+}
+
+#[test]
+fn a_broker_that_is_not_there_is_told_with_what_is_lost() {
+    let folder = bench();
+    let record = ["record", "locator.json", "--from", BOARD, "--out", "press.mcap", "--seconds", "0.5"];
+    let output = run(folder.path(), &[&record[..], &["--mqtt", "mqtt://127.0.0.1:1/bench"]].concat());
+    said(&output);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(told.contains("the broker mqtt://127.0.0.1:1/bench cannot be reached"), "{told}");
+    assert!(told.contains(" messages did not reach the broker mqtt://127.0.0.1:1/bench"), "{told}");
+    let board = ["simulated-board", "rig.toml", "--to", "mqtt://127.0.0.1:1/bench", "--for-time", "1 s"];
+    let output = run(folder.path(), &board);
+    said(&output);
+    let told = String::from_utf8_lossy(&output.stderr);
+    let remarks = told.matches("the broker 127.0.0.1:1 cannot be reached").count();
+    assert!(remarks == 1 && told.contains("see that it runs there"), "{told}");
 }

@@ -6,6 +6,7 @@ mod broken_streams;
 mod browser;
 mod calibrate;
 mod compare;
+mod connections;
 mod design;
 mod digit;
 mod init;

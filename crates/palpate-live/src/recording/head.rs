@@ -19,8 +19,6 @@ pub struct Head {
     pub channels: Vec<RecordedChannel>,
     /// How the session came from tared readings to estimates.
     pub estimation: Estimation,
-    /// The locator, as its file has it.
-    pub locator: String,
 }
 
 /// Channel of a recording.
@@ -38,6 +36,8 @@ pub struct RecordedChannel {
 #[derive(Clone, Debug)]
 pub(super) struct Subject {
     pub head: Head,
+    /// The locator, as its file has it.
+    pub locator: String,
     pub channels: Vec<Channel>,
     pub extent: Extent,
 }
@@ -55,9 +55,10 @@ impl Subject {
             source: source.to_owned(),
             channels: recorded.collect(),
             estimation,
-            locator: locator.to_json().map_err(|error| RecordingError::Encode(error.to_string()))?,
         };
-        Ok(Self { head, channels, extent: locator.setup.surface().extent() })
+        let extent = locator.setup.surface().extent();
+        let locator = locator.to_json().map_err(|error| RecordingError::Encode(error.to_string()))?;
+        Ok(Self { head, locator, channels, extent })
     }
 }
 
@@ -67,7 +68,7 @@ pub(super) const METADATA: &str = "palpate";
 pub(super) const LOCATOR: &str = "locator.json";
 
 impl Head {
-    /// The metadata that say it, beside the locator.
+    /// The metadata that say it.
     pub(super) fn metadata(&self) -> BTreeMap<String, String> {
         let channels = serde_json::to_string(&self.channels).unwrap_or_default();
         let estimation = serde_json::to_string(&self.estimation).unwrap_or_default();
@@ -80,9 +81,9 @@ impl Head {
         ])
     }
 
-    /// The head that metadata and an attachment say; `None` where the channels are not there, or the estimation is not one that is known. Without any
+    /// The head that metadata say; `None` where the channels are not there, or the estimation is not one that is known. Without any
     /// readings were located by themselves.
-    pub(super) fn from_metadata(metadata: &BTreeMap<String, String>, locator: String) -> Option<Self> {
+    pub(super) fn from_metadata(metadata: &BTreeMap<String, String>) -> Option<Self> {
         let text = |key: &str| metadata.get(key).cloned().unwrap_or_default();
         let estimation = match metadata.get("estimation") {
             Some(estimation) => serde_json::from_str(estimation).ok()?,
@@ -93,7 +94,6 @@ impl Head {
             estimation,
             source: text("source"),
             channels: serde_json::from_str(metadata.get("channels")?).ok()?,
-            locator,
         })
     }
 }

@@ -1,8 +1,8 @@
 //! The records of an MCAP file, one by one, without holding the file: chunks are passed over, and decoded where they are wanted.
 
-use super::RecordingError;
 use super::head::{Head, LOCATOR, METADATA};
 use super::whole_record::parse;
+use super::{LocatorFault, RecordingError};
 use crate::schemas::TOPICS;
 use crate::session::Estimation;
 use mcap::records::{Record, op};
@@ -22,6 +22,8 @@ pub struct McapFile {
     length: u64,
     /// Head of the recording.
     pub head: Head,
+    /// The locator that is attached, as its file has it.
+    locator: Result<String, LocatorFault>,
     /// Its chunks, in their order.
     pub chunks: Vec<ChunkPlace>,
     /// True where it ends as it should.
@@ -79,19 +81,25 @@ impl McapFile {
             source: String::new(),
             channels: Vec::new(),
             estimation: Estimation::default(),
-            locator: String::new(),
         };
         let mut own = Self {
             file: BufReader::new(file),
             path: shown,
             length: found.len(),
             head,
+            locator: Err(LocatorFault::Missing),
             chunks: Vec::new(),
             is_whole: false,
             topics: [None; 3],
         };
         own.look_through()?;
         Ok(own)
+    }
+
+    /// The locator that is attached, as its file has it.
+    pub fn locator(&self) -> Result<&str, RecordingError> {
+        let fault = |fault: &LocatorFault| RecordingError::Locator { path: self.path.clone(), fault: *fault };
+        self.locator.as_deref().map_err(fault)
     }
 
     fn look_through(&mut self) -> Result<(), RecordingError> {
@@ -103,7 +111,7 @@ impl McapFile {
             }
             _ => {}
         }
-        let (mut metadata, mut locator) = (None, None);
+        let mut metadata = None;
         let mut counted = true;
         while let Some(place) = self.next_place()? {
             match place.op {
@@ -114,7 +122,7 @@ impl McapFile {
                         metadata = Some(found.metadata);
                     }
                 }
-                op::ATTACHMENT => locator = locator.or(self.locator(&place)?),
+                op::ATTACHMENT if self.locator.is_err() => self.locator = self.attached(&place)?,
                 op::CHUNK => {
                     self.count_last(counted)?;
                     counted = false;
@@ -155,10 +163,17 @@ impl McapFile {
             self.seek(place.at + place.length)?;
         }
         self.count_last(counted)?;
+        if self.locator == Err(LocatorFault::Missing) && !self.is_whole {
+            self.locator = Err(LocatorFault::CutOff);
+        }
         let lacks = |lacks| RecordingError::NotOurs { path: self.path.clone(), lacks };
-        let metadata = metadata.ok_or_else(|| lacks("it has no metadata `palpate`"))?;
-        let locator = locator.ok_or_else(|| lacks("no `locator.json` is attached"))?;
-        self.head = Head::from_metadata(&metadata, locator)
+        let metadata = metadata.ok_or_else(|| {
+            lacks(match self.is_whole {
+                true => "it has no metadata `palpate`",
+                false => "it is cut off before its metadata `palpate`, or has none",
+            })
+        })?;
+        self.head = Head::from_metadata(&metadata)
             .ok_or_else(|| lacks("its metadata do not say its channels and how readings were located"))?;
         Ok(())
     }
@@ -232,14 +247,16 @@ impl McapFile {
         }
     }
 
-    fn locator(&mut self, place: &RecordPlace) -> Result<Option<String>, RecordingError> {
-        let Some(body) = self.body(place.at, place.length)? else { return Ok(None) };
-        match parse(op::ATTACHMENT, &body) {
+    /// The locator, where this attachment is it. One that is damaged is held to be: a recording has no other, and its name may be what is damaged.
+    fn attached(&mut self, place: &RecordPlace) -> Result<Result<String, LocatorFault>, RecordingError> {
+        let body = self.body(place.at, place.length)?;
+        Ok(match body.as_deref().and_then(|body| parse(op::ATTACHMENT, body)) {
             Some(Record::Attachment { header, data, .. }) if header.name == LOCATOR => {
-                Ok(String::from_utf8(data.into_owned()).ok())
+                String::from_utf8(data.into_owned()).map_err(|_| LocatorFault::Damaged)
             }
-            _ => Ok(None),
-        }
+            Some(_) => self.locator.clone(),
+            None => Err(LocatorFault::Damaged),
+        })
     }
 
     fn record(&mut self, place: &RecordPlace) -> Result<Option<Record<'static>>, RecordingError> {

@@ -20,6 +20,20 @@ pub use switch::{RecordingSwitch, check_name};
 /// End of the names of recordings.
 pub const EXTENSION: &str = "mcap";
 
+/// Why the locator of a recording cannot be had from it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LocatorFault {
+    /// None is attached.
+    #[error("no `locator.json` is attached")]
+    Missing,
+    /// The file ends before it.
+    #[error("the file is cut off before its attached `locator.json`")]
+    CutOff,
+    /// Its bytes are others than were written.
+    #[error("the attached `locator.json` is damaged: its bytes do not match their checksum and lengths")]
+    Damaged,
+}
+
 /// A recording that cannot be made or read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
@@ -66,6 +80,14 @@ pub enum RecordingError {
         path: String,
         /// The missing part.
         lacks: &'static str,
+    },
+    /// Its locator cannot be had from it; its readings can.
+    #[error("{path}: {fault}")]
+    Locator {
+        /// The file.
+        path: String,
+        /// The fault.
+        fault: LocatorFault,
     },
     /// The record cannot be written in MCAP.
     #[error("cannot encode the recording: {0}")]

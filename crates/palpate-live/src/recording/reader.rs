@@ -39,7 +39,7 @@ pub struct Excerpt {
     pub events: Vec<Value>,
 }
 
-/// Recordings in a folder, newest first; files that are none are left out. A folder that is not there has none.
+/// Recordings in a folder, newest first, and at the end those of which nothing tells when they were begun; files that are none are left out. A folder that is not there has none.
 ///
 /// # Errors
 /// [`RecordingError::File`] for a folder that cannot be read.
@@ -57,7 +57,7 @@ pub fn list(folder: &Path) -> Result<Vec<RecordingSummary>, RecordingError> {
         .filter_map(|path| summary(&path).ok())
         .collect();
     found.sort_by(|a, b| {
-        let start = |summary: &RecordingSummary| summary.start_s.unwrap_or(f64::INFINITY);
+        let start = |summary: &RecordingSummary| summary.start_s.unwrap_or(f64::NEG_INFINITY);
         start(b).total_cmp(&start(a)).then_with(|| a.name.cmp(&b.name))
     });
     Ok(found)
@@ -254,9 +254,17 @@ impl Playback {
         Ok(Self { file, chunk: 0, messages: Vec::new().into_iter(), bad_messages: 0 })
     }
 
-    /// Its head: version, source, channels, locator.
+    /// Its head: version, source, channels.
     pub fn head(&self) -> &Head {
         &self.file.head
+    }
+
+    /// The locator that is attached, as its file has it.
+    ///
+    /// # Errors
+    /// [`RecordingError::Locator`] where there is none that can be read; the readings are there all the same.
+    pub fn locator(&self) -> Result<&str, RecordingError> {
+        self.file.locator()
     }
 
     /// True where its end is there.

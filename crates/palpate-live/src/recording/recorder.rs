@@ -371,7 +371,7 @@ fn head(encoded: Encoded, subject: &Subject) -> Result<(Writer<NoSeek<Encoded>>,
         create_time: 0,
         name: LOCATOR.to_owned(),
         media_type: "application/json".to_owned(),
-        data: subject.head.locator.as_bytes().into(),
+        data: subject.locator.as_bytes().into(),
     })?;
     let mut ids = [0; 3];
     for (id, (topic, name, schema)) in ids.iter_mut().zip(TOPICS) {

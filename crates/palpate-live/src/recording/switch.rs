@@ -34,7 +34,7 @@ impl RecordingSwitch {
         Ok(Self { subject, reports, recorder: Arc::default() })
     }
 
-    /// Head of its recordings: version, source, channels, locator.
+    /// Head of its recordings: version, source, channels.
     pub fn head(&self) -> &Head {
         &self.subject.head
     }

@@ -1,5 +1,6 @@
 //! Bodies of requests and answers: JSON, and complaints in words.
 
+use super::connections::Connection;
 use axum::body::Bytes;
 use axum::extract::rejection::BytesRejection;
 use axum::extract::{FromRequest, Request};
@@ -42,6 +43,27 @@ impl<T: Serialize> IntoResponse for JsonAnswer<T> {
     }
 }
 
+/// The bytes of a body, of which the rest is waited for so long as a connection lets.
+async fn whole_body<S: Send + Sync>(request: Request, state: &S) -> Result<Bytes, Refusal> {
+    let connection = request.extensions().get::<Connection>().cloned();
+    let bytes = Bytes::from_request(request, state);
+    let Some(connection) = connection else { return bytes.await.map_err(|error| unread(&error)) };
+    let Ok(bytes) = tokio::time::timeout(connection.body_within, bytes).await else {
+        let error = format!("the body did not come within {} s", connection.body_within.as_secs_f64());
+        return Err(Refusal::new(
+            StatusCode::REQUEST_TIMEOUT,
+            error,
+            "send as many bytes as Content-Length says",
+        ));
+    };
+    connection.note_whole_request();
+    bytes.map_err(|error| unread(&error))
+}
+
+fn unread(error: &BytesRejection) -> Refusal {
+    Refusal::new(error.status(), error.body_text(), "send at most 64 kB of JSON")
+}
+
 /// A body of JSON.
 pub struct JsonBody<T>(pub T);
 
@@ -49,9 +71,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
     type Rejection = Refusal;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
-        let bytes = Bytes::from_request(request, state).await.map_err(|error: BytesRejection| {
-            Refusal::new(error.status(), error.body_text(), "send at most 64 kB of JSON")
-        })?;
+        let bytes = whole_body(request, state).await?;
         serde_json::from_slice(&bytes).map(Self).map_err(|error| {
             Refusal::new(
                 StatusCode::BAD_REQUEST,

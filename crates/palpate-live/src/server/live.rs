@@ -81,6 +81,12 @@ pub enum LiveError {
     /// There is no rig to simulate.
     #[error("there is no simulated board: the server was started with a locator alone")]
     NotSimulated,
+    /// The source is that of the calibration.
+    #[error("this server calibrates, and its readings come from {from}")]
+    Calibrates {
+        /// The source, as its URL.
+        from: String,
+    },
     /// The source cannot be opened.
     #[error(transparent)]
     Source(#[from] SourceError),
@@ -185,10 +191,19 @@ impl Live {
     /// Begins a session with the simulated board; one that runs is ended.
     ///
     /// # Errors
-    /// [`LiveError::NotSimulated`] without a rig, and as of [`Self::begin`].
+    /// [`LiveError::Calibrates`], [`LiveError::NotSimulated`] without a rig, and as of [`Self::begin`].
     pub fn begin_simulated(&self) -> Result<(), LiveError> {
+        self.check_source_is_free()?;
         let (rig, config) = self.simulated.clone().ok_or(LiveError::NotSimulated)?;
         self.begin_with("simulated".to_owned(), &[], |clock, to| Source::simulated(rig, config, clock, to))
+    }
+
+    /// Refuses another source than that of the calibration, where there is one.
+    pub(super) fn check_source_is_free(&self) -> Result<(), LiveError> {
+        match &self.calibrator {
+            Some(calibrator) => Err(LiveError::Calibrates { from: calibrator.plan().from.to_string() }),
+            None => Ok(()),
+        }
     }
 
     fn begin_with(
@@ -263,7 +278,7 @@ impl Live {
         Ok(self.switch().ok_or(LiveError::NoSession)?.end())
     }
 
-    /// Recordings in the folder, newest first.
+    /// Recordings in the folder, as [`recording::list`] has them.
     ///
     /// # Errors
     /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a folder that cannot be read.

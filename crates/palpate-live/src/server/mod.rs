@@ -5,6 +5,7 @@
 
 mod body;
 mod calibration;
+mod connections;
 mod guard;
 mod live;
 mod lock;
@@ -22,10 +23,10 @@ pub use guard::{Access, AccessError};
 pub use live::{Live, LiveError};
 pub use web_sink::{Hub, WebSink};
 
-use axum::serve::ListenerExt;
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::thread::JoinHandle;
+use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 
 /// A server that cannot be started.
@@ -58,21 +59,16 @@ impl Server {
     /// # Errors
     /// [`ServerError`] where the address cannot be listened at.
     pub fn start(address: SocketAddr, access: Access, live: Arc<Live>) -> Result<Self, ServerError> {
-        let listener = TcpListener::bind(address).map_err(|error| ServerError::Listen { address, error })?;
-        listener.set_nonblocking(true)?;
-        let address = listener.local_addr()?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let listener = runtime.block_on(TcpListener::bind(address));
+        let listener = listener.map_err(|error| ServerError::Listen { address, error })?;
+        let address = listener.local_addr()?;
         let (stop, stopped) = oneshot::channel::<()>();
         let router = routes::router(access.listening_at(address.ip()), live);
         let run = move || {
             runtime.block_on(async {
-                let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-                // A message leaves at once, whatever the one before it became of.
-                let listener = listener.tap_io(|stream| {
-                    let _ = stream.set_nodelay(true);
-                });
                 tokio::select! {
-                    _ = axum::serve(listener, router) => {}
+                    _ = connections::serve(listener, router, connections::Bounds::default()) => {}
                     _ = stopped => {}
                 }
             });

@@ -1,6 +1,6 @@
 //! The dashboard's files, as far as they were built.
 
-use axum::http::{StatusCode, Uri, header};
+use axum::http::{Method, StatusCode, Uri, header};
 use axum::response::{Html, IntoResponse, Response};
 use rust_embed::RustEmbed;
 
@@ -11,12 +11,18 @@ use rust_embed::RustEmbed;
 struct Dashboard;
 
 /// A file of the dashboard; without the dashboard a page that says how to get it.
-pub async fn page(uri: Uri) -> Response {
+pub async fn page(method: Method, uri: Uri) -> Response {
     let path = match uri.path() {
         "/" => "index.html",
         path => path.trim_start_matches('/'),
     };
-    match Dashboard::get(path) {
+    let file = Dashboard::get(path);
+    let is_there = file.is_some() || path == "index.html";
+    if is_there && method != Method::GET && method != Method::HEAD {
+        let words = "a page can be got, and nothing else";
+        return (StatusCode::METHOD_NOT_ALLOWED, [(header::ALLOW, "GET, HEAD")], words).into_response();
+    }
+    match file {
         Some(file) => ([(header::CONTENT_TYPE, content_type(path))], file.data).into_response(),
         None if path == "index.html" => Html(include_str!("without_dashboard.html")).into_response(),
         None => (StatusCode::NOT_FOUND, "there is no such page").into_response(),

@@ -8,12 +8,12 @@ use super::session_info::SessionInfo;
 use super::{page, stream};
 use crate::input::Command;
 use crate::recording::{Excerpt, RecordingError, RecordingSummary};
-use axum::extract::rejection::QueryRejection;
+use axum::extract::rejection::{PathRejection, QueryRejection};
 use axum::extract::{DefaultBodyLimit, Path, Query, State};
-use axum::http::StatusCode;
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
+use axum::http::{Method, StatusCode};
 use axum::response::{IntoResponse, Response};
-use axum::routing::{get, post};
+use axum::routing::{any, get, post};
 use axum::{Router, middleware};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -41,8 +41,11 @@ pub fn router(access: Access, live: Arc<Live>) -> Router {
         .route("/api/recordings", get(recordings))
         .route("/api/recordings/{name}", get(recording))
         .route("/api/recordings/{name}/file", get(recording_file))
-        .route("/api/{*unknown}", get(unknown).post(unknown))
-        .fallback(get(page::page))
+        .route("/api", any(unknown))
+        .route("/api/", any(unknown))
+        .route("/api/{*unknown}", any(unknown))
+        .method_not_allowed_fallback(other_method)
+        .fallback(page::page)
         .layer(DefaultBodyLimit::max(MOST_BYTES))
         .layer(middleware::from_fn_with_state(guard, guarded))
         .with_state(live)
@@ -81,6 +84,7 @@ struct Source {
 }
 
 async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBody<Source>) -> Answer {
+    live.check_source_is_free().map_err(|error| refusal(&error))?;
     if url != "simulated" {
         return Err(Refusal::new(
             StatusCode::FORBIDDEN,
@@ -164,6 +168,10 @@ fn refusal(error: &LiveError) -> Refusal {
         LiveError::Calibrator(_) => (StatusCode::CONFLICT, "GET /api/calibration says how far it is"),
         LiveError::NoSession => (StatusCode::CONFLICT, "choose a source first"),
         LiveError::Behind => (StatusCode::SERVICE_UNAVAILABLE, "try it again"),
+        LiveError::Calibrates { .. } => (
+            StatusCode::CONFLICT,
+            "start `palpate serve RIG --calibrate` with another --from URL, or leave --calibrate out",
+        ),
         LiveError::NotSimulated => (StatusCode::CONFLICT, "start `palpate serve` with a rig"),
         LiveError::Source(_) | LiveError::Columns(_) | LiveError::Pace(_) | LiveError::OneWay(_) => {
             (StatusCode::BAD_REQUEST, "start `palpate serve` with another source")
@@ -217,12 +225,13 @@ const POINTS: (usize, usize) = (2000, 20_000);
 
 async fn recording(
     State(live): State<Arc<Live>>,
-    Path(name): Path<String>,
+    name: Result<Path<String>, PathRejection>,
     part: Result<Query<Part>, QueryRejection>,
 ) -> Result<JsonAnswer<Excerpt>, Refusal> {
     let Query(Part { from_s, to_s, points }) = part.map_err(|error| {
         Refusal::new(StatusCode::BAD_REQUEST, error.body_text(), "write ?from_s=0&to_s=60&points=2000")
     })?;
+    let name = name_in(name)?;
     let span_s = (from_s.unwrap_or(0.0), to_s.unwrap_or(f64::INFINITY));
     let points = points.unwrap_or(POINTS.0).clamp(1, POINTS.1);
     blocking(move || live.read_recording(&name, span_s, points)).await.map(JsonAnswer)
@@ -233,8 +242,9 @@ const MOST_OF_A_FILE: u64 = 256 << 20;
 
 async fn recording_file(
     State(live): State<Arc<Live>>,
-    Path(name): Path<String>,
+    name: Result<Path<String>, PathRejection>,
 ) -> Result<Response, Refusal> {
+    let name = name_in(name)?;
     let path = live.recording_path(&name).map_err(|error| refusal(&error))?;
     let read = tokio::task::spawn_blocking(move || {
         let bytes = std::fs::metadata(&path)?.len();
@@ -277,4 +287,16 @@ async fn blocking<T: Send + 'static>(
 
 async fn unknown() -> Refusal {
     Refusal::new(StatusCode::NOT_FOUND, "there is no such request", "docs/live-server.md lists them")
+}
+
+/// A path that is there, asked by a method that it has not; those that it has are in the header `Allow`.
+async fn other_method(method: Method) -> Refusal {
+    let error = format!("{method} is no method of this request");
+    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, error, "docs/live-server.md says GET or POST")
+}
+
+/// The name of a recording in a path.
+fn name_in(path: Result<Path<String>, PathRejection>) -> Result<String, Refusal> {
+    let help = "write a name as GET /api/recordings has it";
+    path.map(|Path(name)| name).map_err(|error| Refusal::new(error.status(), error.body_text(), help))
 }

@@ -1,8 +1,9 @@
 //! The stream of a session to one browser.
 
 use super::body::Refusal;
+use super::connections::most_open;
 use super::live::Live;
-use super::web_sink::{Hub, MOST_BROWSERS, with_missed};
+use super::web_sink::{Hub, with_missed};
 use axum::body::Bytes;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::ws::{
@@ -61,7 +62,7 @@ pub async fn stream(
         upgrade.map_err(|error| Refusal::new(error.status(), error.body_text(), "open it as a WebSocket"))?;
     let hub = live.hub().clone();
     let Ok(place) = Arc::clone(&hub.places).try_acquire_owned() else {
-        let error = format!("{MOST_BROWSERS} browsers follow this session already");
+        let error = format!("{} browsers follow this session already", most_open());
         return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, error, "close one of them"));
     };
     let upgrade = upgrade
@@ -120,7 +121,12 @@ async fn send_all<T: Clone>(
             },
             // Nothing that a browser sends means anything; pings are answered by the socket.
             received = socket.recv() => match received {
-                Some(Ok(Message::Close(_))) | Some(Err(_)) | None => return,
+                // The answer to it goes out with the next read, which is the last.
+                Some(Ok(Message::Close(_))) => {
+                    let _ = tokio::time::timeout(PATIENCE, socket.recv()).await;
+                    return;
+                }
+                Some(Err(_)) | None => return,
                 Some(Ok(Message::Pong(_))) => {
                     if let Some(live) = page_of {
                         live.attend();

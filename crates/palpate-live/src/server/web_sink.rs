@@ -1,5 +1,6 @@
 //! The sink that browsers read: each message is encoded once, and its bytes are shared by all of them.
 
+use super::connections::most_open;
 use crate::event::EventRecord;
 use crate::frame::Channel;
 use crate::sample::{Sample, SampleRecord};
@@ -12,8 +13,6 @@ use serde::Serialize;
 use std::sync::Arc;
 use tokio::sync::{Semaphore, broadcast};
 
-/// Most browsers that follow the session at a time.
-pub const MOST_BROWSERS: usize = 256;
 /// Messages that wait for a browser at 60 Hz: about a second.
 const STATES: usize = 64;
 /// Messages that wait for a browser that takes every sample.
@@ -38,7 +37,7 @@ impl Default for Hub {
             states: broadcast::Sender::new(STATES),
             json: broadcast::Sender::new(BATCHES),
             binary: broadcast::Sender::new(BATCHES),
-            places: Arc::new(Semaphore::new(MOST_BROWSERS)),
+            places: Arc::new(Semaphore::new(most_open())),
         }
     }
 }

@@ -2,11 +2,13 @@
 
 use super::{Batch, Sink};
 use crate::frame::Channel;
+use crate::input::{Command, Input};
 use crate::sample::SampleRecord;
 use crate::session::Output;
 use palpate_mechanics::surface::Extent;
 use std::io::{self, Write};
-use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+use std::sync::{Arc, OnceLock};
 
 /// Writes samples and events as lines of JSON, as they come.
 #[derive(Debug)]
@@ -14,14 +16,20 @@ pub struct JsonLines<W> {
     out: W,
     channels: Vec<Channel>,
     extent: Extent,
+    reports: SyncSender<Input>,
     /// The first error of writing; nothing is written after it.
-    failed: Option<io::Error>,
+    failed: Arc<OnceLock<io::Error>>,
 }
 
 impl<W: Write> JsonLines<W> {
-    /// A writer of samples of these channels.
-    pub fn new(out: W, channels: &[Channel], extent: Extent) -> Self {
-        Self { out, channels: channels.to_vec(), extent, failed: None }
+    /// A writer of samples of these channels; that no more can be written is told to the session through `reports`.
+    pub fn new(out: W, channels: &[Channel], extent: Extent, reports: SyncSender<Input>) -> Self {
+        Self { out, channels: channels.to_vec(), extent, reports, failed: Arc::default() }
+    }
+
+    /// The first error of writing, as soon as there is one.
+    pub fn failed(&self) -> Arc<OnceLock<io::Error>> {
+        Arc::clone(&self.failed)
     }
 
     fn write(&mut self, batch: &Batch) -> io::Result<()> {
@@ -43,8 +51,16 @@ impl<W: Write> JsonLines<W> {
 
 impl<W: Write + Send> Sink for JsonLines<W> {
     fn batch(&mut self, batch: &Arc<Batch>) {
-        if self.failed.is_none() {
-            self.failed = self.write(batch).err();
+        if self.failed.get().is_some() {
+            return;
+        }
+        if let Err(error) = self.write(batch) {
+            // A reader that has gone wants no more, which is no trouble.
+            if error.kind() != io::ErrorKind::BrokenPipe {
+                let text = format!("samples are printed no more: {error}");
+                let _ = self.reports.try_send(Input::Command(Command::Trouble(text)));
+            }
+            let _ = self.failed.set(error);
         }
     }
 }

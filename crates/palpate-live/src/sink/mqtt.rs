@@ -137,6 +137,11 @@ impl MqttSink {
     pub fn lost(&self) -> u64 {
         self.lost.load(Ordering::Relaxed)
     }
+
+    /// The same for whoever asks when the sink has gone.
+    pub fn lost_counter(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.lost)
+    }
 }
 
 impl Sink for MqttSink {

@@ -179,7 +179,7 @@ fn estimates_events_status_and_rules_reach_a_broker_that_begins_anew() {
         "[[rule]]\nname = \"far\"\nx = [\"0 mm\", \"400 mm\"]\ntopic = \"bench/stop\"\nmessage = \"1\"\n";
     let (reports, told) = sync_channel(64);
     let url = format!("mqtt://127.0.0.1:{port}/bench/left").parse().unwrap();
-    let rules = Rules::from_toml(rules).unwrap();
+    let rules = Rules::from_toml(rules, session.extent()).unwrap();
     let sink = MqttSink::new(&url, session.channels(), session.extent(), rules, reports).unwrap();
     let config = BoardConfig { rate_hz: 200.0, seed: 3, ..BoardConfig::default() };
     let board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, 3)).unwrap();

@@ -100,7 +100,11 @@ fn commands_of_rules_are_bounded_and_what_is_not_sent_is_told() {
     let bench = Bench::open(&format!("tcp://{}", server.local_addr().unwrap()));
     let (board, _) = server.accept().unwrap();
     bench.opened();
-    let rules = Rules::from_toml("[[rule]]\nevent = \"mark\"\ncommand = \"brake on\"\n").unwrap();
+    let rules = Rules::from_toml(
+        "[[rule]]\nevent = \"mark\"\ncommand = \"brake on\"\n",
+        palpate_mechanics::surface::Extent::line(1.0).unwrap(),
+    )
+    .unwrap();
     let (reports, told) = sync_channel(64);
     let mut sink = CommandSink::new(rules, bench.source.commander().unwrap(), reports);
     let event = Event::Mark { text: String::new() };
@@ -121,7 +125,11 @@ fn commands_of_rules_are_bounded_and_what_is_not_sent_is_told() {
     drop(server);
     bench.lost();
     let (reports, told) = sync_channel(64);
-    let rules = Rules::from_toml("[[rule]]\nevent = \"mark\"\ncommand = \"off\"\n").unwrap();
+    let rules = Rules::from_toml(
+        "[[rule]]\nevent = \"mark\"\ncommand = \"off\"\n",
+        palpate_mechanics::surface::Extent::line(1.0).unwrap(),
+    )
+    .unwrap();
     let mut sink = CommandSink::new(rules, bench.source.commander().unwrap(), reports);
     (0..10).for_each(|_| sink.batch(&mark));
     let told: Vec<Input> = told.try_iter().collect();

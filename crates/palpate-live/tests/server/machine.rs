@@ -258,6 +258,12 @@ fn what_cannot_be_done_is_told_with_a_remedy() {
         let (status, answer) = post(&server, "/api/calibration", body);
         assert!(status == 400 && answer["help"].is_string(), "{body}: {status} {answer}");
     }
+    for url in ["simulated", "tcp://127.0.0.1:1"] {
+        let (status, answer) = post(&server, "/api/source", &json!({ "url": url }).to_string());
+        assert_eq!(status, 409, "{answer}");
+        assert!(answer["error"].as_str().unwrap().contains("udp://"), "{answer}");
+        assert!(answer["help"].as_str().unwrap().contains("--calibrate` with another --from"), "{answer}");
+    }
     assert_eq!(step(&server, "stop").0, 409);
     assert_eq!(step(&server, "begin").0, 200);
     let failed = waited(&server, |state| state["machine"]["runs"] == false);

@@ -164,6 +164,25 @@ fn bad_requests_are_answered_in_words() {
         assert_eq!(status, expected, "{path} {}", &body[..body.len().min(80)]);
         assert!(answer["error"].is_string() && answer["help"].is_string(), "{path}: {answer}");
     }
+    for (method, path, expected) in [
+        ("GET", "/api/tare", 405),
+        ("PUT", "/api/session", 405),
+        ("DELETE", "/api/recordings/a.mcap", 405),
+        ("GET", "/api/recordings/%FF", 400),
+        ("GET", "/api/recordings/%FF/file", 400),
+        ("PUT", "/api/nothing", 404),
+        ("OPTIONS", "/api/nothing/at/all", 404),
+        ("GET", "/api", 404),
+        ("GET", "/api/", 404),
+    ] {
+        let (status, head, body) = ask(&server, method, path, &[], "");
+        assert_eq!(status, expected, "{method} {path}");
+        let answer: Value = serde_json::from_str(&body).unwrap_or_else(|_| panic!("{method} {path}: {body}"));
+        assert!(answer["error"].is_string() && answer["help"].is_string(), "{method} {path}: {answer}");
+        assert_eq!(head.contains("\r\nallow: "), expected == 405, "{method} {path}: {head}");
+    }
+    assert_eq!(ask(&server, "PUT", "/no-such-page", &[], "").0, 404);
+    assert_eq!(ask(&server, "PUT", "/", &[], "").0, 405);
     assert_eq!(get(&server, "/api/stream").0, 400);
     assert!(follow(&server, "?form=xml", None).is_err());
     for path in ["/../Cargo.toml", "/%2e%2e/Cargo.toml", "/no-such-file.js"] {
@@ -196,6 +215,20 @@ fn a_browser_that_sends_too_much_is_let_go() {
     let start = Instant::now();
     while socket.read().is_ok() {
         assert!(start.elapsed() < Duration::from_secs(10));
+    }
+    live.end();
+}
+
+#[test]
+fn a_browser_that_says_goodbye_is_answered() {
+    let (live, server) = served(None);
+    for query in ["", "?form=binary"] {
+        let mut socket = follow(&server, query, None).unwrap();
+        live.begin_simulated().unwrap();
+        socket.read().unwrap();
+        socket.close(None).unwrap();
+        let end = std::iter::repeat_with(|| socket.read()).find_map(Result::err).unwrap();
+        assert!(matches!(end, tungstenite::Error::ConnectionClosed), "{end}");
     }
     live.end();
 }

@@ -129,6 +129,14 @@ impl Link {
         &self.name
     }
 
+    /// What became of the other end since the last call, where it is a broker.
+    pub fn news(&self) -> Option<String> {
+        match &self.way {
+            Way::Mqtt(publisher) => publisher.news(),
+            _ => None,
+        }
+    }
+
     /// Sends a frame, without waiting for anybody.
     ///
     /// # Errors

@@ -1,7 +1,8 @@
 //! A client of an MQTT broker that publishes frames.
 
 use crate::sink::MqttUrl;
-use rumqttc::{Client, QoS};
+use rumqttc::{Client, Connection, ConnectionError, Event, Packet, QoS};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
 /// Messages that wait for the broker at most.
@@ -13,27 +14,53 @@ const AGAIN_AFTER: Duration = Duration::from_millis(500);
 pub struct Publisher {
     client: Client,
     topic: String,
+    /// What becomes of the broker, in words.
+    news: Receiver<String>,
 }
 
 impl Publisher {
     pub fn open(url: &MqttUrl) -> std::io::Result<Self> {
-        let (client, mut connection) = Client::new(url.options("board"), WAITING);
-        std::thread::Builder::new().name("mqtt".to_owned()).spawn(move || {
-            // It ends when the client has gone.
-            for event in connection.iter() {
-                if let Err(error) = event {
-                    if matches!(error, rumqttc::ConnectionError::RequestsDone) {
-                        return;
-                    }
-                    std::thread::sleep(AGAIN_AFTER);
-                }
-            }
-        })?;
-        Ok(Self { client, topic: url.topic.clone() })
+        let (client, connection) = Client::new(url.options("board"), WAITING);
+        let (tell, news) = channel();
+        let broker = format!("the broker {}:{}", url.host, url.port);
+        std::thread::Builder::new()
+            .name("mqtt".to_owned())
+            .spawn(move || drive(connection, &broker, &tell))?;
+        Ok(Self { client, topic: url.topic.clone(), news })
+    }
+
+    /// What became of the broker since the last call.
+    pub fn news(&self) -> Option<String> {
+        self.news.try_recv().ok()
     }
 
     /// Publishes a frame; false where too many wait for the broker.
     pub fn publish(&self, frame: &[u8]) -> bool {
         self.client.try_publish(&self.topic, QoS::AtMostOnce, false, frame).is_ok()
+    }
+}
+
+/// Keeps the connection until the client has gone, and tells once when the broker goes and when it is there again.
+fn drive(mut connection: Connection, broker: &str, tell: &Sender<String>) {
+    let mut is_away = false;
+    for event in connection.iter() {
+        let words = match event {
+            Err(ConnectionError::RequestsDone) => return,
+            Err(error) if !is_away => {
+                is_away = true;
+                format!("{broker} cannot be reached: {error}; see that it runs there, it is tried again")
+            }
+            Err(_) => {
+                std::thread::sleep(AGAIN_AFTER);
+                continue;
+            }
+            Ok(Event::Incoming(Packet::ConnAck(_))) if is_away => {
+                is_away = false;
+                format!("{broker} is there")
+            }
+            Ok(_) => continue,
+        };
+        // A board that has ended wants no news.
+        let _ = tell.send(words);
     }
 }
