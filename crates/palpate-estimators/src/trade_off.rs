@@ -207,7 +207,8 @@ impl Contacts<'_> {
         if !misfit.is_finite() {
             return None;
         }
-        let best = looked.iter().min_by(|a, b| a.cost().total_cmp(&b.cost()))?;
+        let in_numbers = looked.iter().filter(|at| !at.cost().is_nan());
+        let best = in_numbers.min_by(|a, b| a.cost().total_cmp(&b.cost()))?;
         let most_spread = if self.extrapolates { best.spread } else { f64::INFINITY };
         let region = Region { least: best.cost(), most_spread, floor: 0.0 };
         let mut stretches = Vec::new();

@@ -1,11 +1,16 @@
-//! Intervals of contacts near the ends of a line, where the force, which is not known, and the place trade off, and where hardly a press or none tells
-//! the influences: by the likelihood ratio ([`crate::trade_off`]), as what is expected of contacts beforehand would exclude those beside the end.
+//! Intervals of contacts near the ends of a line, where hardly a press or none tells the influences.
 //!
-//! Beyond the outermost presses the influences are extrapolated, and how surely depends on sensors that may be there, of which presses tell nothing. An
-//! interval that reaches there reaches the end of the surface, and holds every force: nothing there is excluded.
+//! Beyond the outermost presses the influences are extrapolated, and how surely depends on sensors that may be there, of which presses tell nothing.
+//!
+//! - Where the force is not known, it and the place trade off there: intervals are by the likelihood ratio ([`crate::trade_off`]), as what is expected of
+//!   contacts beforehand would exclude those beside the end. One that reaches beyond the outermost press reaches the end of the surface, and holds
+//!   every force: nothing there is excluded.
+//! - Where it is known, an interval that reaches farther beyond the outermost press than half of the largest gap between presses holds everything from
+//!   there to the end.
 
 use super::locator::{ForceLinearLocator, Stored};
 use crate::influence::grid::Axis;
+use crate::status::OTHER_PLACE;
 use crate::trade_off::{CALIBRATED, Contacts, Force, NotExcluded};
 use palpate_core::{ContactEstimate, Estimate};
 use palpate_numerics::normal_interval_95;
@@ -15,7 +20,11 @@ impl ForceLinearLocator {
     /// Writes the intervals of a relative reading over those of the posterior where that is near an end of a line.
     pub(super) fn tell_near_ends(&self, relative: &[f64], estimate: &mut Estimate) {
         let [axis, across] = self.axes();
-        if across.count > 1 || axis.count < 2 || self.stored.known_force_n.is_some() {
+        if across.count > 1 || axis.count < 2 {
+            return;
+        }
+        if self.stored.known_force_n.is_some() {
+            self.open_ends(axis, estimate);
             return;
         }
         let modes = estimate.modes.as_slice().iter().map(|mode| mode.contact);
@@ -34,6 +43,20 @@ impl ForceLinearLocator {
             let (least_n, most_n) = normal_interval_95(force_n, uncertainty.covariance[5].sqrt());
             uncertainty.x_95_m = around(around(x_95_m, uncertainty.x_95_m), (x_m, x_m));
             uncertainty.force_95_n = Some(around(force_95_n, (least_n.max(0.0), most_n)));
+        }
+    }
+
+    /// Lets the interval of a contact of known force hold a whole margin of the grid that it reaches, to the end of the surface.
+    fn open_ends(&self, axis: Axis, estimate: &mut Estimate) {
+        let Some(uncertainty) = &mut estimate.contact.uncertainty else { return };
+        let [before_m, behind_m] = axis.margins.map(|margin| margin * axis.step);
+        let usual_m = (axis.start + before_m, axis.start + length_m(axis) - behind_m);
+        let (low_m, high_m) = uncertainty.x_95_m;
+        if low_m < usual_m.0 {
+            uncertainty.x_95_m = around(uncertainty.x_95_m, (0.0, usual_m.0));
+        }
+        if high_m > usual_m.1 {
+            uncertainty.x_95_m = around(uncertainty.x_95_m, (usual_m.1, self.stored.prior.extent.length_m()));
         }
     }
 
@@ -64,12 +87,15 @@ impl ForceLinearLocator {
     fn on_surface(&self, axis: Axis, found: &NotExcluded) -> ((f64, f64), (f64, f64)) {
         let Stored { hardest_n, prior, .. } = &self.stored;
         let (first_m, last_m) = self.outermost_m(axis);
-        let (low_m, high_m) = (axis.start + found.x_95_m.0, axis.start + found.x_95_m.1);
+        // A stretch that is hardly probable is told by nothing else either.
+        let probable = || found.stretches.iter().filter(|stretch| stretch.probability >= OTHER_PLACE);
+        let x_95_m = probable().map(|stretch| stretch.x_95_m).reduce(around).unwrap_or(found.x_95_m);
+        let (low_m, high_m) = (axis.start + x_95_m.0, axis.start + x_95_m.1);
         let (is_before, is_behind) = (low_m <= first_m, high_m >= last_m);
         let low_m = if is_before { 0.0 } else { low_m };
         let high_m = if is_behind { prior.extent.length_m() } else { high_m };
-        let told = found.force_95_n.filter(|_| !is_before && !is_behind);
-        let (least_n, most_n) = told.unwrap_or((0.0, *hardest_n));
+        let told = probable().map(|stretch| stretch.force_95_n).reduce(around);
+        let (least_n, most_n) = told.filter(|_| !is_before && !is_behind).unwrap_or((0.0, *hardest_n));
         let force_n = |response_n: f64| prior.force_of_response(response_n, 0.0).0;
         ((low_m, high_m), (force_n(least_n), force_n(most_n)))
     }
