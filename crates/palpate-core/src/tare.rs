@@ -228,8 +228,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         for ((opposite, value), learnt) in scratch.as_mut().iter_mut().zip(tared).zip(self.learnt.as_ref()) {
             *opposite = 2.0 * learnt - value;
         }
-        self.let_go = if is_contact(status_of(scratch.as_ref())) { self.let_go + 1 } else { 0 };
-        self.as_learnt = if status_of(reading) == Status::NoContact { self.as_learnt + 1 } else { 0 };
+        self.let_go = next_in_row(self.let_go, is_contact(status_of(scratch.as_ref())));
+        self.as_learnt = next_in_row(self.as_learnt, status_of(reading) == Status::NoContact);
         if self.as_learnt >= LET_GO {
             self.current = Baseline::new(self.learnt.clone(), Self::SETTLED);
             (self.is_confirmed, self.other) = (true, None);
@@ -250,7 +250,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// Holds a reading that is `outside_model` by the baseline, and of a status by the other one, against both.
     fn weigh_other(&mut self, reading: &[f64], status: Status) {
         if let Some(other) = &mut self.other {
-            self.strange = if status == Status::OutsideModel { self.strange + 1 } else { 0 };
+            self.strange = next_in_row(self.strange, status == Status::OutsideModel);
             other.add(reading, status, self.time_constant);
             if other.saw_a_whole_touch() {
                 core::mem::swap(&mut self.current, other);
@@ -308,14 +308,10 @@ impl<B: AsRef<[f64]> + AsMut<[f64]>> Baseline<B> {
     fn add(&mut self, reading: &[f64], status: Status, time_constant: u32) {
         if status == Status::NoContact {
             self.average(reading, time_constant);
-            self.untouched = self.untouched.saturating_add(1);
-        } else {
-            self.untouched = 0;
         }
-        if is_contact(status) {
-            self.touched = self.touched.saturating_add(1);
-        } else if self.touched < LET_GO {
-            self.touched = 0;
+        self.untouched = next_in_row(self.untouched, status == Status::NoContact);
+        if self.touched < LET_GO {
+            self.touched = next_in_row(self.touched, is_contact(status));
         }
     }
 
@@ -336,6 +332,11 @@ impl<B: AsRef<[f64]> + AsMut<[f64]>> Baseline<B> {
             *baseline += share * (value - *baseline);
         }
     }
+}
+
+/// Number of readings in a row after the next one, which is one of them or ends the row.
+fn next_in_row(before: u32, is_one: bool) -> u32 {
+    if is_one { before.saturating_add(1) } else { 0 }
 }
 
 fn is_contact(status: Status) -> bool {

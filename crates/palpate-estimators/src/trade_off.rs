@@ -164,7 +164,7 @@ impl Best {
     }
 }
 
-/// The rule by which places are not excluded.
+/// The places that a reading does not exclude, by their costs.
 #[derive(Clone, Copy, Debug)]
 struct Region {
     /// The least cost of all places.
@@ -176,7 +176,7 @@ struct Region {
 }
 
 impl Region {
-    /// What is left of q at a place; less than 0 where it is excluded.
+    /// Distance of the cost of a place below the greatest that is not excluded; negative where it is excluded.
     fn left(&self, at: &Best) -> f64 {
         at.bound.max(self.floor) - (at.misfit + at.spread.min(self.most_spread) - self.least)
     }

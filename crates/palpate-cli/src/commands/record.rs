@@ -81,7 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(url) = &arguments.mqtt {
         let sink = MqttSink::new(url, session.channels(), session.extent(), publishing, to.clone());
         let sink = sink.map_err(Complaint::new)?;
-        unpublished = Some((url, sink.lost_counter()));
+        unpublished = Some((url, sink.lost()));
         sinks.push(Box::new(sink));
     }
     // Kept until the end, as Foxglove's server lives in its outlet.

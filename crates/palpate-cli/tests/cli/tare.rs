@@ -96,7 +96,7 @@ fn what_a_tare_takes_is_said_and_its_rows_stay_in_their_places() {
     assert!(told.contains("40 of 40 readings of the tare are not within the noise"), "{told}");
 }
 
-/// What no contact explains.
+/// Three loads side by side, which are no contact of the model.
 const PALM: [Touch; 3] = [
     Touch { position_mm: 60.0, force_n: 3.0 },
     Touch { position_mm: 130.0, force_n: 3.0 },

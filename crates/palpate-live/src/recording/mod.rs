@@ -20,7 +20,7 @@ pub use switch::{RecordingSwitch, check_name};
 /// End of the names of recordings.
 pub const EXTENSION: &str = "mcap";
 
-/// Why the locator of a recording cannot be had from it.
+/// Fault of the locator that is attached to a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LocatorFault {
     /// None is attached.

@@ -61,12 +61,12 @@ impl Default for Bounds {
     }
 }
 
-/// What a request knows of its connection: an extension of every request.
+/// Connection of a request, which carries it as an extension.
 #[derive(Clone, Debug)]
 pub struct Connection {
     /// Time in which a body must come.
     pub body_within: Duration,
-    /// Whether a whole request has come on it.
+    /// True once a whole request has come on it.
     has_asked: Arc<AtomicBool>,
 }
 
@@ -191,7 +191,7 @@ mod tests {
         stream
     }
 
-    /// What comes until the connection is closed, and the time until then.
+    /// Bytes that come until the connection is closed, and the time until then.
     fn until_closed(mut stream: std::net::TcpStream) -> (String, Duration) {
         let (start, mut answer) = (Instant::now(), Vec::new());
         // An end that is closed with bytes unread is a reset.

@@ -133,13 +133,8 @@ impl MqttSink {
         Ok(Self { to: Some(to), lost, thread: Some(thread) })
     }
 
-    /// Messages that the broker did not take.
-    pub fn lost(&self) -> u64 {
-        self.lost.load(Ordering::Relaxed)
-    }
-
-    /// The same for whoever asks when the sink has gone.
-    pub fn lost_counter(&self) -> Arc<AtomicU64> {
+    /// Messages that the broker did not take, which are counted until the sink has gone.
+    pub fn lost(&self) -> Arc<AtomicU64> {
         Arc::clone(&self.lost)
     }
 }

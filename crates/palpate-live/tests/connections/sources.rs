@@ -8,6 +8,7 @@ use palpate_live::session::Output;
 use palpate_live::sink::{Batch, CommandSink, Sink};
 use palpate_live::source::{SendError, Source};
 use palpate_live::stamp::HostClock;
+use palpate_mechanics::surface::Extent;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream, UdpSocket};
 use std::path::Path;
@@ -100,13 +101,12 @@ fn commands_of_rules_are_bounded_and_what_is_not_sent_is_told() {
     let bench = Bench::open(&format!("tcp://{}", server.local_addr().unwrap()));
     let (board, _) = server.accept().unwrap();
     bench.opened();
-    let rules = Rules::from_toml(
-        "[[rule]]\nevent = \"mark\"\ncommand = \"brake on\"\n",
-        palpate_mechanics::surface::Extent::line(1.0).unwrap(),
-    )
-    .unwrap();
+    let on_marks = |command: &str| {
+        let text = format!("[[rule]]\nevent = \"mark\"\ncommand = \"{command}\"\n");
+        Rules::from_toml(&text, Extent::line(1.0).unwrap()).unwrap()
+    };
     let (reports, told) = sync_channel(64);
-    let mut sink = CommandSink::new(rules, bench.source.commander().unwrap(), reports);
+    let mut sink = CommandSink::new(on_marks("brake on"), bench.source.commander().unwrap(), reports);
     let event = Event::Mark { text: String::new() };
     let mark = Arc::new(Batch { outputs: vec![Output::Event(EventRecord { time_s: 0.0, event })] });
     for _ in 0..2000 {
@@ -125,12 +125,7 @@ fn commands_of_rules_are_bounded_and_what_is_not_sent_is_told() {
     drop(server);
     bench.lost();
     let (reports, told) = sync_channel(64);
-    let rules = Rules::from_toml(
-        "[[rule]]\nevent = \"mark\"\ncommand = \"off\"\n",
-        palpate_mechanics::surface::Extent::line(1.0).unwrap(),
-    )
-    .unwrap();
-    let mut sink = CommandSink::new(rules, bench.source.commander().unwrap(), reports);
+    let mut sink = CommandSink::new(on_marks("off"), bench.source.commander().unwrap(), reports);
     (0..10).for_each(|_| sink.batch(&mark));
     let told: Vec<Input> = told.try_iter().collect();
     let [Input::Command(Command::Trouble(text))] = told.as_slice() else { panic!("{told:?}") };

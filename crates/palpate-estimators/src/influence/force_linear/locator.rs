@@ -86,7 +86,7 @@ impl Tables {
 pub(super) struct Stored {
     pub x: Axis,
     pub y: Axis,
-    /// Positions of the outermost presses along a line, in metres; nothing on a plane, and in files that were written before they were kept.
+    /// Positions of the outermost presses along a line, in metres; none on a plane, and in older files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outermost_m: Option<(f64, f64)>,
     /// Channels of a reading, and those of them that are in use, from 0.
@@ -653,7 +653,7 @@ impl ForceLinearLocator {
         Inversion::new(self.seen(relative)).estimate(self.told_force(), limits)
     }
 
-    /// The posterior of a reading, whose intervals near the ends are by what is expected beforehand.
+    /// The estimate of a reading whose intervals are those of the posterior, near the ends too.
     pub(super) fn posterior(&self, reading: &[f64]) -> Estimate {
         self.estimate(&self.relative(reading))
     }

@@ -129,7 +129,7 @@ impl Link {
         &self.name
     }
 
-    /// What became of the other end since the last call, where it is a broker.
+    /// The next message, in words, that a broker was lost or is there again; none of any other end.
     pub fn news(&self) -> Option<String> {
         match &self.way {
             Way::Mqtt(publisher) => publisher.news(),

@@ -14,7 +14,7 @@ const AGAIN_AFTER: Duration = Duration::from_millis(500);
 pub struct Publisher {
     client: Client,
     topic: String,
-    /// What becomes of the broker, in words.
+    /// Messages, in words, that the broker was lost or is there again.
     news: Receiver<String>,
 }
 
@@ -29,7 +29,7 @@ impl Publisher {
         Ok(Self { client, topic: url.topic.clone(), news })
     }
 
-    /// What became of the broker since the last call.
+    /// The next message, in words, that the broker was lost or is there again.
     pub fn news(&self) -> Option<String> {
         self.news.try_recv().ok()
     }
