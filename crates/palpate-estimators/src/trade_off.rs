@@ -11,7 +11,8 @@
 //!   Cousins, Physical Review D 57, 1998). The intervals of place and force are the region's projections, and hold the best contact
 //!   whatever the reading;
 //! - where influences are extrapolated beyond the outermost press, their variances are hardly more than a guess, and too large ones would exclude what they
-//!   leave open: there the determinant counts up to that of the best contact ([`Contacts::extrapolates`]);
+//!   leave open: there the determinant counts up to that of the best contact. A sensor beside the outermost press, which presses on one of its sides do not
+//!   show, leaves the influences of its channel beyond it open: the channel that explains a contact worst does not count ([`Contacts::extrapolates`]);
 //! - where a stretch of places in the region reaches an end, the estimate is their posterior median, the prior being flat in the place
 //!   and in the size of the signal, with the best force there. Of all estimates it has the least mean error over the places.
 //!
@@ -337,7 +338,9 @@ impl Contacts<'_> {
     fn best(&self, x_m: f64, ends: &[Vec<f64>; 2], buffer: &mut Vec<[f64; 2]>) -> Best {
         let (force_n, is_held, spread) = self.best_force(x_m, buffer);
         // Summed, as |d|² − W·(2·d·f − W·|f|²) loses all digits of a good fit.
-        let misfit: f64 = buffer.iter().map(|[d, f]| (d - force_n * f).powi(2)).sum();
+        let squares = || buffer.iter().map(|[d, f]| (d - force_n * f).powi(2));
+        let open = if self.extrapolates { squares().fold(0.0, f64::max) } else { 0.0 };
+        let misfit = squares().sum::<f64>() - open;
         let ff: f64 = buffer.iter().map(|[_, f]| f * f).sum();
         let across = ends.iter().map(|end| {
             let pairs = || end.iter().zip(buffer.iter());

@@ -513,7 +513,7 @@ impl Search<'_> {
         let plane = dimensions == 2;
         let of_length = |source: Source, share: f64, length: f64| Prior {
             source: Some(source),
-            kernel: if plane { Kernel::SquaredExponential } else { Kernel::Matern52 },
+            kernel: Kernel::Matern52,
             smooth_part: share,
             lengths_m: vec![length * length_m; dimensions],
             ..smooth.clone()

@@ -86,9 +86,9 @@ impl Tables {
 pub(super) struct Stored {
     pub x: Axis,
     pub y: Axis,
-    /// Positions of the outermost presses along a line, in metres; none on a plane, and in older files.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub outermost_m: Option<(f64, f64)>,
+    /// The least and the greatest of each coordinate of the presses, in metres; none in older files.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outermost_m: Vec<(f64, f64)>,
     /// Channels of a reading, and those of them that are in use, from 0.
     pub channels: usize,
     pub live: Vec<usize>,
@@ -225,7 +225,7 @@ impl Stored {
             LocatorFault::check_count(what, places.saturating_mul(live), list.len())?;
         }
         numbers("offset", offsets, |_| true, "a finite number")?;
-        let outermost_m = self.outermost_m.into_iter().flat_map(|(first_m, last_m)| [first_m, last_m]);
+        let outermost_m = self.outermost_m.iter().flat_map(|(first_m, last_m)| [*first_m, *last_m]);
         LocatorFault::check_numbers("outermost press", outermost_m, |_| true, "a finite number")?;
         numbers("mean force", &[self.mean_force_n], |_| true, "a finite number")?;
         numbers("influence value", values, |_| true, "a finite number")?;
@@ -941,7 +941,7 @@ impl Locate for ForceLinearLocator {
             // The most probable place of a contact that would be too light to be told from noise.
             return Estimate::of_contact(estimate.contact, Status::NoContact);
         }
-        self.tell_near_ends(&relative, &mut estimate);
+        self.tell_beyond_presses(&relative, &mut estimate);
         estimate
     }
 

@@ -3,6 +3,7 @@
 //!
 //! Learnt from the presses ([`learning`]) and inverted over a grid of places ([`locator`]).
 
+mod beyond_presses;
 mod condensed;
 mod drift;
 mod drift_fit;
@@ -10,7 +11,6 @@ mod evidence;
 mod learning;
 mod left_out;
 mod locator;
-mod near_ends;
 mod outliers;
 mod place_noise;
 mod place_noise_search;
@@ -92,14 +92,15 @@ fn fit_condensed(
     let functions = learnt.functions(&places_m, watch)?;
     let pressed = presses.force_n.iter().filter(|force_n| **force_n != 0.0);
     let forces = mean_and_variance(pressed.map(|force_n| prior.response_n(*force_n)));
-    let along_m = presses.positions_m().into_iter().map(|position_m| position_m[0]);
-    let outermost_m = along_m.fold((f64::INFINITY, f64::NEG_INFINITY), |(first_m, last_m), at_m| {
-        (at_m.min(first_m), at_m.max(last_m))
-    });
+    let positions_m = presses.positions_m();
+    let outermost_m = |k: usize| {
+        let coordinates = || positions_m.iter().map(|position_m| position_m[k]);
+        (coordinates().fold(f64::INFINITY, f64::min), coordinates().fold(f64::NEG_INFINITY, f64::max))
+    };
     let mut locator = Stored {
         x,
         y,
-        outermost_m: (extent.dimensions() == 1).then_some(outermost_m),
+        outermost_m: (0..extent.dimensions()).map(outermost_m).collect(),
         channels: recording.channels.len(),
         live: learnt.live.clone(),
         functions: Tables::new(&functions, learnt.noise_sd()),

@@ -28,6 +28,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::rc::Rc;
 
 mod drift;
+mod edges;
 mod ends;
 mod few;
 mod noise;

@@ -70,7 +70,7 @@ impl<E: Explain> Inversion<E> {
         misfit <= limits.misfit && (misfit <= limits.spread || self.spread() <= limits.spread)
     }
 
-    /// The posterior's mean and covariance; that of the most probable mode where there are several; `outside_model` beyond the limits.
+    /// The mean of the posterior's most probable mode, and what the posterior leaves open; `outside_model` beyond the limits.
     pub fn estimate(mut self, told: ToldForce, limits: Limits) -> Estimate {
         let axes = self.reading.axes();
         let nowhere = Estimate::of_position(middle(axes), Status::OutsideModel);
@@ -78,21 +78,15 @@ impl<E: Explain> Inversion<E> {
             return nowhere;
         }
         let Some(posterior) = self.quadrature().or_else(|| self.sum()) else { return nowhere };
-        let mut contact = posterior.all.contact(told);
-        if let (Some(uncertainty), Some([x_95_m, y_95_m])) = (&mut contact.uncertainty, posterior.intervals_m)
-        {
-            (uncertainty.x_95_m, uncertainty.y_95_m) = (x_95_m, y_95_m);
-        }
+        let contact = posterior.contact(told);
         if !self.is_explained(limits) {
             return Estimate::of_contact(contact, Status::OutsideModel);
         }
-        let Some((first, others)) = posterior.modes.split_first().filter(|(_, others)| !others.is_empty())
-        else {
+        let others = posterior.modes.get(1..).unwrap_or_default();
+        if others.is_empty() {
             return Estimate::of_contact(contact, Status::Located);
-        };
-        // The most probable place, with the uncertainty of all.
-        let most_probable = ContactEstimate { uncertainty: contact.uncertainty, ..first.contact(told) };
-        let mut estimate = Estimate::of_contact(most_probable, Status::Ambiguous);
+        }
+        let mut estimate = Estimate::of_contact(contact, Status::Ambiguous);
         estimate.modes = BoundedList::none(Mode::default());
         for mode in others {
             let probability = mode.everywhere.weight / posterior.all.everywhere.weight;
@@ -190,6 +184,24 @@ struct Posterior {
     modes: Vec<Probable>,
     /// 95 % intervals along and across, in metres; `None` where they are those of a normal distribution.
     intervals_m: Option<[(f64, f64); 2]>,
+}
+
+impl Posterior {
+    /// The most probable mode, with the uncertainty of all; its intervals hold it.
+    ///
+    /// The mean of all would be of no mode: one of a hundredth as much at the other end of the surface moves it by a hundredth of the length.
+    fn contact(&self, told: ToldForce) -> ContactEstimate {
+        let all = self.all.contact(told);
+        let mut contact = self.modes.first().map_or(all, |first| first.contact(told));
+        contact.uncertainty = all.uncertainty;
+        if let Some(uncertainty) = &mut contact.uncertainty {
+            let [x_95_m, y_95_m] = self.intervals_m.unwrap_or([uncertainty.x_95_m, uncertainty.y_95_m]);
+            let around = |(low_m, high_m): (f64, f64), at_m: f64| (low_m.min(at_m), high_m.max(at_m));
+            uncertainty.x_95_m = around(x_95_m, contact.position.x_m);
+            uncertainty.y_95_m = around(y_95_m, contact.position.y_m);
+        }
+        contact
+    }
 }
 
 /// Position and force of a contact, and the force's variance.

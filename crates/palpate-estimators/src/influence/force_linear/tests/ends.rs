@@ -144,15 +144,10 @@ fn contacts_beyond_the_outermost_press_are_in_their_intervals() {
 }
 
 #[test]
-fn contacts_of_known_force_in_the_margins_of_the_grid_are_in_their_intervals() {
+fn contacts_of_known_force_beyond_the_outermost_press_are_in_their_intervals() {
     const FORCE_N: f64 = 3.0;
     let mut wrong = Vec::new();
-    // Of the first the grid has no margins.
-    for (presses, span_mm, held_mm) in [
-        ((12, 3), (16.7, 383.3), [15.0, 20.0]),
-        ((20, 3), (20.0, 380.0), [5.0, 10.0]),
-        ((9, 3), (60.0, 340.0), [20.0, 30.0]),
-    ] {
+    for (presses, span_mm) in [((12, 3), (16.7, 383.3)), ((20, 3), (20.0, 380.0)), ((9, 3), (60.0, 340.0))] {
         let beam = |seed: u64| {
             let bench = beam(seed, presses, span_mm, Pressed::Alike);
             let setup = bench.setup().known_force(FORCE_N).unwrap();
@@ -162,20 +157,21 @@ fn contacts_of_known_force_in_the_margins_of_the_grid_are_in_their_intervals() {
         };
         let mut beams: Vec<_> = (0..beams()).map(beam).collect();
         eprintln!(
-            "{} places × {} from {} mm, {FORCE_N} N known\n| from the end | place covered | mean width | outside_model |\n|---|---|---|---|",
+            "{} places × {} from {} mm, {FORCE_N} N known\n| from the end | place covered | mean width | mean error | outside_model |\n|---|---|---|---|---|",
             presses.0, presses.1, span_mm.0
         );
         for place_mm in PLACES_MM {
             let row = covered(&mut beams, 1e-3 * place_mm, FORCE_N);
             let percent = |count: usize| 100.0 * count as f64 / row.told as f64;
-            let width_mm = row.width_mm / row.told as f64;
+            let mean = |sum: f64| sum / row.told as f64;
             eprintln!(
-                "| {place_mm} mm | {:.1} % | {width_mm:.2} mm | {:.1} % |",
+                "| {place_mm} mm | {:.1} % | {:.2} mm | {:.2} mm | {:.1} % |",
                 percent(row.place),
+                mean(row.width_mm),
+                mean(row.error_mm),
                 percent(row.not_explained)
             );
-            let is_held = percent(row.place) >= 90.0;
-            if held_mm.contains(&place_mm) && !is_held {
+            if percent(row.place) < 85.0 || row.outside > 0 {
                 wrong.push(format!("{presses:?}, {place_mm} mm: {row:?}"));
             }
         }

@@ -1,0 +1,148 @@
+//! Intervals of contacts beyond the outermost presses.
+//!
+//! The influences are extrapolated there, and how surely depends on sensors that may be there, of which presses tell nothing. An interval of the place that
+//! reaches beyond the outermost press reaches the end of the surface: nothing there is excluded. Where the force is not known, it and the place trade off,
+//! and the force's interval holds every force as well.
+//!
+//! What is expected of contacts beforehand would exclude those beside the end. On a line intervals are therefore by the likelihood ratio
+//! ([`crate::trade_off`]), in which one channel may be anything. Where the force is known, a contact beyond the grid of places may be explained best at either
+//! end of it: an interval that reaches an end of the grid before that of the surface is the whole surface.
+
+use super::locator::{ForceLinearLocator, Stored};
+use crate::influence::grid::Axis;
+use crate::status::OTHER_PLACE;
+use crate::trade_off::{CALIBRATED, Contacts, Force, NotExcluded};
+use palpate_core::{ContactEstimate, Estimate};
+use palpate_numerics::normal_interval_95;
+use std::cell::RefCell;
+
+impl ForceLinearLocator {
+    /// Writes the intervals of a relative reading over those of the posterior where they reach beyond the outermost presses.
+    pub(super) fn tell_beyond_presses(&self, relative: &[f64], estimate: &mut Estimate) {
+        let [along, across] = self.axes();
+        if across.count > 1 {
+            self.open_edges(estimate);
+        } else if along.count > 1 {
+            self.tell_near_ends(along, relative, estimate);
+        }
+    }
+
+    /// Lets the intervals of a contact on a plane that reach beyond the outermost presses reach the edges.
+    fn open_edges(&self, estimate: &mut Estimate) {
+        let Some(uncertainty) = &mut estimate.contact.uncertainty else { return };
+        let extent = self.stored.prior.extent;
+        let sizes_m = [extent.length_m(), extent.width_m().unwrap_or(0.0)];
+        let intervals_m = [&mut uncertainty.x_95_m, &mut uncertainty.y_95_m];
+        let mut is_beyond = false;
+        for (k, interval_m) in intervals_m.into_iter().enumerate() {
+            let (first_m, last_m) = self.outermost_m(k);
+            let (is_before, is_behind) = (interval_m.0 <= first_m, interval_m.1 >= last_m);
+            // The estimate is drawn too far towards an edge as often as too little: all that lies beyond is held.
+            if is_before {
+                *interval_m = around(*interval_m, (0.0, first_m));
+            }
+            if is_behind {
+                *interval_m = around(*interval_m, (last_m, sizes_m[k]));
+            }
+            is_beyond |= is_before || is_behind;
+        }
+        if is_beyond && self.stored.known_force_n.is_none() {
+            uncertainty.force_95_n = Some((0.0, self.hardest_n()));
+        }
+    }
+
+    /// Writes the intervals of a relative reading over those of the posterior where that is near an end of a line.
+    fn tell_near_ends(&self, axis: Axis, relative: &[f64], estimate: &mut Estimate) {
+        let modes = estimate.modes.as_slice().iter().map(|mode| mode.contact);
+        let contacts: Vec<ContactEstimate> = std::iter::once(estimate.contact).chain(modes).collect();
+        let outermost_m = self.outermost_m(0);
+        if !contacts.iter().any(|contact| is_near(outermost_m, contact)) {
+            return;
+        }
+        let minima_m: Vec<f64> = contacts.iter().map(|contact| contact.position.x_m - axis.start).collect();
+        let Some(found) = self.not_excluded(axis, relative, &minima_m) else { return };
+        let (x_95_m, force_95_n) = self.on_surface(axis, &found);
+        let ContactEstimate { position, force_n, uncertainty: Some(uncertainty) } = &mut estimate.contact
+        else {
+            return;
+        };
+        uncertainty.x_95_m = around(around(x_95_m, uncertainty.x_95_m), (position.x_m, position.x_m));
+        if let (Some(force_95_n), Some(force_n)) = (force_95_n, *force_n) {
+            let (least_n, most_n) = normal_interval_95(force_n, uncertainty.covariance[5].sqrt());
+            uncertainty.force_95_n = Some(around(force_95_n, (least_n.max(0.0), most_n)));
+        }
+    }
+
+    /// The contacts over the grid that a reading does not exclude, places from the first node on and φ for the force.
+    fn not_excluded(&self, axis: Axis, relative: &[f64], minima_m: &[f64]) -> Option<NotExcluded> {
+        let seen = RefCell::new(self.seen(relative));
+        let channels = |along_m: f64, response_n: f64, channels: &mut Vec<[f64; 2]>| {
+            seen.borrow_mut().whiten([along_m / axis.step, 0.0, response_n], channels)
+        };
+        let known = self.stored.known_force_n.map(|force_n| self.stored.prior.response_n(force_n));
+        let contacts = Contacts {
+            length_m: length_m(axis),
+            force: known.map_or(Force::AtMost(self.stored.hardest_n), Force::Known),
+            widening: CALIBRATED,
+            reference_force_n: self.stored.mean_force_n,
+            // The likelihood of few presses is widened already.
+            extrapolates: self.stored.channels_as_one == 1.0,
+            channels: &channels,
+        };
+        contacts.not_excluded(minima_m)
+    }
+
+    /// Coordinate k of the outermost presses; the ends of the grid in files that do not say them.
+    fn outermost_m(&self, k: usize) -> (f64, f64) {
+        let axis = self.axes()[k];
+        let of_grid = || (axis.start, axis.start + length_m(axis));
+        self.stored.outermost_m.get(k).copied().unwrap_or_else(of_grid)
+    }
+
+    /// The hardest force that is looked for.
+    fn hardest_n(&self) -> f64 {
+        self.stored.prior.force_of_response(self.stored.hardest_n, 0.0).0
+    }
+
+    /// The intervals of place and force on the surface; none of a force that is known.
+    fn on_surface(&self, axis: Axis, found: &NotExcluded) -> ((f64, f64), Option<(f64, f64)>) {
+        let Stored { hardest_n, prior, .. } = &self.stored;
+        let whole_m = (0.0, prior.extent.length_m());
+        let (first_m, last_m) = self.outermost_m(0);
+        // A stretch that is hardly probable is told by nothing else either.
+        let probable = || found.stretches.iter().filter(|stretch| stretch.probability >= OTHER_PLACE);
+        let (low_m, high_m) = probable().map(|stretch| stretch.x_95_m).reduce(around).unwrap_or(found.x_95_m);
+        let is_beyond_grid = (low_m <= 0.0 && axis.start > whole_m.0)
+            || (high_m >= length_m(axis) && axis.start + length_m(axis) < whole_m.1);
+        let (low_m, high_m) = (axis.start + low_m, axis.start + high_m);
+        let (is_before, is_behind) = (low_m <= first_m, high_m >= last_m);
+        let low_m = if is_before { whole_m.0 } else { low_m };
+        let high_m = if is_behind { whole_m.1 } else { high_m };
+        if found.force_95_n.is_none() {
+            return (if is_beyond_grid { whole_m } else { (low_m, high_m) }, None);
+        }
+        let told = probable().map(|stretch| stretch.force_95_n).reduce(around);
+        let (least_n, most_n) = told.filter(|_| !is_before && !is_behind).unwrap_or((0.0, *hardest_n));
+        let force_n = |response_n: f64| prior.force_of_response(response_n, 0.0).0;
+        ((low_m, high_m), Some((force_n(least_n), force_n(most_n))))
+    }
+}
+
+/// The interval around two.
+fn around(one: (f64, f64), other: (f64, f64)) -> (f64, f64) {
+    (one.0.min(other.0), one.1.max(other.1))
+}
+
+/// Length of a grid along a line.
+fn length_m(axis: Axis) -> f64 {
+    axis.step * (axis.count - 1) as f64
+}
+
+/// True for a contact that may be beyond the outermost presses.
+fn is_near((first_m, last_m): (f64, f64), contact: &ContactEstimate) -> bool {
+    /// Standard deviations.
+    const NEAR: f64 = 5.0;
+    let reach_m = NEAR * contact.uncertainty.map_or(f64::INFINITY, |u| u.covariance[0].sqrt());
+    let x_m = contact.position.x_m;
+    x_m - first_m <= reach_m || last_m - x_m <= reach_m
+}
