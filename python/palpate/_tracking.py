@@ -137,8 +137,8 @@ class TrackedContact(Result):
         Position along the surface in metres, speed in m/s, and force in newtons: of the shape (readings).
     x_sd, speed_sd, force_sd : ndarray of float64
         Their standard deviations.
-    x_95 : ndarray of float64
-        Ends of the position's 95 % interval, in metres: of the shape (readings, 2).
+    x_95, force_95 : ndarray of float64
+        Ends of the 95 % intervals of the position, in metres, and of the force, in newtons: of the shape (readings, 2).
     y, speed_y, y_sd, speed_y_sd, covariance_xy, y_95 : ndarray of float64 or None
         The same across a plane, with the covariance of x and y in m²; None on a line.
     """
@@ -150,6 +150,7 @@ class TrackedContact(Result):
     speed_sd: Floats
     force_sd: Floats
     x_95: Floats
+    force_95: Floats
     y: Floats | None = None
     speed_y: Floats | None = None
     y_sd: Floats | None = None
@@ -162,6 +163,7 @@ class TrackedContact(Result):
         if self.y is not None:
             columns["y [mm]"], columns["speed y [m/s]"] = 1e3 * self.y, self.speed_y
         columns["force [N]"] = self.force
+        columns["force low [N]"], columns["force high [N]"] = self.force_95.T
         columns["x low [mm]"], columns["x high [mm]"] = (1e3 * self.x_95).T
         if self.y_95 is not None:
             columns["y low [mm]"], columns["y high [mm]"] = (1e3 * self.y_95).T
@@ -248,8 +250,8 @@ class ContactState:
         Position along the surface in metres, speed in m/s, and force in newtons.
     x_sd, speed_sd, force_sd : float
         Their standard deviations.
-    x_95 : tuple of float
-        Ends of the position's 95 % interval, in metres.
+    x_95, force_95 : tuple of float
+        Ends of the 95 % intervals of the position, in metres, and of the force, in newtons.
     y, speed_y, y_sd, speed_y_sd, covariance_xy, y_95
         The same across a plane, with the covariance of x and y in m²; None on a line.
     """
@@ -261,6 +263,7 @@ class ContactState:
     speed_sd: float
     force_sd: float
     x_95: tuple[float, float]
+    force_95: tuple[float, float]
     y: float | None = None
     speed_y: float | None = None
     y_sd: float | None = None

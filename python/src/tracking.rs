@@ -330,6 +330,7 @@ fn contact_state<'py>(py: Python<'py>, contact: &Tracked) -> PyResult<Bound<'py,
         fields.set(name, value)?;
     }
     fields.set("x_95", contact.x_95_m)?;
+    fields.set("force_95", contact.force_interval_95_n())?;
     if let Some(across) = contact.across {
         for (name, value) in [
             ("y", across.y_m),
@@ -420,6 +421,9 @@ fn contact_fields(fields: &Fields<'_>, tracks: &[Track], at: usize, plane: bool)
     let ends = |(low, high): (f64, f64)| [low, high];
     let x_95 = contacts().map(|contact| contact.map_or([f64::NAN; 2], |contact| ends(contact.x_95_m)));
     fields.columns("x_95", x_95)?;
+    let force_95 = contacts()
+        .map(|contact| contact.map_or([f64::NAN; 2], |contact| ends(contact.force_interval_95_n())));
+    fields.columns("force_95", force_95)?;
     if !plane {
         return Ok(());
     }

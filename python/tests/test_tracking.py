@@ -63,6 +63,7 @@ def test_a_contact_on_a_beam_is_followed_as_the_command_follows_it(command, beam
     ]:
         assert close(getattr(track.first, name), [at.get(theirs) for at in told], unit), name
     assert close(track.x_95[:, 0], [at.get("x_95_mm", [None])[0] for at in told], MM)
+    assert close(track.first.force_95[:, 1], [at.get("force_95_n", [None, None])[1] for at in told])
     assert close(track.single.x, [at["single_mm"] for at in told], MM)
     assert list(track.single.status) == [at["single_status"] for at in told]
     assert track.errors is not None and track.errors["track"] < track.errors["single"]
@@ -113,14 +114,14 @@ def test_a_contact_on_a_plate_is_followed_as_the_command_follows_it(command, pla
 
 def assert_same_states(track, states, across=()):
     """Readings taken one by one are followed as all of them at once."""
-    nothing = {"x_95": (np.nan, np.nan), "y_95": (np.nan, np.nan)}
+    nothing = dict.fromkeys(("x_95", "y_95", "force_95"), (np.nan, np.nan))
     assert close([state.time for state in states], track.time) and close([state.touching for state in states], track.touching)
     assert close([state.two_touching for state in states], track.two_touching)
     for at, contact in enumerate([track.first, track.second]):
         if contact is None:
             continue
         each = [state.contacts[at] if len(state.contacts) > at else None for state in states]
-        for name in ("x", "speed", "force", "x_sd", "speed_sd", "force_sd", "x_95", *across):
+        for name in ("x", "speed", "force", "x_sd", "speed_sd", "force_sd", "x_95", "force_95", *across):
             ours = [nothing.get(name, np.nan) if one is None else getattr(one, name) for one in each]
             assert np.allclose(ours, getattr(contact, name), rtol=1e-9, atol=1e-15, equal_nan=True), name
     assert [state.single for state in states] == list(track.single)

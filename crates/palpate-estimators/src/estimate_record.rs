@@ -2,6 +2,7 @@
 
 use palpate_core::{ContactEstimate, Estimate, Mode};
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::normal_interval_95;
 use serde::Serialize;
 
 /// The word for an estimate near an end, of a force that is not known.
@@ -111,5 +112,13 @@ impl ContactRecord {
             trade_off: force_95_n.map(|_| TRADE_OFF),
             sd_force_n: uncertainty.and_then(|u| sd(u.covariance[5])),
         }
+    }
+
+    /// The 95 % interval of a force that is estimated, in N: its own where it trades off against the place, elsewhere that of a normal distribution;
+    /// `None` of a force that is known, not estimated, or not told at all.
+    pub fn force_interval_95_n(&self) -> Option<[f64; 2]> {
+        let normal =
+            || self.force_n.zip(self.sd_force_n).map(|(at_n, sd_n)| normal_interval_95(at_n, sd_n).into());
+        self.force_95_n.or_else(normal)
     }
 }

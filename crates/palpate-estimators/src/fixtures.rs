@@ -9,10 +9,10 @@ use palpate_mechanics::sensing::{ChannelModel, Layout, SensorKind};
 use palpate_mechanics::surface::modal::ModalBeam;
 use palpate_mechanics::surface::{Beam, Digit, Extent, ForceDirection, Motion, Plate};
 use palpate_mechanics::units::{Unit, gpa, microstrain, mm, newtons, um};
-use palpate_numerics::normal_interval_95;
 use palpate_testing::data;
 
 use crate::arrangement::Training;
+use crate::estimate_record::ContactRecord;
 use crate::recording::{Columns, Frame, Recording, Row};
 use crate::setup::Setup;
 
@@ -181,7 +181,6 @@ pub(crate) fn sheet_recording() -> Option<(Setup, Recording)> {
 
 /// The 95 % interval of an estimated contact's force: its own, or that of a normal distribution.
 pub(crate) fn force_95_n(contact: &ContactEstimate) -> (f64, f64) {
-    let uncertainty = contact.uncertainty.unwrap();
-    let normal = || normal_interval_95(contact.force_n.unwrap(), uncertainty.covariance[5].sqrt());
-    uncertainty.force_95_n.unwrap_or_else(normal)
+    let of_any_line = Extent::line(1.0).unwrap();
+    ContactRecord::new(contact, of_any_line).force_interval_95_n().unwrap().into()
 }

@@ -7,10 +7,9 @@ use crate::tare::{Taken, TareOption, Taring};
 use crate::{input, output};
 use palpate_estimators::digit::{DigitShape, ShapePoint};
 use palpate_estimators::estimate_record::{ContactRecord, EstimateRecord};
-use palpate_estimators::estimator::{ContactEstimate, Estimate, Locator, Uncertainty};
+use palpate_estimators::estimator::{Estimate, Locator, Uncertainty};
 use palpate_estimators::recording::csv_row;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::normal_interval_95;
 use serde::Serialize;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -143,11 +142,18 @@ fn csv(estimate: &Estimate, line: u64, extent: Extent) -> String {
             [x.0, x.1, y.0, y.1].map(mm).into_iter().take(2 * extent.dimensions()).collect()
         }
     });
-    let (low_n, high_n) = force_95_n(contact).unzip();
-    cells.extend([low_n, high_n].map(|end_n| end_n.map_or_else(String::new, |end_n| format!("{end_n:.4}"))));
-    cells.push(ContactRecord::new(contact, extent).trade_off.unwrap_or_default().to_owned());
+    let record = ContactRecord::new(contact, extent);
+    cells.extend(force_cells(&record));
+    cells.push(record.trade_off.unwrap_or_default().to_owned());
     cells.push(estimate.status.name().to_owned());
     csv_row(cells)
+}
+
+/// Cells of the ends of the force's 95 % interval; empty where it is not estimated.
+fn force_cells(contact: &ContactRecord) -> [String; 2] {
+    contact
+        .force_interval_95_n()
+        .map_or_else(Default::default, |ends_n| ends_n.map(|end_n| format!("{end_n:.4}")))
 }
 
 /// A line of JSON: all that the locator says of the reading in line `line` of its source, and the shape where it is asked for.
@@ -182,14 +188,4 @@ fn shape_point(point: &ShapePoint) -> impl Serialize {
         "y_mm": point.y_m * 1e3,
         "sd_mm": point.sd_m * 1e3,
     }
-}
-
-/// The ends of the 95 % interval of a force that is estimated: its own where it trades off against the place, elsewhere that of a normal distribution.
-fn force_95_n(contact: &ContactEstimate) -> Option<(f64, f64)> {
-    let uncertainty = contact.uncertainty.as_ref()?;
-    let normal = |force_n: f64| {
-        let sd_n = uncertainty.covariance[5].sqrt();
-        (sd_n > 0.0 && sd_n.is_finite()).then(|| normal_interval_95(force_n, sd_n))
-    };
-    uncertainty.force_95_n.or_else(|| contact.force_n.and_then(normal))
 }

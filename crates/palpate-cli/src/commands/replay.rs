@@ -190,9 +190,11 @@ fn is_the_same(estimate: &EstimateRecord, before: &Map<String, Value>) -> bool {
 fn begin(arguments: &Arguments, extent: Extent, out: &mut impl std::io::Write) -> Result<(), Failure> {
     let heading = match (arguments.json, extent) {
         (true, _) => "",
-        (_, Extent::Line { .. }) => "number,time_s,x_mm,force_n,x_low_mm,x_high_mm,status\n",
+        (_, Extent::Line { .. }) => {
+            "number,time_s,x_mm,force_n,x_low_mm,x_high_mm,force_low_n,force_high_n,status\n"
+        }
         (_, Extent::Plane { .. }) => {
-            "number,time_s,x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,status\n"
+            "number,time_s,x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,force_low_n,force_high_n,status\n"
         }
     };
     output::print(out, heading.as_bytes())
@@ -224,6 +226,7 @@ fn csv(line: &Line, extent: Extent) -> String {
     if is_plane {
         cells.extend(low_high(contact.y_95_mm));
     }
+    cells.extend(low_high(contact.force_interval_95_n()));
     cells.push(line.estimate.status.to_owned());
     csv_row(cells)
 }

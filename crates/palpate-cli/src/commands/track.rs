@@ -303,12 +303,13 @@ enum Columns {
 
 impl Columns {
     fn heading(self) -> String {
-        let one = "line,time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching";
-        let second = "position_2_mm,speed_2_m_per_s,force_2_n,low_2_mm,high_2_mm,two_touching";
+        let one =
+            "line,time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,force_low_n,force_high_n,touching";
+        let second = "position_2_mm,speed_2_m_per_s,force_2_n,low_2_mm,high_2_mm,force_low_2_n,force_high_2_n,two_touching";
         match self {
             Self::One => one.to_owned(),
             Self::Two => format!("{one},{second}"),
-            Self::Plane => "line,time_s,x_mm,y_mm,speed_x_m_per_s,speed_y_m_per_s,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,touching".to_owned(),
+            Self::Plane => "line,time_s,x_mm,y_mm,speed_x_m_per_s,speed_y_m_per_s,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,force_low_n,force_high_n,touching".to_owned(),
         }
     }
 
@@ -330,15 +331,19 @@ impl Columns {
 }
 
 fn cells_on_line(contact: Option<&Tracked>) -> Vec<String> {
-    let Some(tracked) = contact else { return vec![String::new(); 5] };
+    let Some(tracked) = contact else { return vec![String::new(); 7] };
     let (low_m, high_m) = tracked.x_95_m;
-    [tracked.x_m * 1e3, tracked.speed_m_per_s, tracked.force_n, low_m * 1e3, high_m * 1e3].map(cell).to_vec()
+    let (low_n, high_n) = tracked.force_interval_95_n();
+    let numbers =
+        [tracked.x_m * 1e3, tracked.speed_m_per_s, tracked.force_n, low_m * 1e3, high_m * 1e3, low_n, high_n];
+    numbers.map(cell).to_vec()
 }
 
 fn cells_on_plane(contact: Option<&Tracked>) -> Vec<String> {
     let on_plane = contact.and_then(|tracked| Some((tracked, tracked.across?)));
-    let Some((tracked, across)) = on_plane else { return vec![String::new(); 9] };
+    let Some((tracked, across)) = on_plane else { return vec![String::new(); 11] };
     let ((x_low_m, x_high_m), (y_low_m, y_high_m)) = (tracked.x_95_m, across.y_95_m);
+    let (low_n, high_n) = tracked.force_interval_95_n();
     let numbers = [
         tracked.x_m * 1e3,
         across.y_m * 1e3,
@@ -349,6 +354,8 @@ fn cells_on_plane(contact: Option<&Tracked>) -> Vec<String> {
         x_high_m * 1e3,
         y_low_m * 1e3,
         y_high_m * 1e3,
+        low_n,
+        high_n,
     ];
     numbers.map(cell).to_vec()
 }
@@ -380,6 +387,7 @@ fn json(track: &Track, line: u64, extent: Extent) -> Result<String, Failure> {
 fn contact_fields(tracked: &Tracked) -> impl Fields {
     let mm = |(low_m, high_m): (f64, f64)| [low_m * 1e3, high_m * 1e3];
     let [sd_m, sd_speed_m_per_s, sd_force_n] = tracked.sd;
+    let (low_n, high_n) = tracked.force_interval_95_n();
     let across = |across: Across| {
         fields! {
             "y_mm": across.y_m * 1e3,
@@ -398,6 +406,7 @@ fn contact_fields(tracked: &Tracked) -> impl Fields {
         "sd_mm": sd_m * 1e3,
         "sd_speed_m_per_s": sd_speed_m_per_s,
         "sd_force_n": sd_force_n,
+        "force_95_n": [low_n, high_n],
         ..tracked.across.map(across),
     }
 }

@@ -34,7 +34,9 @@ fn the_example_s_track_is_closer_than_its_readings() {
     let told = said(&output);
     assert_eq!(
         told.lines().next(),
-        Some("line,time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching")
+        Some(
+            "line,time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,force_low_n,force_high_n,touching"
+        )
     );
     let readings = fs::read_to_string(folder.path().join("moving.csv")).unwrap().lines().count() - 2;
     assert_eq!(told.lines().count() - 1, readings);
@@ -91,9 +93,9 @@ fn two_contacts_are_followed_in_columns_of_their_own() {
     said(&run(folder.path(), &["simulate", "rig.toml", "--moving", "-o", "moving.csv", "--seed", "1"]));
     let output = run(folder.path(), &["track", "locator.json", "moving.csv", "--rig", "rig.toml"]);
     let told = said(&output);
-    let heading = "line,time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching,position_2_mm,speed_2_m_per_s,force_2_n,low_2_mm,high_2_mm,two_touching";
+    let heading = "line,time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,force_low_n,force_high_n,touching,position_2_mm,speed_2_m_per_s,force_2_n,low_2_mm,high_2_mm,force_low_2_n,force_high_2_n,two_touching";
     assert_eq!(told.lines().next(), Some(heading));
-    assert!(told.lines().all(|line| line.split(',').count() == 14));
+    assert!(told.lines().all(|line| line.split(',').count() == 18));
     let filter = row(&output.stderr, "filter");
     assert!(filter[3] >= 2.5 && filter[6] >= 95.0, "{filter:?}");
     // Its beginning is enough for what does not depend on the errors.
@@ -130,10 +132,10 @@ fn a_contact_is_followed_over_a_plate() {
     let track = ["track", "locator.json", "moving.csv", "--smooth", "--report", "page"];
     let output = run(folder.path(), &track);
     let told = said(&output);
-    let heading = "line,time_s,x_mm,y_mm,speed_x_m_per_s,speed_y_m_per_s,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,touching";
+    let heading = "line,time_s,x_mm,y_mm,speed_x_m_per_s,speed_y_m_per_s,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,force_low_n,force_high_n,touching";
     assert_eq!(told.lines().next(), Some(heading));
     assert_eq!(told.lines().count() - 1, csv.lines().count() - 2);
-    assert!(told.lines().all(|line| line.split(',').count() == 12));
+    assert!(told.lines().all(|line| line.split(',').count() == 14));
     let (filter, smoother) = (row(&output.stderr, "filter"), row(&output.stderr, "smoother"));
     assert!(filter[3] >= 2.5, "{filter:?}");
     assert!(smoother[3] >= 4.0, "{smoother:?}");

@@ -182,6 +182,11 @@ impl Tracked {
         }
     }
 
+    /// The 95 % interval of the force, in newtons: [`force_95_n`](Self::force_95_n), or that of a normal distribution.
+    pub fn force_interval_95_n(&self) -> (f64, f64) {
+        self.force_95_n.unwrap_or_else(|| normal_interval_95(self.force_n, self.sd[2]))
+    }
+
     /// The contacts of beliefs with as many of them, each with its weight, the most probable first.
     fn from_mixture(beliefs: &[(f64, Vec<Moments>)], likelihood: &dyn Likelihood) -> Vec<Self> {
         let Some((weight, best)) = beliefs.first() else { return Vec::new() };

@@ -360,8 +360,7 @@ fn the_force_of_a_held_contact_is_within_what_calibration_leaves() {
             }
             let Some(tracked) = found else { continue };
             place += usize::from((tracked.x_95_m.0..=tracked.x_95_m.1).contains(&x_m));
-            let normal = (tracked.force_n - 1.96 * tracked.sd[2], tracked.force_n + 1.96 * tracked.sd[2]);
-            let (least_n, most_n) = tracked.force_95_n.unwrap_or(normal);
+            let (least_n, most_n) = tracked.force_interval_95_n();
             force += usize::from((least_n..=most_n).contains(&3.0));
         }
         assert!(place >= 17 && force >= 17, "{x_m} m: place {place} of 20, force {force} of 20");
