@@ -12,7 +12,8 @@
 //!   whatever the reading;
 //! - where influences are extrapolated beyond the outermost press, their variances are hardly more than a guess, and too large ones would exclude what they
 //!   leave open: there the determinant counts up to that of the best contact. A sensor beside the outermost press, which presses on one of its sides do not
-//!   show, leaves the influences of its channel beyond it open: the channel that explains a contact worst does not count ([`Contacts::extrapolates`]);
+//!   show, leaves the influences of its channel beyond it open: of more channels than unknowns the one that explains a contact worst does not count
+//!   ([`Contacts::extrapolates`]);
 //! - where a stretch of places in the region reaches an end, the estimate is their posterior median, the prior being flat in the place
 //!   and in the size of the signal, with the best force there. Of all estimates it has the least mean error over the places.
 //!
@@ -339,7 +340,10 @@ impl Contacts<'_> {
         let (force_n, is_held, spread) = self.best_force(x_m, buffer);
         // Summed, as |d|² − W·(2·d·f − W·|f|²) loses all digits of a good fit.
         let squares = || buffer.iter().map(|[d, f]| (d - force_n * f).powi(2));
-        let open = if self.extrapolates { squares().fold(0.0, f64::max) } else { 0.0 };
+        let unknowns = if let Force::Known(_) = self.force { 1 } else { 2 };
+        // Without it as many channels would explain every contact.
+        let leaves_out = self.extrapolates && buffer.len() > unknowns;
+        let open = if leaves_out { squares().fold(0.0, f64::max) } else { 0.0 };
         let misfit = squares().sum::<f64>() - open;
         let ff: f64 = buffer.iter().map(|[_, f]| f * f).sum();
         let across = ends.iter().map(|end| {
@@ -537,6 +541,33 @@ mod tests {
         let (least_n, most_n) = found.force_95_n.unwrap();
         assert!((least_n - 0.3).abs() < 0.01 && most_n == 30.0, "{found:?}");
         assert!((stretch.x_m * stretch.force_n - 0.3).abs() < 1e-9, "{found:?}");
+    }
+
+    #[test]
+    fn one_channel_may_be_anything_beyond_the_presses_where_the_others_tell_the_place() {
+        // Sensors that read the place, its square and so on, under a known force of 1 N at 0.5 m.
+        let not_excluded = |channels: i32, wrong: f64| {
+            let channels = move |x_m: f64, _: f64, out: &mut Vec<[f64; 2]>| {
+                out.clear();
+                let reads = |k: i32, x_m: f64| 1e3 * f64::from(k + 1) * x_m.powi(k + 1);
+                let wrong = |k: i32| if k == 0 { wrong } else { 0.0 };
+                out.extend((0..channels).map(|k| [reads(k, 0.5) + wrong(k), reads(k, x_m)]));
+                0.0
+            };
+            let contacts = Contacts {
+                length_m: 1.0,
+                force: Force::Known(1.0),
+                widening: 1.0,
+                reference_force_n: 1.0,
+                extrapolates: true,
+                channels: &channels,
+            };
+            contacts.not_excluded(&[0.5]).unwrap().x_95_m
+        };
+        for (channels, wrong) in [(3, 0.0), (3, 50.0), (2, 0.0), (1, 0.0)] {
+            let (low_m, high_m) = not_excluded(channels, wrong);
+            assert!(low_m <= 0.5 && 0.5 <= high_m && high_m - low_m < 0.1, "{channels}: {low_m} to {high_m}");
+        }
     }
 }
 
