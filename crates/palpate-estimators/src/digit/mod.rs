@@ -229,8 +229,7 @@ impl DigitLocator {
             return Estimate::of_position(Position::default(), Status::OutsideModel);
         };
         let length_m = self.digit.length_m();
-        let quantile_m = |share: f64| posterior.quantile_m(share, length_m);
-        let ends = (quantile_m(0.025), quantile_m(0.975));
+        let ends = posterior.interval_95_m(best.best.position_m, length_m);
         let mut estimate = Estimate::of_contact(contact(best, ends), Status::Located);
         if !explained {
             estimate.status = Status::OutsideModel;
@@ -247,6 +246,11 @@ impl DigitLocator {
         }
         estimate
     }
+}
+
+/// The shorter of two intervals.
+fn shorter(one: (f64, f64), other: (f64, f64)) -> (f64, f64) {
+    if other.1 - other.0 < one.1 - one.0 { other } else { one }
 }
 
 /// Whether two pieces are two places, not the two sides of a gauge.
@@ -383,6 +387,24 @@ impl Posterior {
         for piece in &mut self.pieces {
             piece.probability = (piece.log_weight - most).exp() / total;
         }
+    }
+
+    /// The 95 % interval of the position, which holds the estimate.
+    ///
+    /// Beside the clamp and the tip equal tails would cut contacts there off: of the intervals that leave equal tails, the lower or the upper tail, it is
+    /// the shortest.
+    fn interval_95_m(&self, estimate_m: f64, length_m: f64) -> (f64, f64) {
+        let quantile_m = |share: f64| self.quantile_m(share, length_m);
+        let (low_m, high_m) = (quantile_m(0.025), quantile_m(0.975));
+        let width_m = high_m - low_m;
+        let mut shortest = (low_m, high_m);
+        if low_m < width_m {
+            shortest = shorter(shortest, (0.0, quantile_m(0.95)));
+        }
+        if length_m - high_m < width_m {
+            shortest = shorter(shortest, (quantile_m(0.05), length_m));
+        }
+        (shortest.0.min(estimate_m), shortest.1.max(estimate_m))
     }
 
     /// The position below which the contact lies with probability `share`, by bisection.

@@ -110,6 +110,37 @@ fn beyond_the_second_gauge_position_force_and_shape_are_at_their_limits() {
     }
 }
 
+#[test]
+fn soft_contacts_beside_the_tip_are_in_their_intervals_and_so_is_every_estimate() {
+    const COUNT: usize = 300;
+    let setup = fixtures::digit(ForceDirection::Normal, 4.0).setup;
+    for known in [false, true] {
+        for (force_n, x_mm) in
+            [(0.01, 110.0), (0.01, 118.0), (0.01, 119.7), (0.05, 118.0), (0.05, 119.7), (0.5, 119.7)]
+        {
+            let pressed = setup.clone().known_force(force_n).unwrap();
+            let locator = locator(if known { &pressed } else { &setup }, DigitTheory::Exact);
+            let position = Position::along(1e-3 * x_mm);
+            let recording = simulate_at(&pressed, &[position], COUNT, 9).unwrap();
+            let (mut told, mut held) = (0, 0);
+            for row in &recording.rows {
+                let estimate = locator.locate(&row.reading).unwrap();
+                let Some(uncertainty) = estimate.contact.uncertainty else { continue };
+                let (low_m, high_m) = uncertainty.x_95_m;
+                told += 1;
+                held += usize::from((low_m..=high_m).contains(&position.x_m));
+                let found_m = estimate.contact.position.x_m;
+                assert!((low_m..=high_m).contains(&found_m), "{found_m}: {low_m} to {high_m}");
+            }
+            println!("{force_n} N at {x_mm} mm, known {known}: {held} of {told} held");
+            assert!(
+                told >= COUNT / 2 && 100 * held >= 90 * told,
+                "{force_n} N at {x_mm} mm: {held} of {told}"
+            );
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]

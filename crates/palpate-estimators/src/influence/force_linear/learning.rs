@@ -426,13 +426,16 @@ impl Search<'_> {
         Ok(self.found(prior, &[]))
     }
 
-    /// The prior with another drift, where that is more probable by [`LEAST_GAIN`] than `best`, the evidence of `prior`.
+    /// The prior with another drift, where that is more probable by [`LEAST_GAIN`] than `best`, the evidence of `prior`, and the presses can tell one.
     fn drift(
         &mut self,
         best: f64,
         prior: &Prior,
         sensors_m: &[Vec<f64>],
     ) -> Result<Option<(f64, Prior)>, Cancelled> {
+        if !self.presses.tells_drift() {
+            return Ok(None);
+        }
         let drifts = DriftCourse::ALL
             .into_iter()
             .flat_map(|drift_course| DRIFTS.map(|drift| Prior { drift, drift_course, ..prior.clone() }));
@@ -513,6 +516,7 @@ impl Search<'_> {
         let plane = dimensions == 2;
         let of_length = |source: Source, share: f64, length: f64| Prior {
             source: Some(source),
+            // On a plane a squared exponential is more probable, but claims to know more between a few places than it does.
             kernel: Kernel::Matern52,
             smooth_part: share,
             lengths_m: vec![length * length_m; dimensions],

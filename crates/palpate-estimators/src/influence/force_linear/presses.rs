@@ -4,7 +4,7 @@ use crate::recording::{LEAST_FREEDOM, Recording};
 use crate::setup::Setup;
 use crate::thinning::thinned;
 use ndarray::{Array2, Axis as Dimension};
-use palpate_numerics::mean;
+use palpate_numerics::{mean, mean_and_variance};
 use std::cmp::Ordering;
 use std::sync::Arc;
 
@@ -149,6 +149,37 @@ impl Presses {
         forces.sort_by(f64::total_cmp);
         forces.dedup();
         forces.len()
+    }
+
+    /// True where presses can tell a drift of the offsets from influences that change along the surface.
+    ///
+    /// Presses of one force that go once along the surface have a time for each place, and what changes with the one changes with the other. They tell it by
+    /// different forces, by untouched rows far apart in time, or where neighbours in place were pressed at different times: where the mean square of the
+    /// steps of the time between neighbours is a good part of twice its variance (von Neumann, Annals of Mathematical Statistics 12, 1941).
+    pub fn tells_drift(&self) -> bool {
+        /// Standard deviation of the forces over their mean.
+        const LEAST_FORCES: f64 = 0.1;
+        /// Share of the recording between untouched rows.
+        const LEAST_SPAN: f64 = 0.5;
+        /// Mean square of the steps over the variance: near 2 in random order.
+        const LEAST_STEPS: f64 = 0.5;
+        let (untouched, mut pressed): (Vec<usize>, Vec<usize>) =
+            (0..self.len()).partition(|i| self.force_n[*i] == 0.0);
+        let (mean_n, variance_n2) = mean_and_variance(pressed.iter().map(|i| self.force_n[*i]));
+        if variance_n2.sqrt() >= LEAST_FORCES * mean_n.abs() {
+            return true;
+        }
+        let times = || untouched.iter().map(|i| self.time[*i]);
+        if times().fold(f64::NEG_INFINITY, f64::max) - times().fold(f64::INFINITY, f64::min) >= LEAST_SPAN {
+            return true;
+        }
+        pressed.sort_by(|a, b| {
+            let by_time = self.time[*a].total_cmp(&self.time[*b]);
+            compare(&self.positions_m[*a], &self.positions_m[*b]).then(by_time)
+        });
+        let (_, variance) = mean_and_variance(pressed.iter().map(|i| self.time[*i]));
+        let steps = pressed.windows(2).map(|pair| (self.time[pair[1]] - self.time[pair[0]]).powi(2));
+        pressed.len() > 1 && mean(steps) >= LEAST_STEPS * variance
     }
 
     /// Distinct positions that were pressed, in rising order.

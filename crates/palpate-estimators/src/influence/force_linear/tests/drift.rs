@@ -207,3 +207,40 @@ fn many_presses_under_drift_are_condensed_with_hardly_a_loss() {
     assert!(few_mm < 1.12 * all_mm, "{few_mm} mm, {all_mm} mm");
     assert!(few_covered > all_covered - 0.02, "{few_covered}, {all_covered}");
 }
+
+#[test]
+fn presses_of_one_force_in_order_along_a_strip_tell_no_drift() {
+    const LENGTH_M: f64 = 0.4;
+    const PLACES: usize = 8;
+    const TIMES: usize = 3;
+    let gauges = |rng: &mut Xoshiro256PlusPlus| -> Vec<f64> {
+        (0..GAUGES).map(|_| rng.random_range(0.02..LENGTH_M - 0.02)).collect()
+    };
+    let mut covered = (0, 0);
+    for seed in 0..20 {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let gauges = gauges(&mut rng);
+        // Bending moments of a strip on two supports.
+        let influences: Influences = Box::new(move |at| {
+            let moment = |gauge: &f64| gauge.min(at.x_m) * (LENGTH_M - gauge.max(at.x_m)) / LENGTH_M;
+            gauges.iter().map(|gauge| 2000.0 * moment(gauge)).collect()
+        });
+        let mut bench = Bench::new(Extent::line(LENGTH_M).unwrap(), GAUGES, influences, Vec::new(), rng);
+        let place = |i: usize| Position::along(0.03 + 0.34 * i as f64 / (PLACES - 1) as f64);
+        let presses = (0..PLACES * TIMES).map(|i| (place(i / TIMES), 3.0));
+        let untouched = (0..10).map(|_| (Position::default(), 0.0));
+        bench.presses = presses.chain(untouched).map(|(at, force_n)| bench.row(at, force_n)).collect();
+        let setup = bench.setup().known_force(3.0).unwrap();
+        let recording = bench.recording();
+        let locator = fit(FitTask::new(&setup, &recording), Structure::ForceLinear).unwrap().unwrap();
+        assert_eq!(locator.drift_course(), None, "board {seed}");
+        for _ in 0..20 {
+            let x_m = bench.rng.random_range(0.04..0.36);
+            let reading = bench.counts(Position::along(x_m), 3.0);
+            let (low_m, high_m) = locator.locate(&reading).contact.uncertainty.unwrap().x_95_m;
+            covered = (covered.0 + usize::from((low_m..=high_m).contains(&x_m)), covered.1 + 1);
+        }
+    }
+    eprintln!("{covered:?} covered");
+    assert!(10 * covered.0 >= 9 * covered.1, "{covered:?}");
+}
