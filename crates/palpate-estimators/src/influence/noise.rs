@@ -1,6 +1,6 @@
 //! What the noise of the channels does to a comparison of readings.
 
-use ndarray::{Array2, ArrayView1};
+use ndarray::{Array2, ArrayView1, Axis};
 
 use palpate_numerics::{Cholesky, NotPositiveDefinite, symmetric_eigen};
 
@@ -64,12 +64,14 @@ pub(super) struct Noise {
     pub gain: f64,
 }
 
+/// Degrees of freedom that tell a variance; of each channel, their covariance.
+const LEAST_FREEDOM: usize = 4;
 /// Rounds of the iteration that tells gain from noise.
 const ROUNDS: usize = 40;
 
 impl Noise {
-    /// From repeats: `places` says of each row where it belongs, `means` are the places' mean outputs. `None` with too
-    /// few repeats: less than 4 degrees of freedom a channel.
+    /// From repeats: `places` says of each row where it belongs, `means` are the places' mean outputs. `None` with less than 4 degrees of freedom. With less
+    /// than 4 for each channel the channels' variances are told, but not how they go together.
     ///
     /// Each deviation is a·f + e with f the place's mean and a a gain error. C and γ are those of greatest likelihood,
     /// found by expectation and maximisation (Dempster, Laird and Rubin 1977); without gain, C is the pooled covariance. The
@@ -84,7 +86,7 @@ impl Noise {
         let channels = outputs.ncols();
         let rows: Vec<usize> = repeats(places, means.nrows());
         let freedom = places.len() - rows.iter().filter(|rows| **rows > 0).count();
-        if freedom < 4 * channels {
+        if freedom < LEAST_FREEDOM {
             return Ok(None);
         }
         // A mean of n rows takes a share of 1/n of their scatter with it.
@@ -96,6 +98,13 @@ impl Noise {
         });
         let count = used.len() as f64;
         let floor = Array2::from_diag(&ArrayView1::from(floor));
+        if freedom < LEAST_FREEDOM * channels {
+            // That of Student's t, whose variance few repeats told.
+            let freedom = freedom as f64;
+            let squares = deviations.map(|deviation| deviation * deviation).sum_axis(Axis(0));
+            let variances = squares * (freedom / (freedom - 2.0) / count);
+            return Ok(Some(Self { covariance: Array2::from_diag(&variances) + floor, gain: 0.0 }));
+        }
         let mut noise = Self { covariance: deviations.t().dot(&deviations) / count + &floor, gain: 0.0 };
         if with_gain {
             noise.gain = 0.05;

@@ -150,7 +150,10 @@ impl Presses {
             .collect();
         let repeats = Noise::of_repeats(&self.places, &self.outputs, &self.means, &floor, with_gain)?;
         let fitted = || {
-            let variances = (0..channels).map(|j| process.noise_variance(j).unwrap_or_default() + floor[j]);
+            // The process sees means of so many rows.
+            let rows = self.outputs.nrows() as f64 / self.means.nrows() as f64;
+            let variances =
+                (0..channels).map(|j| rows * process.noise_variance(j).unwrap_or_default() + floor[j]);
             Noise { covariance: Array2::from_diag(&Array1::from_iter(variances)), gain: 0.0 }
         };
         Ok(repeats.unwrap_or_else(fitted))
@@ -266,13 +269,15 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     limit
 }
 
-/// Distinct positions from which on some can be held out.
-const LEAST_TO_JUDGE: usize = 15;
+/// Distinct positions from which on every fifth is held out at once; of fewer each but the outermost by itself, so that enough is left to learn from.
+const MANY_TO_JUDGE: usize = 15;
+/// Distinct positions of which one can be held out.
+const LEAST_TO_JUDGE: usize = 5;
 /// The least and the greatest factor that is believed: with fewer rows to learn from, a factor below 1 says little.
 const FACTORS: (f64, f64) = (1.0, 5.0);
 
 /// By what factor position errors at positions that were not learnt exceed what noise and process say, as a deviation:
-/// every fifth position is held out of the same process. `None` with too few positions to tell.
+/// every fifth position is held out of the same process, or of few each in turn. `None` with too few positions to tell.
 ///
 /// It is what the smoothness that the process found does not know of: texture that repeats itself, presses a little
 /// off. For a residual r with covariance V, and the slopes J of the mean by position and nuisance coordinate, the error is
@@ -285,33 +290,35 @@ pub(super) fn misfit(
     watch: Watch,
 ) -> Result<Option<f64>, MeasuredError> {
     let (dimensions, searched) = (presses.dimensions(), presses.searched());
-    let Some(held) = held_out(presses, dimensions) else { return Ok(None) };
-    let kept: Vec<usize> = (0..held.len()).filter(|i| !held[*i]).collect();
-    let coordinates = presses.coordinates.select(ndarray::Axis(0), &kept);
-    let means = presses.means.select(ndarray::Axis(0), &kept);
-    let samples = Samples { coordinates: coordinates.view(), outputs: means.view(), noise_variance: None };
-    let other = regression.condition(samples, process.hyperparameters(), watch)?;
-
-    let mut known: Vec<Option<Prediction>> = vec![None; held.len()];
     let (mut square, mut count) = (0.0, 0);
-    for (place, output) in presses.places.iter().zip(presses.outputs.outer_iter()) {
-        if !held[*place] {
-            continue;
-        }
-        let at = presses.coordinates.row(*place).to_vec();
-        let prediction =
-            known[*place].get_or_insert_with(|| Prediction::new(&other, &at, searched, whitening));
-        if let Some(score) = prediction.score(&output.to_vec(), whitening, dimensions) {
-            square += score;
-            count += dimensions;
+    for held in held_out(presses, dimensions) {
+        let kept: Vec<usize> = (0..held.len()).filter(|i| !held[*i]).collect();
+        let coordinates = presses.coordinates.select(ndarray::Axis(0), &kept);
+        let means = presses.means.select(ndarray::Axis(0), &kept);
+        let samples =
+            Samples { coordinates: coordinates.view(), outputs: means.view(), noise_variance: None };
+        let other = regression.condition(samples, process.hyperparameters(), watch)?;
+
+        let mut known: Vec<Option<Prediction>> = vec![None; held.len()];
+        for (place, output) in presses.places.iter().zip(presses.outputs.outer_iter()) {
+            if !held[*place] {
+                continue;
+            }
+            let at = presses.coordinates.row(*place).to_vec();
+            let prediction =
+                known[*place].get_or_insert_with(|| Prediction::new(&other, &at, searched, whitening));
+            if let Some(score) = prediction.score(&output.to_vec(), whitening, dimensions) {
+                square += score;
+                count += dimensions;
+            }
         }
     }
     let factor = (square / count as f64).sqrt();
     Ok(factor.is_finite().then(|| factor.clamp(FACTORS.0, FACTORS.1)))
 }
 
-/// Whether the position of each press is one of those held out: every fifth, sorted.
-fn held_out(presses: &Presses, dimensions: usize) -> Option<Vec<bool>> {
+/// Whether the position of each press is one of those held out, for every time that some are.
+fn held_out(presses: &Presses, dimensions: usize) -> Vec<Vec<bool>> {
     let places: Vec<Vec<f64>> =
         presses.coordinates.outer_iter().map(|at| at.slice(s![..dimensions]).to_vec()).collect();
     let order = |a: &Vec<f64>, b: &Vec<f64>| {
@@ -320,11 +327,14 @@ fn held_out(presses: &Presses, dimensions: usize) -> Option<Vec<bool>> {
     let mut positions = places.clone();
     positions.sort_by(order);
     positions.dedup();
-    if positions.len() < LEAST_TO_JUDGE {
-        return None;
-    }
     let index = |place: &Vec<f64>| positions.partition_point(|other| order(other, place).is_lt());
-    Some(places.iter().map(|place| index(place) % 5 == 2).collect())
+    let of_index =
+        |is_held: &dyn Fn(usize) -> bool| places.iter().map(|place| is_held(index(place))).collect();
+    match positions.len() {
+        ..LEAST_TO_JUDGE => Vec::new(),
+        count @ ..MANY_TO_JUDGE => (1..count - 1).map(|held| of_index(&|index| index == held)).collect(),
+        _ => vec![of_index(&|index| index % 5 == 2)],
+    }
 }
 
 /// Prediction of the process at a place, whitened.

@@ -13,11 +13,12 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::{MeasuredError, MeasuredInfluence, MeasuredLocator, NuisanceRole, Scale};
 use crate::evaluation::cross_validate;
 use crate::fit::{Fit, FitTask, Locate};
-use crate::fixtures::{pad, pad_recording, raw_recording, raw_setup, strip_recording};
+use crate::fixtures::{pad, pad_recording, paper, raw_recording, raw_setup, readings, strip_recording};
 use crate::influence::{Influence, InfluenceSource};
 use crate::recording::{Recording, Row};
 use crate::setup::Setup;
-use palpate_mechanics::contact::Position;
+use crate::simulate::clean_reading;
+use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::mm;
 
@@ -440,4 +441,69 @@ fn a_further_nuisance_coordinate_that_never_changes_does_nothing_and_a_missing_o
     assert_eq!(error, MeasuredError::NuisanceMissing { what: "nuisance coordinate", row: 5 });
     recording.rows.iter_mut().for_each(|row| row.nuisances.truncate(1));
     assert_eq!(with, fit(&setup, &recording));
+}
+
+/// The paper's beam as raw channels with noise of 5 µm, pressed with a weight so often at each of so many even places, never untouched.
+fn weighed((places, times): (usize, usize), from_m: f64, rng: &mut Xoshiro256PlusPlus) -> (Setup, Recording) {
+    let names = ["a", "b", "c", "d", "e", "f", "g", "h"];
+    let setup = Setup::measured(0.4, &names).unwrap().known_force(3.0).unwrap();
+    let place = |i: usize| from_m + (0.4 - 2.0 * from_m) * i as f64 / (places - 1) as f64;
+    let rows = (0..places * times).map(|i| weight(place(i / times), rng)).collect();
+    let recording = Recording::new(setup.layout(), "weighed", rows);
+    (setup, recording)
+}
+
+fn weight(x_m: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
+    const NOISE_M: f64 = 5e-6;
+    let setup = paper(NOISE_M, 1).setup;
+    let position = Position::along(x_m);
+    let contact = Contact { position, force_n: 3.0 };
+    let clean = clean_reading(setup.surface().model().unwrap(), setup.layout(), contact);
+    let reading = clean.into_iter().map(|value| value / NOISE_M + noise(rng)).collect();
+    Row { position, force_n: None, nuisances: Vec::new(), time_s: None, reading }
+}
+
+#[test]
+fn presses_of_one_weight_without_untouched_rows_have_intervals_that_hold() {
+    const BOARDS: usize = 5;
+    let readings = readings(100);
+    let mut wrong = Vec::new();
+    eprintln!("| places × times | 30 mm | 50 mm | 80 mm | 120 mm | 200 mm |\n|---|---|---|---|---|---|");
+    for (presses, from_m) in [
+        ((6, 5), 0.04),
+        ((8, 4), 0.03),
+        ((12, 2), 0.02),
+        ((12, 3), 0.0167),
+        ((20, 2), 0.02),
+        ((12, 10), 0.02),
+    ] {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(16);
+        let locators: Vec<MeasuredLocator> = (0..BOARDS)
+            .map(|_| {
+                let (setup, recording) = weighed(presses, from_m, &mut rng);
+                fit(&setup, &recording)
+            })
+            .collect();
+        let mut cells = format!("| {} × {}", presses.0, presses.1);
+        for x_m in [0.03, 0.05, 0.08, 0.12, 0.2] {
+            let (mut held, mut doubted, mut width_mm) = (0, 0, 0.0);
+            for i in 0..readings {
+                let estimate = locators[i % BOARDS].locate(&weight(x_m, &mut rng).reading);
+                let (low_m, high_m) = estimate.contact.uncertainty.unwrap().x_95_m;
+                doubted += usize::from(estimate.status == Status::OutsideModel);
+                held +=
+                    usize::from((low_m..=high_m).contains(&x_m) || estimate.status == Status::OutsideModel);
+                width_mm += 1e3 * (high_m - low_m) / readings as f64;
+            }
+            let percent = |count: usize| 100.0 * count as f64 / readings as f64;
+            cells +=
+                &format!(" | {:.0} %, {:.0} % doubted, {width_mm:.2} mm", percent(held), percent(doubted));
+            // Six places leave between two of them more open than the process says.
+            if presses.0 >= 8 && percent(held) < 85.0 {
+                wrong.push(format!("{presses:?}, {x_m} m: {held} of {readings}"));
+            }
+        }
+        eprintln!("{cells} |");
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
