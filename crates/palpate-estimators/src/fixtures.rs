@@ -179,8 +179,9 @@ pub(crate) fn sheet_recording() -> Option<(Setup, Recording)> {
     Some((setup, recording))
 }
 
-/// The 95 % interval of an estimated contact's force: its own, or that of a normal distribution.
+/// The 95 % interval of a contact's force: its own, or that of a normal distribution; of a known force nothing but this.
 pub(crate) fn force_95_n(contact: &ContactEstimate) -> (f64, f64) {
     let of_any_line = Extent::line(1.0).unwrap();
-    ContactRecord::new(contact, of_any_line).force_interval_95_n().unwrap().into()
+    let known_n = contact.force_n.unwrap();
+    ContactRecord::new(contact, of_any_line).force_interval_95_n().map_or((known_n, known_n), Into::into)
 }

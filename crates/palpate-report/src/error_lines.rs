@@ -59,7 +59,7 @@ pub(super) fn limit_in_words(chart: &Chart) -> String {
     let Some(line) = chart.series.iter().find(|series| series.label.starts_with(LABEL)) else {
         return String::new();
     };
-    let mut words = " Black dashes: the limit, which is the mean error of the best unbiased estimator for noisy readings and a \
+    let mut words = " Dashes without a colour: the limit, which is the mean error of the best unbiased estimator for noisy readings and a \
                      known force (Cramér–Rao bound)."
         .to_owned();
     if line.label == assumed_label() {

@@ -227,7 +227,9 @@ fn single(report: &StudyReport, arm: &Arm, colour: usize) -> Option<Figure> {
         (chart, words)
     } else {
         let limit = limit_of(arm, 6, "limit: what physics allows");
-        let words = limit.as_ref().map_or("", |_| " Black dashes: the limit for a force that is not known.");
+        let words = limit
+            .as_ref()
+            .map_or("", |_| " Dashes without a colour: the limit for a force that is not known.");
         let series = errors(report, &line, true).into_iter().chain(limit).collect();
         (chart_of_errors(report, &title, series), words.to_owned())
     };

@@ -74,9 +74,7 @@ impl Row {
             }
             let found = estimate.contact;
             let uncertainty = found.uncertainty.unwrap();
-            let is_known = uncertainty.covariance[5] == 0.0;
-            let force_95_n = if is_known { (force_n, force_n) } else { force_95_n(&found) };
-            let intervals = [uncertainty.x_95_m, uncertainty.y_95_m, force_95_n];
+            let intervals = [uncertainty.x_95_m, uncertainty.y_95_m, force_95_n(&found)];
             let held = |values: [f64; 3]| {
                 [0, 1, 2].map(|k| intervals[k].0 <= values[k] && values[k] <= intervals[k].1)
             };
