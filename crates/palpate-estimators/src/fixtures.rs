@@ -1,5 +1,9 @@
 //! Setups that tests of several modules share: those of the examples, as values.
 
+mod covered;
+
+pub(crate) use covered::Covered;
+
 use std::fs::File;
 
 use palpate_core::ContactEstimate;

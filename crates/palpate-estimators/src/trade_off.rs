@@ -23,7 +23,7 @@
 use std::sync::OnceLock;
 
 use palpate_core::{ContactEstimate, Estimate, Mode, Position, Status, Uncertainty};
-use palpate_numerics::{bisect, normal_cdf, normal_interval_95};
+use palpate_numerics::{bisect, hull, normal_cdf, normal_interval_95};
 
 use crate::status::OTHER_PLACE;
 
@@ -82,7 +82,8 @@ pub(crate) struct Contacts<'a> {
     pub widening: f64,
     /// The force at which channels are weighed first, in newtons.
     pub reference_force_n: f64,
-    /// True where influences near the ends are extrapolated: contacts whose reading they leave open are not excluded for that.
+    /// True where influences near the ends are extrapolated: contacts whose reading they leave open are not excluded for that, and one channel may be
+    /// anything.
     pub extrapolates: bool,
     /// d and f of every channel.
     pub channels: &'a Channels<'a>,
@@ -231,10 +232,7 @@ impl Contacts<'_> {
         let all: f64 = stretches.iter().map(|stretch| stretch.probability).sum();
         stretches.iter_mut().for_each(|stretch| stretch.probability /= all);
         stretches.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        let around = |of: fn(&Stretch) -> (f64, f64)| {
-            let hull = |hull: (f64, f64), one: (f64, f64)| (hull.0.min(one.0), hull.1.max(one.1));
-            stretches.iter().map(of).reduce(hull)
-        };
+        let around = |of: fn(&Stretch) -> (f64, f64)| stretches.iter().map(of).reduce(hull);
         let is_known = matches!(self.force, Force::Known(_));
         let x_95_m = around(|s| s.x_95_m)?;
         let force_95_n = if is_known { None } else { around(|s| s.force_95_n) };
@@ -341,7 +339,7 @@ impl Contacts<'_> {
         // Summed, as |d|² − W·(2·d·f − W·|f|²) loses all digits of a good fit.
         let squares = || buffer.iter().map(|[d, f]| (d - force_n * f).powi(2));
         let unknowns = if let Force::Known(_) = self.force { 1 } else { 2 };
-        // Without it as many channels would explain every contact.
+        // Of no more channels than unknowns those that are left would explain any contact.
         let leaves_out = self.extrapolates && buffer.len() > unknowns;
         let open = if leaves_out { squares().fold(0.0, f64::max) } else { 0.0 };
         let misfit = squares().sum::<f64>() - open;

@@ -13,6 +13,18 @@ pub fn normal_interval_95(mean: f64, sd: f64) -> (f64, f64) {
     (mean - NORMAL_95 * sd, mean + NORMAL_95 * sd)
 }
 
+/// The least interval that holds two.
+#[inline]
+pub fn hull(one: (f64, f64), other: (f64, f64)) -> (f64, f64) {
+    (one.0.min(other.0), one.1.max(other.1))
+}
+
+/// An interval with a value added.
+#[inline]
+pub fn holding(interval: (f64, f64), value: f64) -> (f64, f64) {
+    hull(interval, (value, value))
+}
+
 /// An interval without what of it is below 0 or above `size`.
 #[inline]
 pub fn clamped_interval((low, high): (f64, f64), size: f64) -> (f64, f64) {

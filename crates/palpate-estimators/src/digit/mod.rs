@@ -23,7 +23,7 @@ use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Digit, Elastica, Surface, SurfaceSpec};
 use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::Cancelled;
-use palpate_numerics::{bisect, clamped_interval, normal_cdf, normal_interval_95};
+use palpate_numerics::{bisect, clamped_interval, holding, normal_cdf, normal_interval_95};
 
 /// The flexible digit's estimator: maximum likelihood over position and force. It needs the digit, its gauges and their
 /// noise, and learns nothing from a recording.
@@ -404,7 +404,7 @@ impl Posterior {
         if length_m - high_m < width_m {
             shortest = shorter(shortest, (quantile_m(0.05), length_m));
         }
-        (shortest.0.min(estimate_m), shortest.1.max(estimate_m))
+        holding(shortest, estimate_m)
     }
 
     /// The position below which the contact lies with probability `share`, by bisection.

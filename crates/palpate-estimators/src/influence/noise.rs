@@ -1,6 +1,6 @@
 //! What the noise of the channels does to a comparison of readings.
 
-use ndarray::{Array2, ArrayView1, Axis};
+use ndarray::{Array2, ArrayView1};
 
 use palpate_numerics::{Cholesky, NotPositiveDefinite, symmetric_eigen};
 
@@ -98,14 +98,14 @@ impl Noise {
         });
         let count = used.len() as f64;
         let floor = Array2::from_diag(&ArrayView1::from(floor));
+        let covariance = deviations.t().dot(&deviations) / count;
         if freedom < LEAST_FREEDOM * channels {
-            // That of Student's t, whose variance few repeats told.
-            let freedom = freedom as f64;
-            let squares = deviations.map(|deviation| deviation * deviation).sum_axis(Axis(0));
-            let variances = squares * (freedom / (freedom - 2.0) / count);
-            return Ok(Some(Self { covariance: Array2::from_diag(&variances) + floor, gain: 0.0 }));
+            // The variance of Student's t, as few repeats told it.
+            let students = freedom as f64 / (freedom as f64 - 2.0);
+            let variances = Array2::from_diag(&covariance.diag()) * students;
+            return Ok(Some(Self { covariance: variances + floor, gain: 0.0 }));
         }
-        let mut noise = Self { covariance: deviations.t().dot(&deviations) / count + &floor, gain: 0.0 };
+        let mut noise = Self { covariance: covariance + &floor, gain: 0.0 };
         if with_gain {
             noise.gain = 0.05;
             let here = Array2::from_shape_fn(deviations.dim(), |(i, j)| means[[places[used[i]], j]]);

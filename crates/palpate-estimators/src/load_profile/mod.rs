@@ -43,8 +43,8 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
 use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface, UniformLoad, Unsolvable};
 use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_numerics::{Cholesky, median, normal_interval_95};
-use patches::{Part, centre_of, find_patches, holds, hull, mean_position};
+use palpate_numerics::{Cholesky, holding, hull, median, normal_interval_95};
+use patches::{Part, centre_of, find_patches, holds, mean_position};
 use smoothness::{Mixture, Problem};
 
 /// One channel of a reading.
@@ -297,7 +297,7 @@ impl<'a> Profiler<'a> {
     fn bounds(&self, y: &Array1<f64>, total_n: f64) -> ForceBounds {
         let influence = &self.problem.influence;
         let cells = self.cells.len();
-        let total_95_n = hull(Bounds::new(influence, y).of_sum(&Array1::ones(cells)), total_n);
+        let total_95_n = holding(Bounds::new(influence, y).of_sum(&Array1::ones(cells)), total_n);
         if total_n <= 0.0 {
             return ForceBounds { total_95_n, margin_m: 0.0, seen_95_n: total_95_n };
         }
@@ -305,7 +305,7 @@ impl<'a> Profiler<'a> {
         let seen: Vec<usize> = (0..cells).filter(|cell| !blind.contains(cell)).collect();
         let of_seen = Bounds::new(&influence.select(Axis(1), &seen), y).of_sum(&Array1::ones(seen.len()));
         let margin_m = blind.iter().map(|cell| self.cells.edge_distance_m(*cell)).fold(0.0, f64::max);
-        ForceBounds { total_95_n, margin_m, seen_95_n: hull(of_seen, total_n) }
+        ForceBounds { total_95_n, margin_m, seen_95_n: holding(of_seen, total_n) }
     }
 
     /// Even loads in the places of patches, where such explain the reading.
@@ -333,8 +333,8 @@ impl<'a> Profiler<'a> {
             *total_n = patches.iter().map(|(_, patch)| patch.force_n).sum();
         }
         // Even loads may be narrower than a cell.
-        bounds.total_95_n = hull(hull(hull(bounds.total_95_n, of_total.0), of_total.1), *total_n);
-        bounds.seen_95_n = hull(bounds.seen_95_n, *total_n);
+        bounds.total_95_n = holding(hull(bounds.total_95_n, of_total), *total_n);
+        bounds.seen_95_n = holding(bounds.seen_95_n, *total_n);
     }
 
     /// Widens the intervals of patches beside an edge, where no even loads explain the reading: they are then of all loads between the patch and
@@ -357,10 +357,10 @@ impl<'a> Profiler<'a> {
             if part.core.iter().any(|cell| blind.contains(cell)) || blind.iter().any(could_be) {
                 let mut c = Array1::zeros(cells);
                 part.all.iter().chain(&blind).for_each(|cell| c[*cell] = 1.0);
-                patch.force_95_n = hull(bounds.of_sum(&c), patch.force_n);
+                patch.force_95_n = holding(bounds.of_sum(&c), patch.force_n);
                 let is_left = patch.centre.position.x_m < 0.5 * length_m;
-                patch.centre.x_95_m = hull(patch.centre.x_95_m, if is_left { 0.0 } else { length_m });
-                centre.x_95_m = hull(hull(centre.x_95_m, patch.centre.x_95_m.0), patch.centre.x_95_m.1);
+                patch.centre.x_95_m = holding(patch.centre.x_95_m, if is_left { 0.0 } else { length_m });
+                centre.x_95_m = hull(centre.x_95_m, patch.centre.x_95_m);
             }
         }
     }

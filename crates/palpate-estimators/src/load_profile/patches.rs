@@ -6,7 +6,7 @@ use crate::status::OUTSIDE_MODEL_RATE;
 use ndarray::Array2;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, UniformLoad};
-use palpate_numerics::{normal_interval_95, normal_quantile};
+use palpate_numerics::{holding, normal_interval_95, normal_quantile};
 use serde::Serialize;
 
 /// A patch is where the load is above this share of its highest density.
@@ -65,8 +65,8 @@ impl CentreOfPressure {
     /// Moves it, and its intervals with it where they do not hold it there.
     pub(super) fn move_to(&mut self, position: Position) {
         self.position = position;
-        self.x_95_m = hull(self.x_95_m, position.x_m);
-        self.y_95_m = hull(self.y_95_m, position.y_m);
+        self.x_95_m = holding(self.x_95_m, position.x_m);
+        self.y_95_m = holding(self.y_95_m, position.y_m);
     }
 }
 
@@ -79,7 +79,7 @@ impl Patch {
             let load = even.middle_load(number);
             (self.from, self.to, self.force_n) = (load.from(), load.to(), load.force_n());
             self.centre.move_to(load.centre());
-            self.force_95_n = hull(self.force_95_n, self.force_n);
+            self.force_95_n = holding(self.force_95_n, self.force_n);
         }
     }
 
@@ -100,11 +100,6 @@ impl Patch {
 /// True for a value within an interval.
 pub(super) fn holds((low, high): (f64, f64), value: f64) -> bool {
     (low..=high).contains(&value)
-}
-
-/// An interval with a value added.
-pub(super) fn hull((low, high): (f64, f64), value: f64) -> (f64, f64) {
-    (low.min(value), high.max(value))
 }
 
 /// The mean position of patches, by their forces.

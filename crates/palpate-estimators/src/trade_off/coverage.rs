@@ -4,7 +4,7 @@ use super::PRIOR_FORCES;
 use crate::arrangement::Training;
 use crate::closed_form::ClosedForm;
 use crate::fit::{Fit, FitTask, Locate, NoCheck};
-use crate::fixtures::{Example, force_95_n, paper, readings};
+use crate::fixtures::{Covered, Example, paper, readings};
 use crate::influence::{Influence, InfluenceSource};
 use crate::simulate::clean_reading;
 use palpate_core::Status;
@@ -30,59 +30,24 @@ fn bench(force_is_known: bool) -> Example {
     bench
 }
 
-/// Counts and sums over the readings of contacts at one place.
-#[derive(Debug, Default)]
-struct Row {
-    found: usize,
-    /// The place is in its interval; the force is in its interval; the estimate is outside its own interval.
-    place: usize,
-    force: usize,
-    outside: usize,
-    error_mm: f64,
-    width_mm: f64,
-    greatest_n: f64,
-    not_explained: usize,
-}
-
-impl Row {
-    fn new(
-        bench: &Example,
-        locators: &[Box<dyn Locate<Check = NoCheck>>],
-        x_m: f64,
-        force_n: f64,
-        rng: &mut Xoshiro256PlusPlus,
-    ) -> Self {
-        let mut row = Self::default();
-        let surface = bench.setup.surface().model().unwrap();
-        let contact = Contact { position: Position::along(x_m), force_n };
-        let truth = clean_reading(surface, bench.setup.layout(), contact);
-        for i in 0..readings(READINGS) {
-            let reading =
-                measure(bench.setup.layout(), &truth, &ChannelErrors::none(bench.setup.layout()), rng);
-            let estimate = locators[i % locators.len()].locate(&reading);
-            if estimate.status == Status::NoContact {
-                continue;
-            }
-            let (found, place) = (estimate.contact, estimate.contact.position.x_m);
-            let (low, high) = found.uncertainty.unwrap().x_95_m;
-            let found_n = found.force_n.unwrap();
-            let (least_n, most_n) = force_95_n(&found);
-            row.found += 1;
-            row.place += usize::from((low..=high).contains(&x_m));
-            row.force += usize::from((least_n..=most_n).contains(&force_n));
-            row.outside +=
-                usize::from(!(low..=high).contains(&place) || !(least_n..=most_n).contains(&found_n));
-            row.not_explained += usize::from(estimate.status == Status::OutsideModel);
-            row.error_mm += 1e3 * (place - x_m).abs();
-            row.width_mm += 1e3 * (high - low);
-            row.greatest_n = row.greatest_n.max(found_n);
-        }
-        row
+/// What contacts at one place are told by locators in turn.
+fn covered(
+    bench: &Example,
+    locators: &[Box<dyn Locate<Check = NoCheck>>],
+    x_m: f64,
+    force_n: f64,
+    rng: &mut Xoshiro256PlusPlus,
+) -> Covered {
+    let mut row = Covered::default();
+    let surface = bench.setup.surface().model().unwrap();
+    let contact = Contact { position: Position::along(x_m), force_n };
+    let truth = clean_reading(surface, bench.setup.layout(), contact);
+    let errors = ChannelErrors::none(bench.setup.layout());
+    for i in 0..readings(READINGS) {
+        let reading = measure(bench.setup.layout(), &truth, &errors, rng);
+        row.add(&locators[i % locators.len()].locate(&reading), contact);
     }
-
-    fn percent(&self, count: usize) -> f64 {
-        100.0 * count as f64 / self.found as f64
-    }
+    row
 }
 
 fn print_and_check(
@@ -94,24 +59,22 @@ fn print_and_check(
 ) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(15);
     let mut wrong = Vec::new();
-    let readings = readings(READINGS);
     for force_n in forces_n {
         eprintln!(
             "{title}, {force_n} N\n| from the end | contact found | place covered | force covered | mean width | mean error | greatest force | outside_model |\n|---|---|---|---|---|---|---|---|"
         );
         for place_mm in PLACES_MM {
-            let row = Row::new(bench, locators, 1e-3 * place_mm, *force_n, &mut rng);
-            let (place, force) = (row.percent(row.place), row.percent(row.force));
-            let mean = |sum: f64| sum / row.found as f64;
+            let row = covered(bench, locators, 1e-3 * place_mm, *force_n, &mut rng);
+            let (place, force) = (row.percent(row.along), row.percent(row.force));
             eprintln!(
                 "| {place_mm} mm | {:.1} % | {place:.1} % | {force:.1} % | {:.2} mm | {:.2} mm | {:.2} N | {:.2} % |",
-                100.0 * row.found as f64 / readings as f64,
-                mean(row.width_mm),
-                mean(row.error_mm),
+                row.found_percent(),
+                row.mean(row.width_mm),
+                row.mean(row.error_mm),
                 row.greatest_n,
-                row.percent(row.not_explained)
+                row.percent(row.doubted)
             );
-            let good = |percent: f64| allowed_percent.contains(&percent) || row.found < readings;
+            let good = |percent: f64| allowed_percent.contains(&percent) || row.found < row.readings;
             if !good(place)
                 || force < *allowed_percent.start()
                 || row.outside > 0

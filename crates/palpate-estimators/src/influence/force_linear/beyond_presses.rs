@@ -4,8 +4,8 @@
 //! reaches beyond the outermost press reaches the end of the surface: nothing there is excluded. Where the force is not known, it and the place trade off,
 //! and the force's interval holds every force as well.
 //!
-//! What is expected of contacts beforehand would exclude those beside the end. On a line intervals are therefore by the likelihood ratio
-//! ([`crate::trade_off`]), in which one channel may be anything. Where the force is known, a contact beyond the grid of places may be explained best at either
+//! On a line intervals are by the likelihood ratio ([`crate::trade_off`]), in which one channel may be anything: by the posterior, contacts beside the end would be
+//! excluded by the prior. Where the force is known, a contact beyond the grid of places may be explained best at either
 //! end of it: an interval that reaches an end of the grid before that of the surface is the whole surface.
 
 use super::locator::{ForceLinearLocator, Stored};
@@ -13,7 +13,7 @@ use crate::influence::grid::Axis;
 use crate::status::OTHER_PLACE;
 use crate::trade_off::{CALIBRATED, Contacts, Force, NotExcluded};
 use palpate_core::{ContactEstimate, Estimate};
-use palpate_numerics::normal_interval_95;
+use palpate_numerics::{holding, hull, normal_interval_95};
 use std::cell::RefCell;
 
 impl ForceLinearLocator {
@@ -39,10 +39,10 @@ impl ForceLinearLocator {
             let (is_before, is_behind) = (interval_m.0 <= first_m, interval_m.1 >= last_m);
             // The estimate is drawn too far towards an edge as often as too little: all that lies beyond is held.
             if is_before {
-                *interval_m = around(*interval_m, (0.0, first_m));
+                *interval_m = hull(*interval_m, (0.0, first_m));
             }
             if is_behind {
-                *interval_m = around(*interval_m, (last_m, sizes_m[k]));
+                *interval_m = hull(*interval_m, (last_m, sizes_m[k]));
             }
             is_beyond |= is_before || is_behind;
         }
@@ -66,10 +66,10 @@ impl ForceLinearLocator {
         else {
             return;
         };
-        uncertainty.x_95_m = around(around(x_95_m, uncertainty.x_95_m), (position.x_m, position.x_m));
+        uncertainty.x_95_m = holding(hull(x_95_m, uncertainty.x_95_m), position.x_m);
         if let (Some(force_95_n), Some(force_n)) = (force_95_n, *force_n) {
             let (least_n, most_n) = normal_interval_95(force_n, uncertainty.covariance[5].sqrt());
-            uncertainty.force_95_n = Some(around(force_95_n, (least_n.max(0.0), most_n)));
+            uncertainty.force_95_n = Some(hull(force_95_n, (least_n.max(0.0), most_n)));
         }
     }
 
@@ -79,10 +79,9 @@ impl ForceLinearLocator {
         let channels = |along_m: f64, response_n: f64, channels: &mut Vec<[f64; 2]>| {
             seen.borrow_mut().whiten([along_m / axis.step, 0.0, response_n], channels)
         };
-        let known = self.stored.known_force_n.map(|force_n| self.stored.prior.response_n(force_n));
         let contacts = Contacts {
             length_m: length_m(axis),
-            force: known.map_or(Force::AtMost(self.stored.hardest_n), Force::Known),
+            force: self.known_response_n().map_or(Force::AtMost(self.stored.hardest_n), Force::Known),
             widening: CALIBRATED,
             reference_force_n: self.stored.mean_force_n,
             // The likelihood of few presses is widened already.
@@ -107,13 +106,17 @@ impl ForceLinearLocator {
     /// The intervals of place and force on the surface; none of a force that is known.
     fn on_surface(&self, axis: Axis, found: &NotExcluded) -> ((f64, f64), Option<(f64, f64)>) {
         let Stored { hardest_n, prior, .. } = &self.stored;
+        /// Of the surface's length.
+        const ROUNDING: f64 = 1e-9;
         let whole_m = (0.0, prior.extent.length_m());
+        let rounding_m = ROUNDING * whole_m.1;
         let (first_m, last_m) = self.outermost_m(0);
         // A stretch that is hardly probable is told by nothing else either.
         let probable = || found.stretches.iter().filter(|stretch| stretch.probability >= OTHER_PLACE);
-        let (low_m, high_m) = probable().map(|stretch| stretch.x_95_m).reduce(around).unwrap_or(found.x_95_m);
-        let is_beyond_grid = (low_m <= 0.0 && axis.start > whole_m.0)
-            || (high_m >= length_m(axis) && axis.start + length_m(axis) < whole_m.1);
+        let (low_m, high_m) = probable().map(|stretch| stretch.x_95_m).reduce(hull).unwrap_or(found.x_95_m);
+        let behind_m = whole_m.1 - (axis.start + length_m(axis));
+        let is_beyond_grid =
+            (low_m <= 0.0 && axis.start > rounding_m) || (high_m >= length_m(axis) && behind_m > rounding_m);
         let (low_m, high_m) = (axis.start + low_m, axis.start + high_m);
         let (is_before, is_behind) = (low_m <= first_m, high_m >= last_m);
         let low_m = if is_before { whole_m.0 } else { low_m };
@@ -121,16 +124,11 @@ impl ForceLinearLocator {
         if found.force_95_n.is_none() {
             return (if is_beyond_grid { whole_m } else { (low_m, high_m) }, None);
         }
-        let told = probable().map(|stretch| stretch.force_95_n).reduce(around);
+        let told = probable().map(|stretch| stretch.force_95_n).reduce(hull);
         let (least_n, most_n) = told.filter(|_| !is_before && !is_behind).unwrap_or((0.0, *hardest_n));
         let force_n = |response_n: f64| prior.force_of_response(response_n, 0.0).0;
         ((low_m, high_m), Some((force_n(least_n), force_n(most_n))))
     }
-}
-
-/// The interval around two.
-fn around(one: (f64, f64), other: (f64, f64)) -> (f64, f64) {
-    (one.0.min(other.0), one.1.max(other.1))
 }
 
 /// Length of a grid along a line.

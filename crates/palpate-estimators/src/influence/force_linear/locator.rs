@@ -625,7 +625,7 @@ impl ForceLinearLocator {
     }
 
     /// φ of the known force.
-    fn known_response_n(&self) -> Option<f64> {
+    pub(super) fn known_response_n(&self) -> Option<f64> {
         self.stored.known_force_n.map(|force_n| self.stored.prior.response_n(force_n))
     }
 

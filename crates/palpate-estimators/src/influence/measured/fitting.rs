@@ -269,7 +269,7 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     limit
 }
 
-/// Distinct positions from which on every fifth is held out at once; of fewer each but the outermost by itself, so that enough is left to learn from.
+/// Distinct positions from which on every fifth is held out at once; of fewer each but the first and the last in their order by itself, so that enough is left to learn from.
 const MANY_TO_JUDGE: usize = 15;
 /// Distinct positions of which one can be held out.
 const LEAST_TO_JUDGE: usize = 5;
@@ -317,7 +317,7 @@ pub(super) fn misfit(
     Ok(factor.is_finite().then(|| factor.clamp(FACTORS.0, FACTORS.1)))
 }
 
-/// Whether the position of each press is one of those held out, for every time that some are.
+/// The presses that are held out, true in their places, for every time that some are.
 fn held_out(presses: &Presses, dimensions: usize) -> Vec<Vec<bool>> {
     let places: Vec<Vec<f64>> =
         presses.coordinates.outer_iter().map(|at| at.slice(s![..dimensions]).to_vec()).collect();

@@ -272,6 +272,17 @@ fn awkward_recordings_give_a_locator_or_clear_words() {
         let estimate = fit(&setup, &raw_recording(rows)).locate(&[1.0, 2.0]);
         assert!(estimate.contact.position.x_m.is_finite(), "{estimate:?}");
     }
+    // Without the one place beside the others the rest are on a line.
+    let on_a_line = [(0.0, 0.0), (0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.03)];
+    let presses = on_a_line.into_iter().flat_map(|(x_m, y_m)| {
+        let press = move |k: f64| Row {
+            position: Position { x_m, y_m },
+            ..row(0.0, [100.0 * x_m + k, 200.0 * y_m - 100.0 * x_m + k])
+        };
+        [0.01, -0.01, 0.02].map(press)
+    });
+    let locator = fit(&raw_setup(*PAD, 2, None), &raw_recording(presses.collect()));
+    assert!(locator.locate(&[1.0, 2.0]).contact.position.x_m.is_finite());
     let logarithms = MeasuredInfluence { readings: Some(Scale::Logarithm), ..MeasuredInfluence::default() };
     let recording = raw_recording(vec![row(0.01, [1.0, 2.0]), row(0.02, [1.0, -2.0])]);
     let task = FitTask::new(&setup, &recording);

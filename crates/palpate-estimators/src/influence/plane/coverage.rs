@@ -1,10 +1,9 @@
 //! Coverage of contacts of unknown force by their distance from the edge of the plate of `examples/plate.toml`.
 
 use crate::fit::{FitTask, Locate};
-use crate::fixtures::{Example, force_95_n, plate, readings};
+use crate::fixtures::{Covered, Example, plate, readings};
 use crate::influence::Influence;
 use crate::simulate::CleanSensors;
-use palpate_core::Status;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
 use palpate_mechanics::surface::plate::PlateSpec;
@@ -58,84 +57,36 @@ impl Place {
     }
 }
 
-/// Counts and sums over the readings of contacts at one place.
-#[derive(Clone, Copy, Debug, Default)]
-struct Row {
-    readings: usize,
-    found: usize,
-    /// The place across and along the edge, and the force, are in their intervals.
-    covered: [usize; 3],
-    /// The estimate is not in its own intervals.
-    outside: usize,
-    doubted: usize,
-    error_mm: f64,
-    width_mm: f64,
-    width_n: f64,
-    greatest_n: f64,
+fn print(row: &Covered, place: Place, force_n: f64) {
+    eprintln!(
+        "| {force_n} N, {} | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.2} mm | {:.2} N | {:.2} mm | {:.2} N |",
+        place.name(),
+        row.found_percent(),
+        row.percent(row.along),
+        row.percent(row.across),
+        row.percent(row.force),
+        row.mean(row.width_mm),
+        row.mean(row.width_n),
+        row.mean(row.error_mm),
+        row.greatest_n,
+    );
 }
 
-impl Row {
-    fn add(&mut self, locator: &PlaneLocator, reading: &[f64], truth: Contact) {
-        let estimate = locator.locate(reading);
-        self.readings += 1;
-        if estimate.status == Status::NoContact {
-            return;
-        }
-        let found = estimate.contact;
-        let uncertainty = found.uncertainty.unwrap();
-        let intervals = [uncertainty.x_95_m, uncertainty.y_95_m, force_95_n(&found)];
-        let holds = |values: [f64; 3]| {
-            let held = |((low, high), value): ((f64, f64), f64)| low <= value && value <= high;
-            [0, 1, 2].map(|k| held((intervals[k], values[k])))
-        };
-        let force_n = found.force_n.unwrap();
-        let held = holds([truth.position.x_m, truth.position.y_m, truth.force_n]);
-        self.found += 1;
-        self.covered.iter_mut().zip(held).for_each(|(count, held)| *count += usize::from(held));
-        self.outside += usize::from(holds([found.position.x_m, found.position.y_m, force_n]) != [true; 3]);
-        self.doubted += usize::from(estimate.status == Status::OutsideModel);
-        self.error_mm += 1e3 * found.position.distance_m(truth.position);
-        let width = |(low, high): (f64, f64)| high - low;
-        self.width_mm += 1e3 * width(intervals[0]);
-        self.width_n += width(intervals[2]);
-        self.greatest_n = self.greatest_n.max(force_n);
+/// Of rows with a few readings nothing is asked. The interval of a force may hold more than 95 %: in a corner it is nearly that of all forces.
+fn check(row: &Covered, place: Place) {
+    assert!(row.outside == 0 && row.greatest_n <= 10.0 * PRESSES_N, "{place:?}: {row:?}");
+    if row.found < 100 {
+        return;
     }
-
-    /// Shares of the contacts found whose place across the edge, place along it and force are covered, in percent.
-    fn covered_percent(&self) -> [f64; 3] {
-        self.covered.map(|count| 100.0 * count as f64 / self.found as f64)
-    }
-
-    fn print(&self, place: Place, force_n: f64) {
-        let [across, along, force] = self.covered_percent();
-        let mean = |sum: f64| sum / self.found as f64;
-        eprintln!(
-            "| {force_n} N, {} | {:.1} % | {across:.1} % | {along:.1} % | {force:.1} % | {:.2} mm | {:.2} N | {:.2} mm | {:.2} N |",
-            place.name(),
-            100.0 * self.found as f64 / self.readings as f64,
-            mean(self.width_mm),
-            mean(self.width_n),
-            mean(self.error_mm),
-            self.greatest_n,
-        );
-    }
-
-    /// Of rows with a few readings nothing is asked. The interval of a force may hold more than 95 %: in a corner it is nearly that of all forces.
-    fn check(&self, place: Place) {
-        assert!(self.outside == 0 && self.greatest_n <= 10.0 * PRESSES_N, "{place:?}: {self:?}");
-        if self.found < 100 {
-            return;
-        }
-        assert!(100 * self.doubted <= self.found, "{place:?}: {self:?}");
-        // Four standard deviations of the readings found; all between 94.3 and 97.0 % was measured where all are found.
-        let margin = 400.0 * (0.95 * 0.05 / self.found as f64).sqrt();
-        let [across, along, force] = self.covered_percent();
-        let least = 95.0 - margin;
-        assert!(across >= least && along >= least && force >= least, "{place:?}: {self:?}");
-        if self.found == self.readings {
-            let most = 97.0 + 0.5 * margin;
-            assert!(across <= most && along <= most, "{place:?}: {self:?}");
-        }
+    assert!(100 * row.doubted <= row.found, "{place:?}: {row:?}");
+    // Four standard deviations of the readings found; all between 94.3 and 97.0 % was measured where all are found.
+    let margin = 400.0 * (0.95 * 0.05 / row.found as f64).sqrt();
+    let [x, y, force] = [row.along, row.across, row.force].map(|count| row.percent(count));
+    let least = 95.0 - margin;
+    assert!(x >= least && y >= least && force >= least, "{place:?}: {row:?}");
+    if row.found == row.readings {
+        let most = 97.0 + 0.5 * margin;
+        assert!(x <= most && y <= most, "{place:?}: {row:?}");
     }
 }
 
@@ -154,16 +105,17 @@ fn intervals_hold_contacts_of_unknown_force_near_edges_and_in_corners() {
     );
     for force_n in CONTACTS_N {
         for place in places.into_iter().chain(corners) {
-            let mut row = Row::default();
+            let mut row = Covered::default();
             for locator in &locators {
                 for _ in 0..readings {
                     let contact = Contact { position: place.draw(&mut rng), force_n };
                     let truth = clean.reading(contact);
-                    row.add(locator, &measure(bench.setup.layout(), &truth, &errors, &mut rng), contact);
+                    let reading = measure(bench.setup.layout(), &truth, &errors, &mut rng);
+                    row.add(&locator.locate(&reading), contact);
                 }
             }
-            row.print(place, force_n);
-            row.check(place);
+            print(&row, place, force_n);
+            check(&row, place);
         }
     }
 }
