@@ -26,6 +26,7 @@ mod gram_schmidt;
 mod out_of_range;
 mod random_order;
 pub mod regression;
+mod shared_error;
 pub mod simd;
 pub mod small;
 mod sparse_cholesky;
@@ -42,6 +43,7 @@ pub use elliptic::{Jacobi, carlson_rd, carlson_rf};
 pub use gram_schmidt::push_rest;
 pub use out_of_range::OutOfRange;
 pub use random_order::random_order;
+pub use shared_error::{SharedError, with_shared_error};
 pub use sparse_cholesky::{SparseCholesky, SparseCholeskyError, SparseSymmetric};
 pub use statistics::{
     FEWEST_FOR_95, conformal_95, mean, mean_and_variance, median, percentile, root_mean_square,

@@ -77,7 +77,7 @@ fn influence(config: Influence) -> Vec<Setting> {
     vec![
         Setting::new("source", "influence functions from", source),
         Setting::new("contacts", "contacts at once, at most", config.contacts.to_string()),
-        Setting::new("force_sd", "contact force", force),
+        Setting::new("force_sd", "prior of the force", force),
         false_alarms(config.false_alarm_rate),
     ]
 }

@@ -1,8 +1,9 @@
 //! Levenberg's steps down the misfit of a contact (K. Levenberg, Quart. Appl. Math. 2, 1944, with Marquardt's scaling by the diagonal).
 
-use super::lanes::{Lanes, sum_of};
+use super::lanes::{LANES, Lanes, sum_of};
 use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
 use palpate_numerics::small::{Ldl, Matrix};
+use palpate_numerics::with_shared_error;
 
 /// Position along and across, and the force or whatever else a reading depends on.
 pub(super) type Unknowns = [f64; 3];
@@ -20,6 +21,30 @@ impl Equations {
     /// From the weights V⁻¹, the residual and the derivatives of groups of channels.
     pub fn new(channels: impl Iterator<Item = (Lanes, Lanes, [Lanes; 3])>) -> Self {
         InstructionSet::best().run(SumGroups { channels })
+    }
+
+    /// With errors g that the channels share besides: by V + g·gᵀ in place of V, from the same groups of channels and g.
+    pub fn with_shared_errors(
+        mut self,
+        channels: impl Iterator<Item = ((Lanes, Lanes, [Lanes; 3]), Lanes)>,
+    ) -> Self {
+        let (mut gg, mut ge, mut gj) = (0.0, 0.0, [0.0; 3]);
+        for ((weights, e, slopes), shared) in channels {
+            for l in 0..LANES {
+                let weighed = weights[l] * shared[l];
+                gg += weighed * shared[l];
+                ge += weighed * e[l];
+                gj.iter_mut().zip(&slopes).for_each(|(sum, slopes)| *sum += weighed * slopes[l]);
+            }
+        }
+        self.misfit = with_shared_error(self.misfit, ge, ge, gg);
+        for i in 0..3 {
+            self.right[i] = with_shared_error(self.right[i], ge, gj[i], gg);
+            for j in 0..3 {
+                self.information[i][j] = with_shared_error(self.information[i][j], gj[i], gj[j], gg);
+            }
+        }
+        self
     }
 
     /// With what is expected of the last unknown: a normal density of this mean and precision.

@@ -64,7 +64,7 @@ fn unread(error: &BytesRejection) -> Refusal {
     Refusal::new(error.status(), error.body_text(), "send at most 64 kB of JSON")
 }
 
-/// A body of JSON.
+/// A body that is a JSON object.
 pub struct JsonBody<T>(pub T);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
@@ -72,12 +72,14 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
         let bytes = whole_body(request, state).await?;
-        serde_json::from_slice(&bytes).map(Self).map_err(|error| {
-            Refusal::new(
-                StatusCode::BAD_REQUEST,
-                error.to_string(),
-                "docs/live-server.md says what the body is",
-            )
-        })
+        let refused = |error: String| {
+            Refusal::new(StatusCode::BAD_REQUEST, error, "docs/live-server.md says what the body is")
+        };
+        let body = serde_json::from_slice(&bytes).map_err(|error| refused(error.to_string()))?;
+        // A list of a struct's values would be read as the struct.
+        if bytes.trim_ascii_start().first() != Some(&b'{') {
+            return Err(refused("the body is no JSON object".to_owned()));
+        }
+        Ok(Self(body))
     }
 }

@@ -154,6 +154,7 @@ fn bad_requests_are_answered_in_words() {
         ("/api/mark", r#"{"text":"two\nlines"}"#, 400),
         ("/api/mark", r#"{"text":1}"#, 400),
         ("/api/mark", "{", 400),
+        ("/api/mark", r#"["text"]"#, 400),
         ("/api/mark", &large, 413),
         ("/api/source", r#"{"url":"serial:///dev/ttyACM0"}"#, 403),
         ("/api/source", r#"{"url":"simulated:/etc/passwd"}"#, 403),

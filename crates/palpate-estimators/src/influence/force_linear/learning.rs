@@ -14,6 +14,7 @@ use super::place_noise_search::PlaceNoiseSearch;
 use super::posterior::{Functions, functions, of_equal_ratio, offsets, readings};
 use super::presses::{Presses, Repeats, compare};
 use super::prior::{Prior, Source};
+use super::shared_errors::loadings;
 use crate::influence::config::Structure;
 use crate::influence::measured::MeasuredError;
 use crate::recording::Recording;
@@ -161,6 +162,12 @@ impl Learnt {
     /// Standard deviation of each channel's noise.
     pub fn noise_sd(&self) -> Vec<f64> {
         self.fits.iter().map(|fit| fit.noise_variance().sqrt()).collect()
+    }
+
+    /// Loadings of the errors that all channels share.
+    pub fn shared_errors(&self) -> Result<Vec<f64>, MeasuredError> {
+        let l = loadings(&self.presses, &self.prior, &self.fits, &self.sensors_m)?;
+        Ok(l)
     }
 
     /// Offsets, and influences at `places_m` per newton of φ.
@@ -499,7 +506,7 @@ impl Search<'_> {
     }
 
     /// The most probable prior of point sensors: which kind of source, then what share is smooth and over what length; `None` where the
-    /// presses are less than twice its coefficients, polynomials and offset.
+    /// presses are less than twice its coefficients, polynomials and offset, or places less than twice the polynomials.
     fn sources(&mut self, smooth: &Prior) -> Result<Option<Found>, Cancelled> {
         /// η² and ℓ, in lengths of the surface; on a plane a smooth part is always needed.
         const SHARES: [f64; 4] = [0.0, 1e-4, 1e-2, 1.0];
@@ -507,9 +514,10 @@ impl Search<'_> {
         /// The drift is told as well by one of so many places of sensors.
         const ONE_OF: usize = 5;
         let sensors_m = everywhere(self.extent);
-        // Each press, or nearly, would be a coefficient, and what is left tells no variance.
-        let effects = 1 + Prior { source: Some(Source::Strain), ..smooth.clone() }.polynomials();
-        if self.presses.len() < 2 * effects {
+        // Each press or each place, or nearly, would be a coefficient, and what is left tells no variance.
+        let polynomials = Prior { source: Some(Source::Strain), ..smooth.clone() }.polynomials();
+        let (presses, places) = (self.presses.len(), self.presses.positions_m().len());
+        if presses < 2 * (1 + polynomials) || places < 2 * polynomials {
             return Ok(None);
         }
         let (dimensions, length_m) = (self.extent.dimensions(), self.extent.length_m());

@@ -1,33 +1,22 @@
-//! The locator of a force-linear surface: the posterior of a reading over a grid of places, the force integrated in closed form.
-//!
-//! With d the reading less the offsets and f the influences at a place, both over the noise, channel k errs by
-//! S_k(F) = 1 + ω_k + 2F·β_k + F²·v_k: noise, and the variances ω of the offset and v of the influence with their covariance β, as the
-//! presses leave them open. For a force F that is as likely as any other between 0 and the hardest looked for,
-//!
-//! p(a | d) ∝ ∫ Π S_k^(−½)·exp(−(d_k − F·f_k)²/(2·S_k)) dF,
-//!
-//! where the noise differs by place its multiplier m(a) in the place of the 1, S taken at the force of the least misfit. Where the response
-//! to the force is not linear, F stands for φ(F), and the estimate is turned back. The determinant belongs there: between presses, where v
-//! is large, everything would explain a reading otherwise. From few presses ln p is divided by a number of channels whose errors count as
-//! those of one.
+//! The locator of a force-linear surface: the posterior of a reading over a grid of places, the force integrated in closed form
+//! ([`super::seen`]).
 
 use super::drift::DriftCourse;
 use super::posterior::Functions;
 use super::prior::{Prior, Source};
 use super::scan::Scan;
+use super::seen::Seen;
+use super::shared_errors::own_shares;
 use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::influence::at_nodes::InfluencesAtNodes;
 use crate::influence::config::Structure;
 use crate::influence::grid::{Axis, check_axes, greatest_distances};
-use crate::influence::inversion::{
-    Cells, Explain, Explained, Inversion, Layers, Limits, Look, Slopes, ToldForce, look_at_cells,
-};
-use crate::influence::lanes::{LANES, Lanes, in_lanes};
-use crate::influence::levenberg::{Equations, Unknowns};
+use crate::influence::inversion::{Inversion, Layers, Limits, ToldForce};
+use crate::influence::lanes::{Lanes, in_lanes};
 use crate::lightest_touch::LightestTouch;
 use crate::recording::{LEAST_FREEDOM, Recording};
 use crate::setup::Setup;
-use crate::spread::{About, spread_bound, spread_score};
+use crate::spread::spread_bound;
 use crate::status::{
     Detection, Directions, FalseAlarmRate, NoiseBounds, learnt_bounds, misfit_bound, unknowns,
 };
@@ -35,9 +24,8 @@ use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::CramerRaoBound;
 use palpate_mechanics::surface::{Extent, ResponseFunction, ResponseGradient};
-use palpate_numerics::normal_between;
+use palpate_numerics::median;
 use palpate_numerics::regression::Kernel;
-use palpate_numerics::simd;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -77,6 +65,15 @@ impl Tables {
             covariances: at_places(|found| &found.covariances, 2),
             noise_sd,
         }
+    }
+
+    /// True where what the presses leave open of a contact's reading is, all channels together, more than the noise of two, at half of the places or
+    /// more. Elsewhere it does not matter which of it the channels share.
+    pub fn are_open(&self, force_n: f64) -> bool {
+        const LEAST: f64 = 2.0;
+        let open = |variances: &[f64]| force_n * force_n * variances.iter().sum::<f64>();
+        let places = self.variances.chunks(self.offsets.len().max(1));
+        median(places.map(open).collect()).is_some_and(|open| open > LEAST)
     }
 }
 
@@ -122,6 +119,9 @@ pub(super) struct Stored {
     /// Channels whose errors count as those of one: the logarithm of the likelihood is divided by it.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub channels_as_one: f64,
+    /// Loading of each channel in use on the errors that all share; none where they are small.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shared_errors: Vec<f64>,
 }
 
 const fn one() -> f64 {
@@ -138,15 +138,19 @@ fn is_one(value: &f64) -> bool {
 pub struct ForceLinearLocator {
     pub(super) stored: Stored,
     /// Expected φ of a contact, and its precision.
-    expected: [f64; 2],
+    pub(super) expected: [f64; 2],
     /// f, v and β, eight channels side by side.
-    layers: Layers,
+    pub(super) layers: Layers,
     /// ω.
-    open: Vec<Lanes>,
+    pub(super) open: Vec<Lanes>,
+    /// Share of what is open of each channel that it errs by itself, r.
+    pub(super) own: Vec<Lanes>,
+    /// Loadings on errors that all channels share, u; nothing where they share none.
+    pub(super) shared: Vec<Lanes>,
     /// Bounds of what each place costs a reading.
-    scan: Scan,
+    pub(super) scan: Scan,
     /// Greatest distance of the influences of each place from those of its neighbours along and across, per newton and over the noise.
-    lengths: Vec<[f64; 2]>,
+    pub(super) lengths: Vec<[f64; 2]>,
     /// The largest square of a relative reading of noise alone.
     noise_bound: f64,
     /// The most that a contact takes off the square of noise alone.
@@ -167,10 +171,10 @@ pub struct Scatter {
 /// Contacts are expected to have forces that spread this many times as far as those of the presses.
 const FORCE_SPREAD: f64 = 2.0;
 /// Layers of f, v and β.
-const VALUES: usize = 0;
-const VARIANCES: usize = 1;
-const COVARIANCES: usize = 2;
-const LAYERS: usize = 3;
+pub(super) const VALUES: usize = 0;
+pub(super) const VARIANCES: usize = 1;
+pub(super) const COVARIANCES: usize = 2;
+pub(super) const LAYERS: usize = 3;
 
 impl Stored {
     pub fn into_locator(self) -> ForceLinearLocator {
@@ -184,6 +188,8 @@ impl Stored {
                 [values, variances, covariances][layer][place * self.live.len() + channel]
             }),
             open: in_lanes(&self.functions.offset_variances),
+            own: in_lanes(&self.own_shares()),
+            shared: in_lanes(&self.shared_errors),
             scan: Scan::default(),
             lengths: Vec::new(),
             noise_bound: 0.0,
@@ -195,6 +201,14 @@ impl Stored {
         locator.scan = locator.new_scan();
         locator.bound_noise();
         locator
+    }
+
+    /// r of each channel in use.
+    fn own_shares(&self) -> Vec<f64> {
+        if self.shared_errors.is_empty() {
+            return vec![1.0; self.live.len()];
+        }
+        own_shares(&self.shared_errors, self.prior.extent)
     }
 
     /// Checks what a file may have got wrong.
@@ -236,6 +250,11 @@ impl Stored {
         }
         self.prior.check()?;
         numbers("channels as one", &[self.channels_as_one], |count| count >= 1.0, "at least 1")?;
+        if !self.shared_errors.is_empty() {
+            LocatorFault::check_count("loadings on shared errors", live, self.shared_errors.len())?;
+        }
+        let is_share = |loading: f64| (-1.0..=1.0).contains(&loading);
+        numbers("loading on shared errors", &self.shared_errors, is_share, "from -1 to 1")?;
         let force = [self.hardest_n, self.force_sd_n, self.known_force_n.unwrap_or(1.0)];
         numbers("force", &force, |force| force > 0.0, "greater than 0")?;
         numbers(
@@ -473,17 +492,20 @@ impl ForceLinearLocator {
 
     fn new_scan(&self) -> Scan {
         let live = self.stored.live.len();
+        let own = self.stored.own_shares();
+        // The greatest eigenvalue of the errors' correlation is no more than this.
+        let together = 1.0 + self.stored.shared_errors.iter().map(|loading| loading * loading).sum::<f64>();
         Scan::new(self.places(), live, self.expected, self.known_response_n(), |place, c| {
             let Place { values, variances, covariances } = self.place(place);
             let open = self.stored.functions.offset_variances[c];
             let noise = self.noise() * self.noise_at(self.node(place));
             let (v, beta) = (variances[c], covariances[c]);
             let hardest_n = self.known_response_n().unwrap_or(self.stored.hardest_n);
-            let hardest = noise + (open + hardest_n * (2.0 * beta + hardest_n * v)).max(0.0);
+            let hardest = noise + together * (open + hardest_n * (2.0 * beta + hardest_n * v)).max(0.0);
             let told = if v > 0.0 { beta * beta / v } else { 0.0 };
             let as_one = self.stored.channels_as_one;
-            let least = (noise + (open - told).max(0.0)).powf(as_one.recip());
-            (values[c], [least, as_one * hardest.max(noise + open)])
+            let least = (noise + own[c] * (open - told).max(0.0)).powf(as_one.recip());
+            (values[c], [least, as_one * hardest.max(noise + together * open)])
         })
     }
 
@@ -604,12 +626,12 @@ impl ForceLinearLocator {
     }
 
     /// Variance of the noise: where it was learnt from few readings it may be larger than it seems, as that of Student's t is.
-    fn noise(&self) -> f64 {
+    pub(super) fn noise(&self) -> f64 {
         self.stored.noise_freedom / (self.stored.noise_freedom - 2.0)
     }
 
     /// Variance of the noise at a place of the grid, in nodes, over that of an untouched board.
-    fn noise_at(&self, [x, y]: [f64; 2]) -> f64 {
+    pub(super) fn noise_at(&self, [x, y]: [f64; 2]) -> f64 {
         self.noise_at_position(Position { x_m: self.stored.x.value(x), y_m: self.stored.y.value(y) })
     }
 
@@ -631,14 +653,7 @@ impl ForceLinearLocator {
 
     /// A reading, less offsets and over the noise, ready to be explained.
     pub(super) fn seen(&self, relative: &[f64]) -> Seen<'_> {
-        Seen {
-            locator: self,
-            reading: in_lanes(relative),
-            noise: 1.0,
-            between: Vec::new(),
-            slopes: Vec::new(),
-            weights: Vec::new(),
-        }
+        Seen::new(self, relative)
     }
 
     /// Source of the force of an estimate.
@@ -668,222 +683,6 @@ impl ForceLinearLocator {
     #[cfg(test)]
     pub fn summed_everywhere(&self, reading: &[f64], per_node: usize) -> palpate_core::ContactEstimate {
         Inversion::new(self.seen(&self.relative(reading))).summed_everywhere(self.told_force(), per_node)
-    }
-}
-
-/// A relative reading, and room for what is interpolated to explain it.
-#[derive(Debug)]
-pub(super) struct Seen<'a> {
-    locator: &'a ForceLinearLocator,
-    reading: Vec<Lanes>,
-    /// Variance of the noise at the place that is looked at over that of an untouched board.
-    noise: f64,
-    between: Vec<Lanes>,
-    slopes: Vec<Slopes>,
-    weights: Vec<Lanes>,
-}
-
-/// Sums over the channels of a place, by the variances S of one force.
-struct WeighChannels<'a> {
-    reading: &'a [Lanes],
-    /// f, v and β of the place.
-    functions: [&'a [Lanes]; LAYERS],
-    open: &'a [Lanes],
-    noise: f64,
-    force_n: f64,
-}
-
-/// Σ d²/S, Σ f·d/S, Σ f²/S and ln Π S, S relative to the noise.
-#[derive(Clone, Copy, Debug)]
-struct Weighed {
-    dd: f64,
-    fd: f64,
-    ff: f64,
-    log_determinant: f64,
-}
-
-impl simd::Kernel for WeighChannels<'_> {
-    type Output = Weighed;
-    const FUSED: bool = false;
-
-    #[inline(always)] // Compiled for the instructions of its caller.
-    fn run<S: simd::Simd>(self) -> Weighed {
-        const LARGE: f64 = 1e30;
-        let Self { reading, functions: [values, variances, covariances], open, noise, force_n } = self;
-        let mut sums = [[0.0; LANES]; 3];
-        // One logarithm for many channels, but before their product overflows.
-        let (mut product, mut log_determinant) = ([1.0; LANES], 0.0);
-        for g in 0..reading.len() {
-            for l in 0..LANES {
-                let (v, beta) = (variances[g][l].max(0.0), covariances[g][l]);
-                let spread = (open[g][l] + force_n * (2.0 * beta + force_n * v)).max(0.0);
-                let weight = 1.0 / (noise + spread);
-                let (d, f) = (reading[g][l], values[g][l]);
-                sums[0][l] += weight * d * d;
-                sums[1][l] += weight * f * d;
-                sums[2][l] += weight * f * f;
-                product[l] *= 1.0 + spread / noise;
-            }
-            if product.iter().any(|product| *product > LARGE) {
-                log_determinant += product.iter().map(|product| product.ln()).sum::<f64>();
-                product = [1.0; LANES];
-            }
-        }
-        let [low, high] = [0, 4].map(|i| product[i] * product[i + 1] * product[i + 2] * product[i + 3]);
-        let [dd, fd, ff] = sums.map(|lanes| lanes.iter().sum());
-        log_determinant += low.ln() + high.ln();
-        Weighed { dd, fd, ff, log_determinant }
-    }
-}
-
-impl Seen<'_> {
-    fn weighed(&self, force_n: f64) -> Weighed {
-        let ForceLinearLocator { open, layers, .. } = self.locator;
-        let of = |layer: usize| &self.between[layer * layers.groups()..(layer + 1) * layers.groups()];
-        let functions = [of(VALUES), of(VARIANCES), of(COVARIANCES)];
-        let noise = self.locator.noise() * self.noise;
-        let weighed =
-            simd::run_loops(WeighChannels { reading: &self.reading, functions, open, noise, force_n });
-        // Its determinant is relative to the noise of the place.
-        let of_place = self.locator.stored.live.len() as f64 * self.noise.ln();
-        let share = self.locator.stored.channels_as_one.recip();
-        Weighed {
-            dd: share * weighed.dd,
-            fd: share * weighed.fd,
-            ff: share * weighed.ff,
-            log_determinant: share * (weighed.log_determinant + of_place),
-        }
-    }
-}
-
-impl Seen<'_> {
-    /// Writes d and f of every channel over its standard deviation for a contact; the logarithm of the determinant, less a constant.
-    pub(super) fn whiten(&mut self, at: Unknowns, channels: &mut Vec<[f64; 2]>) -> f64 {
-        self.weigh(at);
-        let ForceLinearLocator { layers, stored, .. } = self.locator;
-        layers.interpolate([at[0], at[1]], VALUES..VALUES + 1, &mut self.between);
-        let [weights, reading, values] =
-            [&self.weights, &self.reading, &self.between].map(|lanes| lanes.as_flattened());
-        let live = stored.live.len();
-        channels.clear();
-        channels.extend((0..live).map(|c| [reading[c], values[c]].map(|value| weights[c].sqrt() * value)));
-        -weights[..live].iter().map(|weight| weight.ln()).sum::<f64>() / stored.channels_as_one
-    }
-}
-
-impl Explain for Seen<'_> {
-    fn axes(&self) -> [Axis; 2] {
-        self.locator.axes()
-    }
-
-    fn cells(&self) -> Cells {
-        Cells::new(self.axes().map(|axis| axis.count), 1)
-    }
-
-    fn scan(&self, looks: &mut Vec<Look>) {
-        look_at_cells(&self.locator.scan, &self.reading, self.locator.stored.live.len(), looks);
-    }
-
-    fn lengths(&self, [x, y]: [usize; 2], response_n: f64) -> [f64; 2] {
-        self.locator.lengths[x * self.locator.stored.y.count + y].map(|way| way * response_n.abs())
-    }
-
-    /// Of φ.
-    fn range(&self) -> Option<(f64, f64)> {
-        self.locator.known_response_n().is_none().then_some((0.0, self.locator.stored.hardest_n))
-    }
-
-    fn weigh(&mut self, [x, y, response_n]: Unknowns) {
-        let ForceLinearLocator { layers, open, .. } = self.locator;
-        layers.interpolate([x, y], VARIANCES..LAYERS, &mut self.between);
-        let noise = self.locator.noise() * self.locator.noise_at([x, y]);
-        let as_one = self.locator.stored.channels_as_one;
-        let groups = self.reading.len();
-        let (variances, covariances) = self.between.split_at(groups);
-        self.weights.clear();
-        self.weights.extend((0..groups).map(|g| {
-            std::array::from_fn(|l| {
-                let v = variances[g][l].max(0.0);
-                let spread = open[g][l] + response_n * (2.0 * covariances[g][l] + response_n * v);
-                1.0 / (as_one * (noise + spread.max(0.0)))
-            })
-        }));
-    }
-
-    fn equations(&mut self, [x, y, response_n]: Unknowns) -> Equations {
-        let ForceLinearLocator { layers, expected, .. } = self.locator;
-        layers.interpolate_slopes([x, y], VALUES..VALUES + 1, &mut self.slopes);
-        let equations = Equations::new((0..self.reading.len()).map(|g| {
-            let [f, along, across] = &self.slopes[g];
-            let residual = std::array::from_fn(|l| self.reading[g][l] - response_n * f[l]);
-            let times = |slopes: &Lanes| slopes.map(|slope| response_n * slope);
-            (self.weights[g], residual, [times(along), times(across), *f])
-        }));
-        if self.range().is_some() { equations.with_expected(response_n, *expected) } else { equations }
-    }
-
-    fn spread(&mut self, at: Unknowns) -> f64 {
-        self.weigh(at);
-        let roots: Vec<f64> = self.weights.as_flattened().iter().map(|weight| weight.sqrt()).collect();
-        let live = self.locator.stored.live.len();
-        let mut values = Vec::new();
-        let reads = |[x, y, response_n]: Unknowns| -> Vec<f64> {
-            self.locator.layers.interpolate([x, y], VALUES..VALUES + 1, &mut values);
-            values.as_flattened()[..live].iter().zip(&roots).map(|(f, root)| root * response_n * f).collect()
-        };
-        let [x, y] = self.axes().map(|axis| (0.0, (axis.count - 1) as f64));
-        let about = About { at, ends: [x, y, self.range().unwrap_or((at[2], at[2]))] };
-        let reading = self.reading.as_flattened().iter().zip(&roots).map(|(d, root)| root * d);
-        spread_score(about, reading, reads)
-    }
-
-    /// φ is found in steps from about `latent`, each by the variances of the last.
-    fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained {
-        /// Two steps leave less than a thousandth.
-        const STEPS: usize = 2;
-        let [x, y] = self.axes();
-        let margin = x.margin_cost(place[0]) + y.margin_cost(place[1]);
-        self.locator.layers.interpolate(place, 0..LAYERS, &mut self.between);
-        self.noise = self.locator.noise_at(place);
-        let Some((least_n, hardest_n)) = self.range() else {
-            let Weighed { dd, fd, ff, log_determinant } = self.weighed(latent);
-            let misfit = (dd + latent * (latent * ff - 2.0 * fd)).max(0.0);
-            return Explained {
-                misfit,
-                cost: misfit + log_determinant + margin,
-                latent,
-                latent_variance: 0.0,
-            };
-        };
-        // Least squares of φ by the weights of the last one, with what is expected of it.
-        let [expected_n, precision] = self.locator.expected;
-        let told = |Weighed { fd, ff, .. }: Weighed| (fd + expected_n * precision, ff + precision);
-        let response_n = (0..STEPS).fold(latent, |response_n, _| {
-            let (fd, ff) = told(self.weighed(response_n));
-            if ff > 0.0 { (fd / ff).clamp(least_n, hardest_n) } else { least_n }
-        });
-        let weighed = self.weighed(response_n);
-        let misfit = (weighed.dd + response_n * (response_n * weighed.ff - 2.0 * weighed.fd)).max(0.0);
-        // The density of φ: normal about that of the least squares, cut off at 0 and at the hardest.
-        let (fd, ff) = told(weighed);
-        if ff.is_nan() || ff <= 0.0 {
-            return Explained { misfit, cost: f64::INFINITY, latent: response_n, latent_variance: 0.0 };
-        }
-        let (free_n, sd_n) = (fd / ff, ff.sqrt().recip());
-        let part = normal_between((least_n - free_n) / sd_n, (hardest_n - free_n) / sd_n);
-        // The misfit was taken at φ within the bounds; the integral is relative to the free one.
-        let with_expected = misfit + (response_n - expected_n).powi(2) * precision;
-        let free_misfit = with_expected - (response_n - free_n).powi(2) * ff;
-        Explained {
-            misfit,
-            cost: free_misfit + weighed.log_determinant - 2.0 * (part.ln_share + sd_n.ln()) + margin,
-            latent: free_n + sd_n * part.mean,
-            latent_variance: part.variance * sd_n * sd_n,
-        }
-    }
-
-    fn force(&self, latent: f64, variance: f64) -> (f64, f64) {
-        self.locator.stored.prior.force_of_response(latent, variance)
     }
 }
 

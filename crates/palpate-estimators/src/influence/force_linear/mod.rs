@@ -19,6 +19,8 @@ mod presses;
 mod prior;
 mod residuals;
 mod scan;
+mod seen;
+mod shared_errors;
 
 pub use drift::DriftCourse;
 pub(crate) use learning::{FOLDS, MOST_PRESSES, MOST_SEARCHED};
@@ -97,13 +99,15 @@ fn fit_condensed(
         let coordinates = || positions_m.iter().map(|position_m| position_m[k]);
         (coordinates().fold(f64::INFINITY, f64::min), coordinates().fold(f64::NEG_INFINITY, f64::max))
     };
+    let functions = Tables::new(&functions, learnt.noise_sd());
     let mut locator = Stored {
         x,
         y,
         outermost_m: (0..extent.dimensions()).map(outermost_m).collect(),
         channels: recording.channels.len(),
         live: learnt.live.clone(),
-        functions: Tables::new(&functions, learnt.noise_sd()),
+        shared_errors: if functions.are_open(forces.0) { learnt.shared_errors()? } else { Vec::new() },
+        functions,
         known_force_n: setup.force_n(),
         mean_force_n: forces.0,
         // Presses of one force alone, beside untouched rows, say nothing of others.

@@ -4,8 +4,8 @@
 //!
 //! f_c(a) = Σ_j β_cj·h_j(a) + α_c·g(a − p_c) + s_c/F̄·η·z(a),
 //!
-//! - h: polynomials, whose coefficients β are as likely as any others (a constant; along a line where the sensors' places are looked
-//!   for, all of the third degree: a beam between its loads bends as a cubic);
+//! - h: polynomials, whose coefficients β are as likely as any others (a constant; where the sensors' places are looked for, all of the third
+//!   degree: a beam between its loads bends as a cubic, a plate as a biharmonic function, which these are);
 //! - g: what a point sensor at the unknown place p_c sees of a load beside it, the singular part of the Green's function
 //!   ([`Source`]), with an amplitude α that is as likely at any order of magnitude;
 //! - z: a Gaussian process of unit variance with a Matérn or squared exponential correlation k, for all that the others are not.
@@ -241,7 +241,7 @@ impl Prior {
         match (self.source, self.extent) {
             (None, _) => 1,
             (Some(_), Extent::Line { .. }) => 4,
-            (Some(_), Extent::Plane { .. }) => 3,
+            (Some(_), Extent::Plane { .. }) => 10,
         }
     }
 
@@ -250,9 +250,15 @@ impl Prior {
         let unit = |k: usize, size_m: f64| 2.0 * place_m[k] / size_m - 1.0;
         let x = unit(0, self.extent.length_m());
         // Legendre's, which hardly depend on each other.
+        let second = |x: f64| 0.5 * (3.0 * x * x - 1.0);
+        let third = |x: f64| 0.5 * x * (5.0 * x * x - 3.0);
         let all = match self.extent.width_m() {
-            None => vec![1.0, x, 0.5 * (3.0 * x * x - 1.0), 0.5 * x * (5.0 * x * x - 3.0)],
-            Some(width_m) => vec![1.0, x, unit(1, width_m)],
+            None => vec![1.0, x, second(x), third(x)],
+            Some(width_m) => {
+                let y = unit(1, width_m);
+                let to_second = [1.0, x, y, second(x), x * y, second(y)];
+                [&to_second[..], &[third(x), second(x) * y, x * second(y), third(y)]].concat()
+            }
         };
         all[..self.polynomials()].to_vec()
     }

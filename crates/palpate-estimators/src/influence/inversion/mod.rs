@@ -42,6 +42,9 @@ pub(super) trait Explain {
     /// Lower bounds of what the middles of the cells cost, about, cell by cell.
     fn scan(&self, looks: &mut Vec<Look>);
 
+    /// True where these bounds may be so far below the costs that they do not show every minimum that matters.
+    fn bounds_are_loose(&self) -> bool;
+
     /// Greatest way of the reading, over the noise, from a node to the next along and across, for this latent number.
     fn lengths(&self, node: [usize; 2], latent: f64) -> [f64; 2];
 

@@ -97,11 +97,13 @@ impl<E: Explain> Inversion<E> {
         estimate
     }
 
-    /// The posterior around a minimum that is alone and nearly normal; `None` of any other.
+    /// The posterior around a minimum that is surely alone and nearly normal; `None` of any other.
     fn quadrature(&mut self) -> Option<Posterior> {
         let Self { reading, minima, .. } = self;
         let best = minima[0];
-        if minima.get(1).is_some_and(|other| other.found.cost <= best.found.cost + CUT) {
+        if reading.bounds_are_loose()
+            || minima.get(1).is_some_and(|other| other.found.cost <= best.found.cost + CUT)
+        {
             return None;
         }
         let mut posterior = Posterior::default();

@@ -435,6 +435,10 @@ impl Explain for Seen<'_> {
         );
     }
 
+    fn bounds_are_loose(&self) -> bool {
+        false
+    }
+
     fn lengths(&self, [x, y]: [usize; 2], latent: f64) -> [f64; 2] {
         let nodes = self.nodes();
         let place = x * self.locator.stored.table.y.count + y;

@@ -104,15 +104,15 @@ fn contacts_near_an_edge_are_in_their_intervals() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// docs/measured.md has its table: between few places the intervals hold less.
 #[test]
-fn estimates_between_few_places_of_a_plate_are_in_their_own_intervals() {
+fn contacts_between_few_places_of_a_plate_are_in_their_intervals() {
     const PLACES: usize = 4;
     const FORCE_N: f64 = 5.0;
     let mut plates = plates(PLACES, None);
     for place_mm in [10.0, 60.0, 100.0, 150.0] {
         let row = covered(&mut plates, 1e-3 * place_mm, FORCE_N);
         print(&row, &format!("{PLACES} × {PLACES} places, {FORCE_N} N"), place_mm);
-        assert!(row.outside == 0 && row.found == row.readings, "{place_mm} mm: {row:?}");
+        let is_held = row.percent(row.along).min(row.percent(row.across)).min(row.percent(row.force)) >= 85.0;
+        assert!(is_held && row.outside == 0 && row.found == row.readings, "{place_mm} mm: {row:?}");
     }
 }

@@ -167,9 +167,9 @@ fn contacts_of_known_force_at_either_end_of_a_grid_that_reaches_it_are_told() {
     }
 }
 
-/// docs/measured.md has its table: one gap inside the outermost of few places the intervals hold less.
+/// From six presses 53 % were covered 60 mm from the end by errors of each channel by itself.
 #[test]
-fn estimates_between_few_places_of_a_beam_are_in_their_own_intervals() {
+fn contacts_between_few_places_of_a_beam_are_in_their_intervals() {
     for times in [1, 3] {
         let beam = |seed: u64| {
             let bench = beam(seed, (6, times), (40.0, 360.0), Pressed::Variously);
@@ -186,7 +186,8 @@ fn estimates_between_few_places_of_a_beam_are_in_their_own_intervals() {
                 row.mean(row.width_mm),
                 row.percent(row.doubted)
             );
-            assert!(row.outside == 0 && row.found == row.readings, "{place_mm} mm: {row:?}");
+            let is_held = row.percent(row.along) >= 75.0 && row.percent(row.force) >= 70.0;
+            assert!(is_held && row.outside == 0 && row.found == row.readings, "{place_mm} mm: {row:?}");
         }
     }
 }

@@ -1,0 +1,314 @@
+//! A reading, as contacts on a force-linear surface explain it.
+//!
+//! With d the reading less the offsets and f the influences at a place, both over the noise, channel k errs by
+//! S_k(F) = 1 + r_k·w_k(F), w_k(F) = ω_k + 2F·β_k + F²·v_k: noise, and the variances ω of the offset and v of the influence with their covariance β, as the
+//! presses leave them open. r_k is the share of that which the channel has for itself; g_k = u_k·√w_k are errors that all channels share
+//! ([`super::shared_errors`]). For a force F that is as likely as any other between 0 and the hardest looked for,
+//!
+//! p(a | d) ∝ ∫ |V|^(−½)·exp(−½·(d − F·f)ᵀ·V⁻¹·(d − F·f)) dF, V = diag(S) + g·gᵀ,
+//!
+//! where the noise differs by place its multiplier m(a) in the place of the 1, V taken at the force of the least misfit. Where the response
+//! to the force is not linear, F stands for φ(F), and the estimate is turned back. The determinant belongs there: between presses, where v
+//! is large, everything would explain a reading otherwise. From few presses ln p is divided by a number of channels whose errors count as
+//! those of one.
+
+use super::locator::{COVARIANCES, ForceLinearLocator, LAYERS, VALUES, VARIANCES};
+use crate::influence::grid::Axis;
+use crate::influence::inversion::{Cells, Explain, Explained, Look, Slopes, look_at_cells};
+use crate::influence::lanes::{LANES, Lanes, in_lanes};
+use crate::influence::levenberg::{Equations, Unknowns};
+use crate::spread::{About, spread_score};
+use palpate_numerics::{SharedError, normal_between, simd, with_shared_error};
+
+/// A relative reading, and room for what is interpolated to explain it.
+#[derive(Debug)]
+pub(super) struct Seen<'a> {
+    locator: &'a ForceLinearLocator,
+    reading: Vec<Lanes>,
+    /// Variance of the noise at the place that is looked at over that of an untouched board.
+    noise: f64,
+    between: Vec<Lanes>,
+    slopes: Vec<Slopes>,
+    weights: Vec<Lanes>,
+    /// g.
+    shared: Vec<Lanes>,
+}
+
+/// Sums over the channels of a place, by the variances of one force.
+struct WeighChannels<'a, const SHARED: bool> {
+    reading: &'a [Lanes],
+    /// f, v and β of the place.
+    functions: [&'a [Lanes]; LAYERS],
+    open: &'a [Lanes],
+    /// r and u, which are read where channels share errors.
+    own: &'a [Lanes],
+    shared: &'a [Lanes],
+    noise: f64,
+    force_n: f64,
+}
+
+/// dᵀ·V⁻¹·d, fᵀ·V⁻¹·d, fᵀ·V⁻¹·f and ln|V|, V relative to the noise.
+#[derive(Clone, Copy, Debug)]
+struct Weighed {
+    dd: f64,
+    fd: f64,
+    ff: f64,
+    log_determinant: f64,
+}
+
+impl<const SHARED: bool> simd::Kernel for WeighChannels<'_, SHARED> {
+    type Output = Weighed;
+    const FUSED: bool = false;
+
+    #[inline(always)] // Compiled for the instructions of its caller.
+    fn run<S: simd::Simd>(self) -> Weighed {
+        const LARGE: f64 = 1e30;
+        let Self { reading, functions: [values, variances, covariances], open, own, shared, noise, force_n } =
+            self;
+        let mut sums = [[0.0; LANES]; 3];
+        // Σ g·d/S, Σ g·f/S and Σ g²/S.
+        let mut with_shared = [[0.0; LANES]; 3];
+        // One logarithm for many channels, but before their product overflows.
+        let (mut product, mut log_determinant) = ([1.0; LANES], 0.0);
+        for g in 0..reading.len() {
+            let (mut spreads, mut weights) = ([0.0; LANES], [0.0; LANES]);
+            for l in 0..LANES {
+                let (v, beta) = (variances[g][l].max(0.0), covariances[g][l]);
+                spreads[l] = (open[g][l] + force_n * (2.0 * beta + force_n * v)).max(0.0);
+                let own = if SHARED { own[g][l] * spreads[l] } else { spreads[l] };
+                weights[l] = 1.0 / (noise + own);
+                let (d, f) = (reading[g][l], values[g][l]);
+                sums[0][l] += weights[l] * d * d;
+                sums[1][l] += weights[l] * f * d;
+                sums[2][l] += weights[l] * f * f;
+                product[l] *= 1.0 + own / noise;
+            }
+            if SHARED {
+                for l in 0..LANES {
+                    let error = shared[g][l] * spreads[l].sqrt();
+                    let weighed = weights[l] * error;
+                    with_shared[0][l] += weighed * reading[g][l];
+                    with_shared[1][l] += weighed * values[g][l];
+                    with_shared[2][l] += weighed * error;
+                }
+            }
+            if product.iter().any(|product| *product > LARGE) {
+                log_determinant += product.iter().map(|product| product.ln()).sum::<f64>();
+                product = [1.0; LANES];
+            }
+        }
+        let [low, high] = [0, 4].map(|i| product[i] * product[i + 1] * product[i + 2] * product[i + 3]);
+        let [dd, fd, ff] = sums.map(|lanes| lanes.iter().sum());
+        log_determinant += low.ln() + high.ln();
+        if !SHARED {
+            return Weighed { dd, fd, ff, log_determinant };
+        }
+        let [gd, gf, gg] = with_shared.map(|lanes| lanes.iter().sum());
+        Weighed {
+            dd: with_shared_error(dd, gd, gd, gg),
+            fd: with_shared_error(fd, gd, gf, gg),
+            ff: with_shared_error(ff, gf, gf, gg),
+            log_determinant: log_determinant + gg.ln_1p(),
+        }
+    }
+}
+
+impl<'a> Seen<'a> {
+    /// A reading, less offsets and over the noise, ready to be explained.
+    pub fn new(locator: &'a ForceLinearLocator, relative: &[f64]) -> Self {
+        Self {
+            locator,
+            reading: in_lanes(relative),
+            noise: 1.0,
+            between: Vec::new(),
+            slopes: Vec::new(),
+            weights: Vec::new(),
+            shared: Vec::new(),
+        }
+    }
+
+    fn weighed(&self, force_n: f64) -> Weighed {
+        let ForceLinearLocator { open, own, shared, layers, .. } = self.locator;
+        let of = |layer: usize| &self.between[layer * layers.groups()..(layer + 1) * layers.groups()];
+        let functions = [of(VALUES), of(VARIANCES), of(COVARIANCES)];
+        let noise = self.locator.noise() * self.noise;
+        let reading = &self.reading;
+        let weighed = if shared.is_empty() {
+            let channels = WeighChannels::<false> { reading, functions, open, own, shared, noise, force_n };
+            simd::run_loops(channels)
+        } else {
+            let channels = WeighChannels::<true> { reading, functions, open, own, shared, noise, force_n };
+            simd::run_loops(channels)
+        };
+        // Its determinant is relative to the noise of the place.
+        let of_place = self.locator.stored.live.len() as f64 * self.noise.ln();
+        let share = self.locator.stored.channels_as_one.recip();
+        Weighed {
+            dd: share * weighed.dd,
+            fd: share * weighed.fd,
+            ff: share * weighed.ff,
+            log_determinant: share * (weighed.log_determinant + of_place),
+        }
+    }
+
+    /// Writes d and f of every channel over its standard deviation for a contact; the logarithm of the determinant, less a constant.
+    pub(super) fn whiten(&mut self, at: Unknowns, channels: &mut Vec<[f64; 2]>) -> f64 {
+        self.weigh(at);
+        let ForceLinearLocator { layers, stored, .. } = self.locator;
+        layers.interpolate([at[0], at[1]], VALUES..VALUES + 1, &mut self.between);
+        let [weights, reading, values] =
+            [&self.weights, &self.reading, &self.between].map(|lanes| lanes.as_flattened());
+        let live = stored.live.len();
+        channels.clear();
+        channels.extend((0..live).map(|c| [reading[c], values[c]].map(|value| weights[c].sqrt() * value)));
+        let mut log_determinant = -weights[..live].iter().map(|weight| weight.ln()).sum::<f64>();
+        if !self.shared.is_empty() {
+            let shared = self.shared_error();
+            shared.whiten(channels);
+            log_determinant += shared.log_determinant();
+        }
+        log_determinant / stored.channels_as_one
+    }
+
+    /// Values of the channels in use over the standard deviations that they have for themselves.
+    fn over_own(&self, values: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
+        let weights = self.weights.as_flattened().iter().take(self.locator.stored.live.len());
+        weights.zip(values).map(|(weight, value)| weight.sqrt() * value)
+    }
+
+    /// The error that channels share, over those that they have for themselves.
+    fn shared_error(&self) -> SharedError {
+        SharedError::new(self.over_own(self.shared.as_flattened().iter().copied()).collect())
+    }
+}
+
+impl Explain for Seen<'_> {
+    fn axes(&self) -> [Axis; 2] {
+        self.locator.axes()
+    }
+
+    fn cells(&self) -> Cells {
+        Cells::new(self.axes().map(|axis| axis.count), 1)
+    }
+
+    fn scan(&self, looks: &mut Vec<Look>) {
+        look_at_cells(&self.locator.scan, &self.reading, self.locator.stored.live.len(), looks);
+    }
+
+    /// Of few presses variances change too much from place to place.
+    fn bounds_are_loose(&self) -> bool {
+        !self.locator.shared.is_empty() || self.locator.stored.channels_as_one > 1.0
+    }
+
+    fn lengths(&self, [x, y]: [usize; 2], response_n: f64) -> [f64; 2] {
+        self.locator.lengths[x * self.locator.stored.y.count + y].map(|way| way * response_n.abs())
+    }
+
+    /// Of φ.
+    fn range(&self) -> Option<(f64, f64)> {
+        self.locator.known_response_n().is_none().then_some((0.0, self.locator.stored.hardest_n))
+    }
+
+    fn weigh(&mut self, [x, y, response_n]: Unknowns) {
+        let ForceLinearLocator { layers, open, own, shared, .. } = self.locator;
+        layers.interpolate([x, y], VARIANCES..LAYERS, &mut self.between);
+        let noise = self.locator.noise() * self.locator.noise_at([x, y]);
+        let as_one = self.locator.stored.channels_as_one;
+        let (variances, covariances) = self.between.split_at(self.reading.len());
+        let spread = |g: usize, l: usize| {
+            let v = variances[g][l].max(0.0);
+            (open[g][l] + response_n * (2.0 * covariances[g][l] + response_n * v)).max(0.0)
+        };
+        let weight = |g: usize, l: usize| 1.0 / (as_one * (noise + own[g][l] * spread(g, l)));
+        let error = |g: usize, l: usize| shared[g][l] * (as_one * spread(g, l)).sqrt();
+        self.weights.clear();
+        self.weights.extend((0..self.reading.len()).map(|g| std::array::from_fn(|l| weight(g, l))));
+        self.shared.clear();
+        self.shared.extend((0..shared.len()).map(|g| std::array::from_fn(|l| error(g, l))));
+    }
+
+    fn equations(&mut self, [x, y, response_n]: Unknowns) -> Equations {
+        let ForceLinearLocator { layers, expected, .. } = self.locator;
+        layers.interpolate_slopes([x, y], VALUES..VALUES + 1, &mut self.slopes);
+        let of_group = |g: usize| {
+            let [f, along, across] = &self.slopes[g];
+            let residual = std::array::from_fn(|l| self.reading[g][l] - response_n * f[l]);
+            let times = |slopes: &Lanes| slopes.map(|slope| response_n * slope);
+            (self.weights[g], residual, [times(along), times(across), *f])
+        };
+        let mut equations = Equations::new((0..self.reading.len()).map(of_group));
+        if !self.shared.is_empty() {
+            let errors = self.shared.iter().enumerate().map(|(g, shared)| (of_group(g), *shared));
+            equations = equations.with_shared_errors(errors);
+        }
+        if self.range().is_some() { equations.with_expected(response_n, *expected) } else { equations }
+    }
+
+    fn spread(&mut self, at: Unknowns) -> f64 {
+        self.weigh(at);
+        let shared = self.shared_error();
+        let whitened = |values: &mut dyn Iterator<Item = f64>| {
+            let mut rows: Vec<[f64; 1]> = self.over_own(values).map(|value| [value]).collect();
+            shared.whiten(&mut rows);
+            rows.into_flattened()
+        };
+        let mut values = Vec::new();
+        let reads = |[x, y, response_n]: Unknowns| -> Vec<f64> {
+            self.locator.layers.interpolate([x, y], VALUES..VALUES + 1, &mut values);
+            whitened(&mut values.as_flattened().iter().map(|f| response_n * f))
+        };
+        let [x, y] = self.axes().map(|axis| (0.0, (axis.count - 1) as f64));
+        let about = About { at, ends: [x, y, self.range().unwrap_or((at[2], at[2]))] };
+        let reading = whitened(&mut self.reading.as_flattened().iter().copied());
+        spread_score(about, reading, reads)
+    }
+
+    /// φ is found in steps from about `latent`, each by the variances of the last.
+    fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained {
+        /// Two steps leave less than a thousandth.
+        const STEPS: usize = 2;
+        let [x, y] = self.axes();
+        let margin = x.margin_cost(place[0]) + y.margin_cost(place[1]);
+        self.locator.layers.interpolate(place, 0..LAYERS, &mut self.between);
+        self.noise = self.locator.noise_at(place);
+        let Some((least_n, hardest_n)) = self.range() else {
+            let Weighed { dd, fd, ff, log_determinant } = self.weighed(latent);
+            let misfit = (dd + latent * (latent * ff - 2.0 * fd)).max(0.0);
+            return Explained {
+                misfit,
+                cost: misfit + log_determinant + margin,
+                latent,
+                latent_variance: 0.0,
+            };
+        };
+        // Least squares of φ by the weights of the last one, with what is expected of it.
+        let [expected_n, precision] = self.locator.expected;
+        let told = |Weighed { fd, ff, .. }: Weighed| (fd + expected_n * precision, ff + precision);
+        let response_n = (0..STEPS).fold(latent, |response_n, _| {
+            let (fd, ff) = told(self.weighed(response_n));
+            if ff > 0.0 { (fd / ff).clamp(least_n, hardest_n) } else { least_n }
+        });
+        let weighed = self.weighed(response_n);
+        let misfit = (weighed.dd + response_n * (response_n * weighed.ff - 2.0 * weighed.fd)).max(0.0);
+        // The density of φ: normal about that of the least squares, cut off at 0 and at the hardest.
+        let (fd, ff) = told(weighed);
+        if ff.is_nan() || ff <= 0.0 {
+            return Explained { misfit, cost: f64::INFINITY, latent: response_n, latent_variance: 0.0 };
+        }
+        let (free_n, sd_n) = (fd / ff, ff.sqrt().recip());
+        let part = normal_between((least_n - free_n) / sd_n, (hardest_n - free_n) / sd_n);
+        // The misfit was taken at φ within the bounds; the integral is relative to the free one.
+        let with_expected = misfit + (response_n - expected_n).powi(2) * precision;
+        let free_misfit = with_expected - (response_n - free_n).powi(2) * ff;
+        Explained {
+            misfit,
+            cost: free_misfit + weighed.log_determinant - 2.0 * (part.ln_share + sd_n.ln()) + margin,
+            latent: free_n + sd_n * part.mean,
+            latent_variance: part.variance * sd_n * sd_n,
+        }
+    }
+
+    fn force(&self, latent: f64, variance: f64) -> (f64, f64) {
+        self.locator.stored.prior.force_of_response(latent, variance)
+    }
+}

@@ -1,0 +1,90 @@
+//! Errors of influence functions that all channels share.
+//!
+//! What presses leave open of the functions lies between the same places in all channels, and sensors of one surface see it bend alike. Channel k
+//! errs by √w_k·(u_k·z + √r_k·e_k) for a contact, w_k being what the presses leave open of its reading, z one standard normal variable of all channels
+//! and e_k one of its own. The loadings u are those of the first principal component of the channels' correlation as their processes have it: with
+//! A the covariance of the presses, K its part without noise and P = A⁻¹ less what offset and polynomials take up, that of
+//! yᵀ·P·K·P·y (Conti and O'Hagan, Journal of Statistical Planning and Inference 140, 2010, for outputs that share a design).
+//!
+//! Along a line r_k = 1 − u_k². On a plane r_k = 1: beside its sensor an influence has a peak that presses between which it lies do not show, in each
+//! channel by itself. Where the places of point sensors are looked for along a line, these and cubics are most of every function, and no errors are shared.
+
+use super::evidence::{ChannelFit, Evidence};
+use super::presses::Presses;
+use super::prior::Prior;
+use ndarray::Array2;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::NotPositiveDefinite;
+
+/// Loadings u of the channels; none where they share no errors.
+pub(super) fn loadings(
+    presses: &Presses,
+    prior: &Prior,
+    fits: &[ChannelFit],
+    sensors_m: &[Vec<f64>],
+) -> Result<Vec<f64>, NotPositiveDefinite> {
+    if matches!(prior.extent, Extent::Line { .. }) && prior.source.is_some() {
+        return Ok(Vec::new());
+    }
+    let mut ratios: Vec<f64> = fits.iter().map(|fit| fit.ratio).collect();
+    ratios.sort_by(f64::total_cmp);
+    let evidence = Evidence::new(presses, prior, &[]);
+    let restricted = evidence.restricted(ratios[ratios.len() / 2])?;
+    let projection = restricted.projection();
+    let (mut white, _) = restricted.residuals(presses.means.clone());
+    for (mut white, fit) in white.columns_mut().into_iter().zip(fits) {
+        if let Some(source) = fit.sources.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)) {
+            let place = std::slice::from_ref(&sensors_m[source.place]);
+            let (column, _) = restricted.residuals(prior.sources(presses, place));
+            let column = column.column(0);
+            let share = column.dot(&white) / column.dot(&column);
+            white.scaled_add(-share, &column);
+        }
+    }
+    let weights = projection.t().dot(&white);
+    let lower = prior.covariance(presses);
+    let covariance = &lower + &lower.t() - Array2::from_diag(&lower.diag());
+    let products = weights.t().dot(&covariance).dot(&weights);
+    Ok(first_component(&products))
+}
+
+/// Loadings of the first principal component of the correlations of given products, by the power method: channels may be hundreds.
+fn first_component(products: &Array2<f64>) -> Vec<f64> {
+    const ROUNDS: usize = 100;
+    let n = products.nrows();
+    let root = |i: usize| products[[i, i]].max(f64::MIN_POSITIVE).sqrt();
+    let correlation = Array2::from_shape_fn((n, n), |(i, j)| products[[i, j]] / (root(i) * root(j)));
+    // The channel that has most in common with the others is no right angle to it.
+    let common = |i: &usize| correlation.row(*i).mapv(|value| value * value).sum();
+    let Some(first) = (0..n).max_by(|a, b| common(a).total_cmp(&common(b))) else { return Vec::new() };
+    let mut component = correlation.row(first).to_owned();
+    let mut value = 0.0;
+    for _ in 0..ROUNDS {
+        component /= component.dot(&component).sqrt();
+        component = correlation.dot(&component);
+        value = component.dot(&component).sqrt();
+    }
+    component.iter().map(|loading| (loading / value.sqrt()).clamp(-1.0, 1.0)).collect()
+}
+
+/// r of channels with given loadings.
+pub(super) fn own_shares(loadings: &[f64], extent: Extent) -> Vec<f64> {
+    match extent {
+        Extent::Line { .. } => loadings.iter().map(|u| (1.0 - u * u).max(0.0)).collect(),
+        Extent::Plane { .. } => vec![1.0; loadings.len()],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn channels_that_are_multiples_of_each_other_share_all_errors() {
+        let products = array![[4.0, -2.0, 0.0], [-2.0, 1.0, 0.0], [0.0, 0.0, 9.0]];
+        let loadings = first_component(&products);
+        assert!((loadings[0] + loadings[1]).abs() < 1e-12 && (loadings[0].abs() - 1.0).abs() < 1e-12);
+        assert!(loadings[2].abs() < 1e-12, "{loadings:?}");
+    }
+}
