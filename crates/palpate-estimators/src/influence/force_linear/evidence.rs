@@ -106,6 +106,11 @@ impl ChannelFit {
     pub fn noise_variance(&self) -> f64 {
         self.signal * self.ratio
     }
+
+    /// The source whose place is the most probable; `None` where none are looked for.
+    pub fn most_probable_source(&self) -> Option<&SourceFit> {
+        self.sources.iter().max_by(|a, b| a.weight.total_cmp(&b.weight))
+    }
 }
 
 /// Presses whose evidence is asked under one prior, and the places of sensors that are tried.

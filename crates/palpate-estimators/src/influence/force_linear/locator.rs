@@ -143,7 +143,7 @@ pub struct ForceLinearLocator {
     pub(super) layers: Layers,
     /// ω.
     pub(super) open: Vec<Lanes>,
-    /// Share of what is open of each channel that it errs by itself, r.
+    /// Share of what is open of a channel that is an error of its own, r.
     pub(super) own: Vec<Lanes>,
     /// Loadings on errors that all channels share, u; nothing where they share none.
     pub(super) shared: Vec<Lanes>,

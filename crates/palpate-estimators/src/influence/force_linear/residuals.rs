@@ -45,7 +45,7 @@ impl Residuals {
             for c in channels {
                 let mut left = white.column(c).to_owned();
                 let mut diagonal = squared.clone();
-                if let Some(source) = fits[c].sources.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)) {
+                if let Some(source) = fits[c].most_probable_source() {
                     let place = std::slice::from_ref(&sensors_m[source.place]);
                     let (column, _) = restricted.residuals(prior.sources(presses, place));
                     let column = column.column(0).to_owned();

@@ -151,7 +151,7 @@ impl<'a> Seen<'a> {
         }
     }
 
-    /// Writes d and f of every channel over its standard deviation for a contact; the logarithm of the determinant, less a constant.
+    /// Writes d and f of the channels for a contact, whitened; the logarithm of the determinant, less a constant.
     pub(super) fn whiten(&mut self, at: Unknowns, channels: &mut Vec<[f64; 2]>) -> f64 {
         self.weigh(at);
         let ForceLinearLocator { layers, stored, .. } = self.locator;

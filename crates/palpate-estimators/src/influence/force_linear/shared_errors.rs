@@ -14,7 +14,7 @@ use super::presses::Presses;
 use super::prior::Prior;
 use ndarray::Array2;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::NotPositiveDefinite;
+use palpate_numerics::{NotPositiveDefinite, median};
 
 /// Loadings u of the channels; none where they share no errors.
 pub(super) fn loadings(
@@ -26,14 +26,12 @@ pub(super) fn loadings(
     if matches!(prior.extent, Extent::Line { .. }) && prior.source.is_some() {
         return Ok(Vec::new());
     }
-    let mut ratios: Vec<f64> = fits.iter().map(|fit| fit.ratio).collect();
-    ratios.sort_by(f64::total_cmp);
-    let evidence = Evidence::new(presses, prior, &[]);
-    let restricted = evidence.restricted(ratios[ratios.len() / 2])?;
+    let Some(ratio) = median(fits.iter().map(|fit| fit.ratio).collect()) else { return Ok(Vec::new()) };
+    let restricted = Evidence::new(presses, prior, &[]).restricted(ratio)?;
     let projection = restricted.projection();
     let (mut white, _) = restricted.residuals(presses.means.clone());
     for (mut white, fit) in white.columns_mut().into_iter().zip(fits) {
-        if let Some(source) = fit.sources.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)) {
+        if let Some(source) = fit.most_probable_source() {
             let place = std::slice::from_ref(&sensors_m[source.place]);
             let (column, _) = restricted.residuals(prior.sources(presses, place));
             let column = column.column(0);
