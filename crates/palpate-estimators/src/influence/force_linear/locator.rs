@@ -5,21 +5,17 @@ use super::drift::DriftCourse;
 use super::posterior::Functions;
 use super::prior::{Prior, Source};
 use super::scan::Scan;
-use super::seen::Seen;
 use super::shared_errors::own_shares;
 use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::influence::at_nodes::InfluencesAtNodes;
 use crate::influence::config::Structure;
 use crate::influence::grid::{Axis, check_axes, greatest_distances};
-use crate::influence::inversion::{Inversion, Layers, Limits, ToldForce};
+use crate::influence::inversion::Layers;
 use crate::influence::lanes::{Lanes, in_lanes};
 use crate::lightest_touch::LightestTouch;
 use crate::recording::{LEAST_FREEDOM, Recording};
 use crate::setup::Setup;
-use crate::spread::spread_bound;
-use crate::status::{
-    Detection, Directions, FalseAlarmRate, NoiseBounds, learnt_bounds, misfit_bound, unknowns,
-};
+use crate::status::{Detection, Directions, FalseAlarmRate, NoiseBounds, unknowns};
 use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::CramerRaoBound;
@@ -468,7 +464,7 @@ impl ForceLinearLocator {
         [self.stored.x, self.stored.y]
     }
 
-    fn unknowns(&self) -> usize {
+    pub(super) fn unknowns(&self) -> usize {
         unknowns(if self.stored.y.count > 1 { 2 } else { 1 }, self.stored.known_force_n)
     }
 
@@ -607,19 +603,8 @@ impl ForceLinearLocator {
         Directions { length: 0.5 * boundary, area }
     }
 
-    /// Sets the bound of the residual from the recording's own readings.
-    pub(super) fn limit_residuals(&mut self, recording: &Recording) {
-        let freedom = self.stored.live.len().saturating_sub(self.unknowns());
-        let normal = [misfit_bound(freedom), spread_bound(self.stored.prior.extent.dimensions())];
-        let [misfit, spread] = learnt_bounds(normal, recording, |reading| {
-            let mut seen = Inversion::new(self.seen(&self.relative(reading)));
-            [seen.misfit(), seen.spread()]
-        });
-        (self.stored.residual_limit, self.stored.spread_limit) = (misfit, Some(spread));
-    }
-
     /// The reading less the offsets, over the noise.
-    fn relative(&self, reading: &[f64]) -> Vec<f64> {
+    pub(super) fn relative(&self, reading: &[f64]) -> Vec<f64> {
         let Tables { offsets, noise_sd, .. } = &self.stored.functions;
         let channels = self.stored.live.iter().zip(offsets).zip(noise_sd);
         channels.map(|((c, offset), noise)| (reading[*c] - offset) / noise).collect()
@@ -651,38 +636,10 @@ impl ForceLinearLocator {
         self.stored.known_force_n.map(|force_n| self.stored.prior.response_n(force_n))
     }
 
-    /// A reading, less offsets and over the noise, ready to be explained.
-    pub(super) fn seen(&self, relative: &[f64]) -> Seen<'_> {
-        Seen::new(self, relative)
-    }
-
-    /// Source of the force of an estimate.
-    fn told_force(&self) -> ToldForce {
-        self.stored.known_force_n.map_or(ToldForce::Estimated, ToldForce::Known)
-    }
-
-    /// The estimate of a relative reading.
-    fn estimate(&self, relative: &[f64]) -> Estimate {
-        let Stored { residual_limit, spread_limit, .. } = self.stored;
-        let limits = Limits { misfit: residual_limit, spread: spread_limit.unwrap_or(f64::INFINITY) };
-        Inversion::new(self.seen(relative)).estimate(self.told_force(), limits)
-    }
-
-    /// The estimate of a reading whose intervals are those of the posterior, near the ends too.
-    pub(super) fn posterior(&self, reading: &[f64]) -> Estimate {
-        self.estimate(&self.relative(reading))
-    }
-
     /// True for a reading that noise alone explains.
     #[cfg(test)]
     pub fn is_noise(&self, reading: &[f64]) -> bool {
         self.is_no_contact(&self.relative(reading))
-    }
-
-    /// The contact of a reading, summed over the whole grid.
-    #[cfg(test)]
-    pub fn summed_everywhere(&self, reading: &[f64], per_node: usize) -> palpate_core::ContactEstimate {
-        Inversion::new(self.seen(&self.relative(reading))).summed_everywhere(self.told_force(), per_node)
     }
 }
 

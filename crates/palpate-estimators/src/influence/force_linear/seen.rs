@@ -12,13 +12,59 @@
 //! is large, everything would explain a reading otherwise. From few presses ln p is divided by a number of channels whose errors count as
 //! those of one.
 
-use super::locator::{COVARIANCES, ForceLinearLocator, LAYERS, VALUES, VARIANCES};
+use super::locator::{COVARIANCES, ForceLinearLocator, LAYERS, Stored, VALUES, VARIANCES};
 use crate::influence::grid::Axis;
-use crate::influence::inversion::{Cells, Explain, Explained, Look, Slopes, look_at_cells};
+use crate::influence::inversion::{
+    Cells, Explain, Explained, Inversion, Limits, Look, Slopes, ToldForce, look_at_cells,
+};
 use crate::influence::lanes::{LANES, Lanes, in_lanes};
 use crate::influence::levenberg::{Equations, Unknowns};
-use crate::spread::{About, spread_score};
+use crate::recording::Recording;
+use crate::spread::{About, spread_bound, spread_score};
+use crate::status::{learnt_bounds, misfit_bound};
+use palpate_core::Estimate;
 use palpate_numerics::{SharedError, normal_between, simd, with_shared_error};
+
+impl ForceLinearLocator {
+    /// A reading, less offsets and over the noise, ready to be explained.
+    pub(super) fn seen(&self, relative: &[f64]) -> Seen<'_> {
+        Seen::new(self, relative)
+    }
+
+    /// Sets the bound of the residual from the recording's own readings.
+    pub(super) fn limit_residuals(&mut self, recording: &Recording) {
+        let freedom = self.stored.live.len().saturating_sub(self.unknowns());
+        let normal = [misfit_bound(freedom), spread_bound(self.stored.prior.extent.dimensions())];
+        let [misfit, spread] = learnt_bounds(normal, recording, |reading| {
+            let mut seen = Inversion::new(self.seen(&self.relative(reading)));
+            [seen.misfit(), seen.spread()]
+        });
+        (self.stored.residual_limit, self.stored.spread_limit) = (misfit, Some(spread));
+    }
+
+    /// Source of the force of an estimate.
+    fn told_force(&self) -> ToldForce {
+        self.stored.known_force_n.map_or(ToldForce::Estimated, ToldForce::Known)
+    }
+
+    /// The estimate of a relative reading.
+    pub(super) fn estimate(&self, relative: &[f64]) -> Estimate {
+        let Stored { residual_limit, spread_limit, .. } = self.stored;
+        let limits = Limits { misfit: residual_limit, spread: spread_limit.unwrap_or(f64::INFINITY) };
+        Inversion::new(self.seen(relative)).estimate(self.told_force(), limits)
+    }
+
+    /// The estimate of a reading whose intervals are those of the posterior, near the ends too.
+    pub(super) fn posterior(&self, reading: &[f64]) -> Estimate {
+        self.estimate(&self.relative(reading))
+    }
+
+    /// The contact of a reading, summed over the whole grid.
+    #[cfg(test)]
+    pub fn summed_everywhere(&self, reading: &[f64], per_node: usize) -> palpate_core::ContactEstimate {
+        Inversion::new(self.seen(&self.relative(reading))).summed_everywhere(self.told_force(), per_node)
+    }
+}
 
 /// A relative reading, and room for what is interpolated to explain it.
 #[derive(Debug)]
