@@ -30,7 +30,7 @@ fn bench(force_is_known: bool) -> Example {
     bench
 }
 
-/// What contacts at one place are told by locators in turn.
+/// Coverage of contacts at one place, by locators in turn.
 fn covered(
     bench: &Example,
     locators: &[Box<dyn Locate<Check = NoCheck>>],

@@ -22,7 +22,7 @@ pub(super) struct OutlierTest<'a> {
 
 impl OutlierTest<'_> {
     /// First rows of the worst outliers among the presses, no more than `at_once`; others may be none without them. `tested` presses are
-    /// tested in all.
+    /// tested in all, and told the noise together.
     pub fn worst(
         &self,
         presses: &Presses,
@@ -39,6 +39,7 @@ impl OutlierTest<'_> {
         if freedom < 5.0 {
             return Ok(Vec::new());
         }
+        let freedom = freedom + tested.saturating_sub(n) as f64;
         let externally = |square: f64, told: f64| {
             let others = (freedom - square).max(1e-3 * freedom);
             // The others say next to nothing of a press alone at its place.

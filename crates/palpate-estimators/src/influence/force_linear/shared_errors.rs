@@ -1,6 +1,6 @@
 //! Errors of influence functions that all channels share.
 //!
-//! What presses leave open of the functions lies between the same places in all channels, and sensors of one surface see it bend alike. Channel k
+//! Functions that are learnt at few places are open between the same places in all channels, and sensors of one surface see it bend alike. Channel k
 //! errs by √w_k·(u_k·z + √r_k·e_k) for a contact, w_k being what the presses leave open of its reading, z one standard normal variable of all channels
 //! and e_k one of its own. The loadings u are those of the first principal component of the channels' correlation as their processes have it: with
 //! A the covariance of the presses, K its part without noise and P = A⁻¹ less what offset and polynomials take up, that of

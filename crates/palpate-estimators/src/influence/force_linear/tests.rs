@@ -8,12 +8,13 @@ use super::prior::Prior;
 use super::{ForceLinearLocator, evidence, fit, fit_condensed, posterior};
 use crate::fit::Fit;
 use crate::fit::{FitTask, Locate};
+use crate::fixtures::Covered;
 use crate::influence::{Influence, InfluenceFitError, InfluenceLocator, Structure};
 use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use ndarray::{Array1, Array2};
 use palpate_core::Status;
-use palpate_mechanics::contact::Position;
+use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
 use palpate_mechanics::surface::{
@@ -421,6 +422,23 @@ fn compare_strips(count: u64, (presses, places): (usize, usize), structure: Stru
     comparison
 }
 
+/// Coverage of contacts, each drawn by the board that it presses, by boards in turn.
+fn covered(
+    boards: &mut [(Bench, ForceLinearLocator)],
+    readings: usize,
+    mut contact: impl FnMut(&mut Xoshiro256PlusPlus) -> Contact,
+) -> Covered {
+    let mut row = Covered::default();
+    let count = boards.len();
+    for i in 0..readings {
+        let (bench, locator) = &mut boards[i % count];
+        let contact = contact(&mut bench.rng);
+        let reading = bench.counts(contact.position, contact.force_n);
+        row.add(&locator.locate(&reading), contact);
+    }
+    row
+}
+
 #[test]
 fn strips_are_located_better_than_by_a_spline() {
     for (presses, places) in [(25, 9), (60, 15), (120, 30)] {
@@ -636,7 +654,7 @@ fn estimates_are_those_of_a_plain_sum_over_the_grid() {
     for (bench, touches, most_apart) in
         [(&bench, &touches, 0.1), (&precise, &precise.presses.clone(), 0.1), (&open, &open_touches, 0.2)]
     {
-        let locator = bench.fit(Structure::ForceLinear).unwrap();
+        let locator = bench.fit(Structure::Auto).unwrap();
         for row in touches {
             let (found, all) =
                 (locator.locate(&row.reading), locator.summed_everywhere(&row.reading, PER_NODE));
@@ -712,9 +730,26 @@ fn many_presses_all_over_a_plate_are_condensed_with_hardly_a_loss() {
 }
 
 #[test]
+fn presses_of_plates_that_are_right_are_kept() {
+    /// Plates in a test that takes seconds.
+    const QUICK: u64 = 3;
+    let plates = benches(QUICK);
+    let lost: Vec<u64> = (22..22 + plates)
+        .filter(|seed| {
+            let mut bench = Bench::plate(*seed);
+            bench.presses = bench.touches(450);
+            let (setup, recording) = (bench.setup(), bench.recording());
+            let task = FitTask::new(&setup, &recording);
+            let locator = fit_condensed(task, Structure::ForceLinear, 150).unwrap().unwrap();
+            !locator.set_aside().is_empty()
+        })
+        .collect();
+    eprintln!("{} of {plates} plates of 450 right presses have one set aside: {lost:?}", lost.len());
+    assert!(50 * lost.len() as u64 <= plates, "{lost:?}");
+}
+
+#[test]
 fn presses_that_nothing_explains_are_set_aside_among_many() {
-    /// One of ten plates loses a press or two that are right, where its influences bend as no prior says.
-    const MOST_RIGHT: usize = 2;
     let plate = |seed| {
         let mut bench = Bench::plate(seed);
         bench.presses = bench.touches(450);
@@ -727,7 +762,7 @@ fn presses_that_nothing_explains_are_set_aside_among_many() {
         };
         let touches = bench.touches(200);
         let clean = condensed(&bench);
-        assert!(clean.set_aside().len() <= MOST_RIGHT, "{:?}", clean.set_aside());
+        assert_eq!(clean.set_aside(), [0usize; 0]);
         // Some were pressed elsewhere, and a gauge of others was read wrong.
         let moved = [17, 170, 333];
         let misread = [40, 41, 42, 200, 420];
@@ -738,11 +773,10 @@ fn presses_that_nothing_explains_are_set_aside_among_many() {
         for row in misread {
             bench.presses[row].reading[2] += 100.0;
         }
-        let wrong = [&moved[..], &misread[..]].concat();
+        let mut wrong = [&moved[..], &misread[..]].concat();
+        wrong.sort_unstable();
         let locator = condensed(&bench);
-        let found = locator.set_aside();
-        assert!(wrong.iter().all(|row| found.contains(row)), "{found:?}");
-        assert!(found.len() <= wrong.len() + MOST_RIGHT, "{found:?}");
+        assert_eq!(locator.set_aside(), wrong);
         let [mended, clean] = [locator, clean].map(|locator| mean(errors_mm(&locator, &touches).0));
         assert!(mended < 1.05 * clean, "{mended} mm, {clean} mm without outliers");
     }

@@ -59,12 +59,9 @@ impl Place {
 
 fn print(row: &Covered, place: Place, force_n: f64) {
     eprintln!(
-        "| {force_n} N, {} | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.2} mm | {:.2} N | {:.2} mm | {:.2} N |",
+        "| {force_n} N, {} | {} | {:.2} mm | {:.2} N | {:.2} mm | {:.2} N |",
         place.name(),
-        row.found_percent(),
-        row.percent(row.along),
-        row.percent(row.across),
-        row.percent(row.force),
+        row.shares(),
         row.mean(row.width_mm),
         row.mean(row.width_n),
         row.mean(row.error_mm),

@@ -1,8 +1,7 @@
 //! Coverage of contacts by their distance from an edge of a plate of which nothing but presses is known.
 
 use super::*;
-use crate::fixtures::{Covered, readings};
-use palpate_mechanics::contact::Contact;
+use crate::fixtures::readings;
 
 const SIDE_M: f64 = 0.3;
 /// Presses at each place.
@@ -50,26 +49,18 @@ fn plates(places: usize, known_force_n: Option<f64>) -> Vec<(Bench, ForceLinearL
     (0..(readings(READINGS) / OF_A_PLATE).min(MOST_PLATES)).map(plate).collect()
 }
 
-/// What contacts so far from the left edge are told by plates in turn.
-fn covered(plates: &mut [(Bench, ForceLinearLocator)], x_m: f64, force_n: f64) -> Covered {
-    let mut row = Covered::default();
-    let count = plates.len();
-    for i in 0..readings(READINGS) {
-        let (bench, locator) = &mut plates[i % count];
-        let position = Position { x_m, y_m: bench.rng.random_range(0.06..SIDE_M - 0.06) };
-        let reading = bench.counts(position, force_n);
-        row.add(&locator.locate(&reading), Contact { position, force_n });
-    }
-    row
+/// Coverage of contacts so far from the left edge.
+fn covered_at(plates: &mut [(Bench, ForceLinearLocator)], x_m: f64, force_n: f64) -> Covered {
+    covered(plates, readings(READINGS), |rng| {
+        let position = Position { x_m, y_m: rng.random_range(0.06..SIDE_M - 0.06) };
+        Contact { position, force_n }
+    })
 }
 
 fn print(row: &Covered, name: &str, place_mm: f64) {
     eprintln!(
-        "| {name}, {place_mm} mm | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.1} mm | {:.1} mm |",
-        row.found_percent(),
-        row.percent(row.along),
-        row.percent(row.across),
-        row.percent(row.force),
+        "| {name}, {place_mm} mm | {} | {:.1} mm | {:.1} mm |",
+        row.shares(),
         row.mean(row.width_mm),
         row.mean(row.error_mm),
     );
@@ -91,7 +82,7 @@ fn contacts_near_an_edge_are_in_their_intervals() {
             let mut plates = plates(PLACES, known_force_n);
             let name = format!("{force_n} N{}", if known_force_n.is_some() { ", known" } else { "" });
             for place_mm in PLACES_MM {
-                let row = covered(&mut plates, 1e-3 * place_mm, force_n);
+                let row = covered_at(&mut plates, 1e-3 * place_mm, force_n);
                 print(&row, &name, place_mm);
                 let is_held = row.percent(row.along) >= 85.0 && row.percent(row.force) >= 85.0;
                 let is_held = is_held || place_mm > BEYOND_MM;
@@ -110,7 +101,7 @@ fn contacts_between_few_places_of_a_plate_are_in_their_intervals() {
     const FORCE_N: f64 = 5.0;
     let mut plates = plates(PLACES, None);
     for place_mm in [10.0, 60.0, 100.0, 150.0] {
-        let row = covered(&mut plates, 1e-3 * place_mm, FORCE_N);
+        let row = covered_at(&mut plates, 1e-3 * place_mm, FORCE_N);
         print(&row, &format!("{PLACES} × {PLACES} places, {FORCE_N} N"), place_mm);
         let is_held = row.percent(row.along).min(row.percent(row.across)).min(row.percent(row.force)) >= 85.0;
         assert!(is_held && row.outside == 0 && row.found == row.readings, "{place_mm} mm: {row:?}");

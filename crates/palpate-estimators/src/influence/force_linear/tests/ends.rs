@@ -1,9 +1,8 @@
 //! Coverage of contacts by their distance from the end of a beam of which nothing but presses is known.
 
 use super::*;
-use crate::fixtures::{Covered, paper, readings};
+use crate::fixtures::{paper, readings};
 use crate::simulate::clean_reading;
-use palpate_mechanics::contact::Contact;
 
 const BEAM_M: f64 = 0.4;
 /// Distances from the left end, in millimetres.
@@ -13,6 +12,8 @@ const READINGS: usize = 100;
 /// Readings at each place by one beam.
 const OF_A_BEAM: usize = 10;
 const MOST_BEAMS: usize = 20;
+
+const HEADER: &str = "| from the end | contact found | place covered | force covered | mean width | mean error | outside_model |\n|---|---|---|---|---|---|---|";
 
 /// The forces of the presses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,16 +55,19 @@ fn beams() -> u64 {
     (readings(READINGS) / OF_A_BEAM).min(MOST_BEAMS) as u64
 }
 
-/// What contacts at one place are told by beams in turn.
-fn covered(beams: &mut [(Bench, ForceLinearLocator)], x_m: f64, force_n: f64) -> Covered {
-    let mut row = Covered::default();
-    let contact = Contact { position: Position::along(x_m), force_n };
-    let count = beams.len();
-    for i in 0..readings(READINGS) {
-        let (bench, locator) = &mut beams[i % count];
-        let reading = bench.counts(contact.position, force_n);
-        row.add(&locator.locate(&reading), contact);
-    }
+/// Coverage of contacts at one place, whose row of a table it prints under [`HEADER`].
+fn covered_at(beams: &mut [(Bench, ForceLinearLocator)], place_mm: f64, force_n: f64) -> Covered {
+    let contact = Contact { position: Position::along(1e-3 * place_mm), force_n };
+    let row = covered(beams, readings(READINGS), |_| contact);
+    eprintln!(
+        "| {place_mm} mm | {:.1} % | {:.1} % | {:.1} % | {:.2} mm | {:.2} mm | {:.1} % |",
+        row.found_percent(),
+        row.percent(row.along),
+        row.percent(row.force),
+        row.mean(row.width_mm),
+        row.mean(row.error_mm),
+        row.percent(row.doubted)
+    );
     row
 }
 
@@ -90,20 +94,11 @@ fn contacts_beyond_the_outermost_press_are_in_their_intervals() {
         let mut beams: Vec<_> = (0..beams()).map(beam).collect();
         for force_n in [1.0, 3.0] {
             eprintln!(
-                "{places} places × {times} from {} mm, pressed {pressed:?}; {force_n} N\n| from the end | contact found | place covered | force covered | mean width | mean error | outside_model |\n|---|---|---|---|---|---|---|",
+                "{places} places × {times} from {} mm, pressed {pressed:?}; {force_n} N\n{HEADER}",
                 span_mm.0
             );
             for place_mm in PLACES_MM {
-                let row = covered(&mut beams, 1e-3 * place_mm, force_n);
-                eprintln!(
-                    "| {place_mm} mm | {:.1} % | {:.1} % | {:.1} % | {:.1} mm | {:.1} mm | {:.1} % |",
-                    row.found_percent(),
-                    row.percent(row.along),
-                    row.percent(row.force),
-                    row.mean(row.width_mm),
-                    row.mean(row.error_mm),
-                    row.percent(row.doubted)
-                );
+                let row = covered_at(&mut beams, place_mm, force_n);
                 let is_held = row.percent(row.along) >= 85.0 && row.percent(row.force) >= 85.0;
                 if !is_held || row.outside > 0 {
                     wrong.push(format!("{places} places × {times}, {force_n} N at {place_mm} mm: {row:?}"));
@@ -130,19 +125,9 @@ fn contacts_of_known_force_beyond_the_outermost_press_are_in_their_intervals() {
             (bench, locator)
         };
         let mut beams: Vec<_> = (0..beams()).map(beam).collect();
-        eprintln!(
-            "{} places × {} from {} mm, {FORCE_N} N known\n| from the end | place covered | mean width | mean error | outside_model |\n|---|---|---|---|---|",
-            presses.0, presses.1, span_mm.0
-        );
+        eprintln!("{} places × {} from {} mm, {FORCE_N} N known\n{HEADER}", presses.0, presses.1, span_mm.0);
         for place_mm in PLACES_MM {
-            let row = covered(&mut beams, 1e-3 * place_mm, FORCE_N);
-            eprintln!(
-                "| {place_mm} mm | {:.1} % | {:.2} mm | {:.2} mm | {:.1} % |",
-                row.percent(row.along),
-                row.mean(row.width_mm),
-                row.mean(row.error_mm),
-                row.percent(row.doubted)
-            );
+            let row = covered_at(&mut beams, place_mm, FORCE_N);
             if row.percent(row.along) < 85.0 || row.outside > 0 {
                 wrong.push(format!("{presses:?}, {place_mm} mm: {row:?}"));
             }
@@ -177,15 +162,9 @@ fn contacts_between_few_places_of_a_beam_are_in_their_intervals() {
             (bench, locator)
         };
         let mut beams: Vec<_> = (0..beams()).map(beam).collect();
+        eprintln!("6 places × {times} from 40 mm; 3 N\n{HEADER}");
         for place_mm in [20.0, 45.0, 60.0, 75.0, 120.0, 200.0] {
-            let row = covered(&mut beams, 1e-3 * place_mm, 3.0);
-            eprintln!(
-                "| 6 places × {times}, {place_mm} mm | {:.1} % | {:.1} % | {:.1} mm | {:.1} % |",
-                row.percent(row.along),
-                row.percent(row.force),
-                row.mean(row.width_mm),
-                row.percent(row.doubted)
-            );
+            let row = covered_at(&mut beams, place_mm, 3.0);
             let is_held = row.percent(row.along) >= 75.0 && row.percent(row.force) >= 70.0;
             assert!(is_held && row.outside == 0 && row.found == row.readings, "{place_mm} mm: {row:?}");
         }
