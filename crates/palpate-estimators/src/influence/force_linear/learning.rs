@@ -166,8 +166,7 @@ impl Learnt {
 
     /// Loadings of the errors that all channels share.
     pub fn shared_errors(&self) -> Result<Vec<f64>, MeasuredError> {
-        let l = loadings(&self.presses, &self.prior, &self.fits, &self.sensors_m)?;
-        Ok(l)
+        Ok(loadings(&self.presses, &self.prior, &self.fits, &self.sensors_m)?)
     }
 
     /// Offsets, and influences at `places_m` per newton of φ.

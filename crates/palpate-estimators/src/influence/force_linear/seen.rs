@@ -28,7 +28,15 @@ use palpate_numerics::{SharedError, normal_between, simd, with_shared_error};
 impl ForceLinearLocator {
     /// A reading, less offsets and over the noise, ready to be explained.
     pub(super) fn seen(&self, relative: &[f64]) -> Seen<'_> {
-        Seen::new(self, relative)
+        Seen {
+            locator: self,
+            reading: in_lanes(relative),
+            noise: 1.0,
+            between: Vec::new(),
+            slopes: Vec::new(),
+            weights: Vec::new(),
+            shared: Vec::new(),
+        }
     }
 
     /// Sets the bound of the residual from the recording's own readings.
@@ -159,20 +167,7 @@ impl<const SHARED: bool> simd::Kernel for WeighChannels<'_, SHARED> {
     }
 }
 
-impl<'a> Seen<'a> {
-    /// A reading, less offsets and over the noise, ready to be explained.
-    pub fn new(locator: &'a ForceLinearLocator, relative: &[f64]) -> Self {
-        Self {
-            locator,
-            reading: in_lanes(relative),
-            noise: 1.0,
-            between: Vec::new(),
-            slopes: Vec::new(),
-            weights: Vec::new(),
-            shared: Vec::new(),
-        }
-    }
-
+impl Seen<'_> {
     fn weighed(&self, force_n: f64) -> Weighed {
         let ForceLinearLocator { open, own, shared, layers, .. } = self.locator;
         let of = |layer: usize| &self.between[layer * layers.groups()..(layer + 1) * layers.groups()];
