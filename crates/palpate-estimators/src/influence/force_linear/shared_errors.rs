@@ -6,6 +6,9 @@
 //! A the covariance of the presses, K its part without noise and P = A⁻¹ less what offset and polynomials take up, that of
 //! yᵀ·P·K·P·y (Conti and O'Hagan, Journal of Statistical Planning and Inference 140, 2010, for outputs that share a design).
 //!
+//! Channels that share nothing have a first component too, the larger the fewer presses: of N channels whose presses leave ν degrees of freedom its
+//! variance is about (1 + √(N/ν))² (Johnstone, Annals of Statistics 29, 2001). No errors are shared where it is not more.
+//!
 //! Along a line r_k = 1 − u_k². On a plane r_k = 1: beside its sensor an influence has a peak that presses between which it lies do not show, in each
 //! channel by itself. Where the places of point sensors are looked for along a line, these and cubics are most of every function, and no errors are shared.
 
@@ -43,7 +46,15 @@ pub(super) fn loadings(
     let lower = prior.covariance(presses);
     let covariance = &lower + &lower.t() - Array2::from_diag(&lower.diag());
     let products = weights.t().dot(&covariance).dot(&weights);
-    Ok(first_component(&products))
+    let freedom = presses.len().saturating_sub(restricted.effects());
+    let loadings = first_component(&products);
+    Ok(if is_common(&loadings, freedom) { loadings } else { Vec::new() })
+}
+
+/// True where a first component of given loadings has more variance than that of channels which share nothing.
+fn is_common(loadings: &[f64], freedom: usize) -> bool {
+    let variance: f64 = loadings.iter().map(|loading| loading * loading).sum();
+    variance > (1.0 + (loadings.len() as f64 / freedom as f64).sqrt()).powi(2)
 }
 
 /// Loadings of the first principal component of the correlations of given products, by the power method: channels may be hundreds.
@@ -77,6 +88,9 @@ pub(super) fn own_shares(loadings: &[f64], extent: Extent) -> Vec<f64> {
 mod tests {
     use super::*;
     use ndarray::array;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
 
     #[test]
     fn channels_that_are_multiples_of_each_other_share_all_errors() {
@@ -84,5 +98,21 @@ mod tests {
         let loadings = first_component(&products);
         assert!((loadings[0] + loadings[1]).abs() < 1e-12 && (loadings[0].abs() - 1.0).abs() < 1e-12);
         assert!(loadings[2].abs() < 1e-12, "{loadings:?}");
+    }
+
+    #[test]
+    fn channels_of_noise_share_nothing() {
+        const COUNT: u64 = 200;
+        const CHANNELS: usize = 6;
+        for freedom in [4, 8, 16] {
+            let is_shared = |seed: &u64| {
+                let mut rng = Xoshiro256PlusPlus::seed_from_u64(*seed);
+                let noise = Array2::from_shape_simple_fn((freedom, CHANNELS), || StandardNormal.sample(&mut rng));
+                let loadings = first_component(&noise.t().dot(&noise));
+                is_common(&loadings, freedom)
+            };
+            let shared = (0..COUNT).filter(is_shared).count();
+            assert!(shared < 15, "{shared} of {COUNT} from {freedom} degrees of freedom");
+        }
     }
 }
