@@ -2,6 +2,12 @@
 
 use crate::fit::LocatorFault;
 use palpate_mechanics::contact::Position;
+use std::ops::RangeInclusive;
+
+/// Least nodes along a line: what few presses leave open rises and falls between two of them, which cubics over a node or two a press miss.
+pub(super) const LEAST_ALONG_LINE: usize = 60;
+/// Least nodes of any other axis, those of a cubic.
+pub(super) const LEAST_NODES: usize = 4;
 
 /// Evenly spaced nodes.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -25,17 +31,28 @@ impl Axis {
     /// Nodes over the span of `values`, and half their largest gap beyond at either end; about two nodes for every distinct value, and at
     /// least `per_length` a `length`, but no more than `most`.
     pub fn over(values: Vec<f64>, length: f64, most: usize) -> Self {
-        Self::beyond(values, 0.5, (f64::NEG_INFINITY, f64::INFINITY), length, most)
+        Self::beyond(values, 0.5, (f64::NEG_INFINITY, f64::INFINITY), length, LEAST_NODES..=most)
     }
 
     /// The same of positions along a side of so many metres: beyond half the largest gap, contacts are less likely up to the whole gap, but
-    /// nowhere beyond the side's ends.
-    pub fn of_positions(positions_m: Vec<f64>, side_m: f64, length_m: f64, most: usize) -> Self {
-        Self::beyond(positions_m, 1.0, (0.0, side_m), length_m, most)
+    /// nowhere beyond the side's ends. There are at least and at most so many `nodes`.
+    pub fn of_positions(
+        positions_m: Vec<f64>,
+        side_m: f64,
+        length_m: f64,
+        nodes: RangeInclusive<usize>,
+    ) -> Self {
+        Self::beyond(positions_m, 1.0, (0.0, side_m), length_m, nodes)
     }
 
     /// Nodes up to so many gaps beyond the values.
-    fn beyond(mut values: Vec<f64>, gaps: f64, bounds: (f64, f64), length: f64, most: usize) -> Self {
+    fn beyond(
+        mut values: Vec<f64>,
+        gaps: f64,
+        bounds: (f64, f64),
+        length: f64,
+        nodes: RangeInclusive<usize>,
+    ) -> Self {
         /// Nodes a length scale: linear and cubic interpolation between them is then better than the noise.
         const PER_LENGTH: f64 = 8.0;
         values.sort_by(f64::total_cmp);
@@ -50,8 +67,9 @@ impl Axis {
             return Self { start: *first, ..Self::NONE };
         }
         let by_values = 2 * values.len() - 1;
+        let (least, most) = nodes.into_inner();
         let by_length = ((to - from) / length * PER_LENGTH).min(most as f64) as usize + 2;
-        let count = by_values.max(by_length).min(most).max(4);
+        let count = by_values.max(by_length).clamp(least, most);
         let step = (to - from) / (count - 1) as f64;
         Self { start: from, step, count, margins: [(usual.0 - from) / step, (to - usual.1) / step] }
     }

@@ -107,7 +107,8 @@ mod tests {
         for freedom in [4, 8, 16] {
             let is_shared = |seed: &u64| {
                 let mut rng = Xoshiro256PlusPlus::seed_from_u64(*seed);
-                let noise = Array2::from_shape_simple_fn((freedom, CHANNELS), || StandardNormal.sample(&mut rng));
+                let noise =
+                    Array2::from_shape_simple_fn((freedom, CHANNELS), || StandardNormal.sample(&mut rng));
                 let loadings = first_component(&noise.t().dot(&noise));
                 is_common(&loadings, freedom)
             };
