@@ -2,6 +2,8 @@
 
 /// Half the width of a normal distribution's 95 % interval, in standard deviations.
 pub const NORMAL_95: f64 = 1.959_963_984_540_054;
+/// The same of 99 %.
+pub const NORMAL_99: f64 = 2.575_829_303_548_900_4;
 
 /// 95 % quantile of χ² with two degrees of freedom, −2·ln 0.05: the squared size, in standard
 /// deviations, of a normal distribution's 95 % ellipse.
@@ -249,6 +251,7 @@ mod tests {
     fn tables_are_met() {
         assert!((normal_cdf(NORMAL_95) - 0.975).abs() < 1e-15);
         assert!((normal_quantile(0.975) - NORMAL_95).abs() < 1e-12);
+        assert!((normal_quantile(0.995) - NORMAL_99).abs() < 1e-12);
         assert!((chi_squared_critical_value(0.05, 2) - ELLIPSE_95).abs() < 1e-12);
         // Tables of χ²: 95 %, 99.99 % and one in a million.
         for (tail, freedom, value) in [

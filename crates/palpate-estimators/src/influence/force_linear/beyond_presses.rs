@@ -2,7 +2,7 @@
 //!
 //! The influences are extrapolated there, and how surely depends on sensors that may be there, of which presses tell nothing. An interval of the place that
 //! reaches beyond the outermost press reaches the end of the surface: nothing there is excluded. Where the force is not known, it and the place trade off,
-//! and the force's interval holds every force as well.
+//! and the force's interval holds every force as well. On a plane that of 99 % has to stay within the presses.
 //!
 //! On a line intervals are by the likelihood ratio ([`crate::trade_off`]), in which one channel may be anything: by the posterior, contacts beside the end would be
 //! excluded by the prior. Where the force is known, a contact beyond the grid of places may be explained best at either
@@ -13,7 +13,7 @@ use crate::influence::grid::Axis;
 use crate::status::OTHER_PLACE;
 use crate::trade_off::{CALIBRATED, Contacts, Force, NotExcluded};
 use palpate_core::{ContactEstimate, Estimate};
-use palpate_numerics::{holding, hull, normal_interval_95};
+use palpate_numerics::{NORMAL_95, NORMAL_99, holding, hull, normal_interval_95};
 use std::cell::RefCell;
 
 impl ForceLinearLocator {
@@ -27,16 +27,19 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Lets the intervals of a contact on a plane that reach beyond the outermost presses reach the edges.
+    /// Lets the intervals of a contact on a plane that would reach beyond the outermost presses with 99 % reach the edges.
     fn open_edges(&self, estimate: &mut Estimate) {
-        let Some(uncertainty) = &mut estimate.contact.uncertainty else { return };
+        let ContactEstimate { position, uncertainty: Some(uncertainty), .. } = &mut estimate.contact else {
+            return;
+        };
         let extent = self.stored.prior.extent;
         let sizes_m = [extent.length_m(), extent.width_m().unwrap_or(0.0)];
-        let intervals_m = [&mut uncertainty.x_95_m, &mut uncertainty.y_95_m];
+        let intervals_m = [(position.x_m, &mut uncertainty.x_95_m), (position.y_m, &mut uncertainty.y_95_m)];
         let mut is_beyond = false;
-        for (k, interval_m) in intervals_m.into_iter().enumerate() {
+        for (k, (at_m, interval_m)) in intervals_m.into_iter().enumerate() {
             let (first_m, last_m) = self.outermost_m(k);
-            let (is_before, is_behind) = (interval_m.0 <= first_m, interval_m.1 >= last_m);
+            let (low_m, high_m) = of_99(at_m, *interval_m);
+            let (is_before, is_behind) = (low_m <= first_m, high_m >= last_m);
             // The estimate is drawn too far towards an edge as often as too little: all that lies beyond is held.
             if is_before {
                 *interval_m = hull(*interval_m, (0.0, first_m));
@@ -129,6 +132,12 @@ impl ForceLinearLocator {
         let force_n = |response_n: f64| prior.force_of_response(response_n, 0.0).0;
         ((low_m, high_m), Some((force_n(least_n), force_n(most_n))))
     }
+}
+
+/// The interval of 99 % of an estimate with one of 95 %.
+fn of_99(at_m: f64, (low_m, high_m): (f64, f64)) -> (f64, f64) {
+    const TIMES: f64 = NORMAL_99 / NORMAL_95;
+    (at_m - TIMES * (at_m - low_m), at_m + TIMES * (high_m - at_m))
 }
 
 /// Length of a grid along a line.
