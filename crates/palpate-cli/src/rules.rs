@@ -2,19 +2,34 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::input;
+use palpate_estimators::estimator::Locator;
 use palpate_live::rules::Rules;
 use palpate_mechanics::surface::Extent;
 use std::path::Path;
 
-/// The rules of a file for a surface of this extent: those that publish and those that send commands to the board; none without a file.
-pub fn read(path: Option<&Path>, extent: Extent) -> Result<(Rules, Rules), Failure> {
-    let Some(path) = path else { return Ok((Rules::default(), Rules::default())) };
+/// The rules of a file for a surface of this extent; none without a file.
+pub fn read(path: Option<&Path>, extent: Extent) -> Result<Rules, Failure> {
+    let Some(path) = path else { return Ok(Rules::default()) };
     let text = input::read_text(path)?;
-    let rules = Rules::from_toml(&text, extent).map_err(|error| {
+    Ok(Rules::from_toml(&text, extent).map_err(|error| {
         let span = error.span.clone().unwrap_or(0..0);
         Complaint::new(error).at_span(&path.display().to_string(), &text, span)
-    })?;
-    Ok(rules.by_action())
+    })?)
+}
+
+/// Refuses rules that ask for a force, where the locator tells none: they would never act.
+pub fn refuse_untold_forces(rules: &Rules, path: &Path, locator: &Locator) -> Result<(), Failure> {
+    if locator.tells_force() {
+        return Ok(());
+    }
+    let Some(rule) = rules.first_of_force() else { return Ok(()) };
+    let problem = format!(
+        "rule `{}` asks for a `force`, and the locator, of kind `{}`, tells none: it would never act",
+        rule.name,
+        locator.kind()
+    );
+    let complaint = Complaint::about(path, problem);
+    Err(complaint.help("leave `force` out, or fit an estimator that tells it, such as `influence`").into())
 }
 
 /// Refuses rules that publish, where there is no broker.

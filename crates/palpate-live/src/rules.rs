@@ -158,6 +158,12 @@ impl Rules {
         &self.0
     }
 
+    /// The first rule that asks for a force, of which a locator that [tells none](palpate_estimators::estimator::Locator::tells_force) has none.
+    pub fn first_of_force(&self) -> Option<&Rule> {
+        let asks = |rule: &&Rule| matches!(rule.condition, Condition::Contact { force_n: Some(_), .. });
+        self.0.iter().find(asks)
+    }
+
     /// The rules that publish messages, and those that send commands to the board.
     pub fn by_action(self) -> (Self, Self) {
         let publishes = |rule: &Rule| matches!(rule.action, Action::Publish { .. });

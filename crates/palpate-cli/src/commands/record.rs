@@ -73,7 +73,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .set_columns(arguments.from.columns())
         .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
     let mut sinks: Vec<Box<dyn Sink>> = vec![Box::new(Words)];
-    let (publishing, commanding) = rules::read(arguments.rules.as_deref(), session.extent())?;
+    let rules = rules::read(arguments.rules.as_deref(), session.extent())?;
+    if let Some(path) = &arguments.rules {
+        rules::refuse_untold_forces(&rules, path, &locator)?;
+    }
+    let (publishing, commanding) = rules.by_action();
     if let (None, Some(path)) = (&arguments.mqtt, &arguments.rules) {
         rules::refuse_publishing(&publishing, path, "--mqtt mqtt://host/topic names a broker")?;
     }

@@ -168,6 +168,9 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
             (locator, can_be.then_some((*rig, config)))
         }
     };
+    if let Some(path) = &arguments.rules {
+        rules::refuse_untold_forces(&commanding, path, &locator)?;
+    }
     if let Err(error) = locator.tare() {
         remark!("warning: no tare, so offsets that have moved stay in the readings: {error}");
     }
@@ -180,7 +183,7 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
 
 /// The rules of the arguments, which send commands to the board.
 fn commands(arguments: &Arguments, extent: Extent) -> Result<Rules, Failure> {
-    let (publishing, commanding) = rules::read(arguments.rules.as_deref(), extent)?;
+    let (publishing, commanding) = rules::read(arguments.rules.as_deref(), extent)?.by_action();
     if let Some(path) = &arguments.rules {
         rules::refuse_publishing(&publishing, path, "`palpate record --mqtt` has one")?;
     }

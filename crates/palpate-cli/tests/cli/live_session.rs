@@ -169,6 +169,22 @@ fn rules_send_commands_to_the_board_over_a_pseudo_terminal_and_tcp() {
 }
 
 #[test]
+fn rules_that_ask_for_a_force_of_a_locator_that_tells_none_are_refused() {
+    let (rest, _) = NOISY_BEAM.split_once("[estimator]").unwrap();
+    let folder = bench(&format!("{rest}[estimator]\nkind = \"network\"\nmax_epochs = 200\n"));
+    let record = ["record", "locator.json", "--out", "never.mcap", "--rules", "rules.toml", "--from", BOARD];
+    let serve = ["serve", "locator.json", "--listen", "127.0.0.1:0", "--rules", "rules.toml"];
+    let rule = "[[rule]]\nname = \"brake\"\nforce = [\"5 N\", \"9 N\"]\ncommand = \"brake on\"\n";
+    fs::write(folder.path().join("rules.toml"), rule).unwrap();
+    for arguments in [&record[..], &serve] {
+        let told = complained(&run(folder.path(), arguments), 2);
+        assert!(told.contains("rules.toml: rule `brake` asks for a `force`"), "{told}");
+        assert!(told.contains("kind `network`") && told.contains("leave `force` out"), "{told}");
+    }
+    assert!(!folder.path().join("never.mcap").exists());
+}
+
+#[test]
 fn sources_without_a_way_back_and_rules_without_a_broker_are_refused() {
     let folder = bench(NOISY_BEAM);
     fs::write(folder.path().join("rules.toml"), RULES).unwrap();

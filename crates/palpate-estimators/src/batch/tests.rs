@@ -58,24 +58,45 @@ fn assert_agree(locator: &Locator, readings: &[f64]) -> Vec<Status> {
     single.iter().map(|estimate| estimate.status).collect()
 }
 
-#[test]
-fn a_batch_of_every_method_answers_as_readings_one_by_one_do() {
+/// Benches of every estimator, with presses.
+fn benches() -> Vec<(Setup, Recording)> {
     let measured = raw_setup(paper(0.0, 1).setup.surface().extent(), 8, None);
     let beam = paper(um(5.0), 4);
     let plate = plate(12, ChannelModel { noise_sd: um(20.0), ..ChannelModel::default() });
     let digit = digit(ForceDirection::Normal, 4.0);
     let mut presses = beam.simulate(1);
     presses.rows.iter_mut().for_each(|row| row.force_n = None);
-    let benches = [
+    vec![
         (beam.setup.clone(), beam.simulate(1)),
         (beam.setup.clone().unknown_force(), beam.simulate(1)),
         (measured.clone(), beam.simulate(1)),
         (measured, presses),
         (plate.setup.clone(), plate.simulate(1)),
         (digit.setup.clone(), digit.simulate(1)),
-    ];
+    ]
+}
+
+#[test]
+fn contacts_of_every_method_have_a_force_where_the_locator_tells_one() {
+    let mut told = Vec::new();
+    for (setup, presses) in benches() {
+        for locator in locators(&setup, &presses) {
+            let readings = presses.touched().rows.into_iter().map(|row| row.reading);
+            let estimates = readings.map(|reading| locator.locate(&reading).unwrap());
+            let found = estimates.filter(|estimate| estimate.status == Status::Located);
+            let forces: Vec<Option<f64>> = found.map(|estimate| estimate.contact.force_n).collect();
+            let is_as_told = |force_n: &Option<f64>| force_n.is_some() == locator.tells_force();
+            assert!(!forces.is_empty() && forces.iter().all(is_as_told), "{}: {forces:?}", locator.kind());
+            told.push(locator.tells_force());
+        }
+    }
+    assert!(told.contains(&true) && told.contains(&false), "{told:?}");
+}
+
+#[test]
+fn a_batch_of_every_method_answers_as_readings_one_by_one_do() {
     let (mut kinds, mut statuses) = (Vec::new(), Vec::new());
-    for (setup, presses) in benches {
+    for (setup, presses) in benches() {
         let readings = readings(&presses);
         for locator in locators(&setup, &presses) {
             statuses.extend(assert_agree(&locator, &readings));

@@ -430,6 +430,31 @@ impl Locator {
         }
     }
 
+    /// True of a locator whose estimates have a force: one that is known, or that it tells.
+    ///
+    /// ```
+    /// use palpate_estimators::{arrangement::Training, fit::Fit, network::Network, influence::Influence, setup::Setup};
+    /// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+    ///
+    /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+    /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+    /// let presses = setup.simulate(&Training::even(10), 0)?;
+    /// assert!(Influence::default().fit(&setup, &presses)?.into_locator().tells_force());
+    /// assert!(!Network::default().fit(&setup, &presses)?.into_locator().tells_force());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn tells_force(&self) -> bool {
+        match &self.method {
+            Method::Influence(influence) => influence.tells_force(),
+            Method::ClosedForm(_) | Method::Digit(_) => true,
+            Method::Network(_) => false,
+            Method::NetworkLm(networks) => networks.tells_force(),
+            Method::GaussianProcess(process) => process.force_n.is_some(),
+            Method::Neighbours(neighbours) => neighbours.force_n.is_some(),
+            Method::Centroid(centroid) => centroid.force_n.is_some(),
+        }
+    }
+
     /// The influence functions of a surface without a model that are proportional to force, or to a power of it; `None` of any other locator.
     pub fn force_linear(&self) -> Option<&ForceLinearLocator> {
         match &self.method {

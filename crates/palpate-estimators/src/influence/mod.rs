@@ -198,6 +198,14 @@ impl InfluenceLocator {
         }
     }
 
+    /// True of one whose estimates have a force.
+    pub fn tells_force(&self) -> bool {
+        match self {
+            Self::Beam(_) | Self::Plane(_) | Self::ForceLinear(_) => true,
+            Self::Measured(measured) => measured.tells_force(),
+        }
+    }
+
     /// Share of untouched readings that may be taken for a contact; `None` of one that tells no untouched reading.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         match self {

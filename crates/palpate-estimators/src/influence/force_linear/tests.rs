@@ -610,9 +610,10 @@ fn a_file_gives_the_same_locator_and_bad_numbers_are_refused() {
     let bad = json.replacen("\"offset_variances\":[", "\"offset_variances\":[-", 1);
     let error = serde_json::from_str::<ForceLinearLocator>(&bad).unwrap_err().to_string();
     assert!(error.contains("offset variance"), "{error}");
-    // Few places: what is open of the influences is shared by all channels.
     let mut file = serde_json::to_value(&locator).unwrap();
-    assert_eq!(file["shared_errors"].as_array().unwrap().len(), GAUGES);
+    file["shared_errors"] = serde_json::json!(vec![0.5; GAUGES]);
+    let sharing: ForceLinearLocator = serde_json::from_value(file.clone()).unwrap();
+    assert_eq!(serde_json::to_value(&sharing).unwrap(), file);
     for (loadings, what) in
         [(vec![0.5; 2], "loadings"), (vec![1.5; GAUGES], "loading"), (vec![-1e308; GAUGES], "-1")]
     {

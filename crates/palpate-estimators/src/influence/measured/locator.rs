@@ -174,6 +174,11 @@ impl MeasuredLocator {
             .summed_everywhere(self.told_force(), per_node)
     }
 
+    /// True where its estimates have a force: one that is known, or the nuisance coordinate.
+    pub fn tells_force(&self) -> bool {
+        self.told_force() != ToldForce::Untold
+    }
+
     /// Source of the force of an estimate.
     fn told_force(&self) -> ToldForce {
         match (self.stored.role, self.stored.force_n) {

@@ -358,11 +358,21 @@ impl LevenbergMarquardtLocator {
         Some((mean, covariance))
     }
 
+    /// Number of the output that is the force, if one is.
+    fn force_output(&self) -> Option<usize> {
+        (self.scales.len() > self.extent.dimensions()).then(|| self.scales.len() - 1)
+    }
+
+    /// True where its estimates have a force: one that is known, or an output.
+    pub fn tells_force(&self) -> bool {
+        self.force_n.is_some() || self.force_output().is_some()
+    }
+
     fn contact(&self, mean: &[f64], covariance: &[Vec<f64>]) -> ContactEstimate {
         let value = |k: usize| self.scales[k].mean + self.scales[k].sd * mean[k];
         let covariance = |i: usize, j: usize| self.scales[i].sd * self.scales[j].sd * covariance[i][j];
         let (x, y) = (Some(0), self.extent.width_m().map(|_| 1));
-        let force = (self.scales.len() > 1 + usize::from(y.is_some())).then(|| self.scales.len() - 1);
+        let force = self.force_output();
         let pairs = [(x, x), (x, y), (x, force), (y, y), (y, force), (force, force)];
         let interval = |k: usize| normal_interval_95(value(k), covariance(k, k).sqrt());
         ContactEstimate {

@@ -162,6 +162,9 @@ fn contacts_between_few_places_of_a_beam_are_in_their_intervals() {
             (bench, locator)
         };
         let mut beams: Vec<_> = (0..beams()).map(beam).collect();
+        assert!(
+            beams.iter().all(|(bench, locator)| locator.stored.shared_errors.len() == bench.offsets.len())
+        );
         eprintln!("6 places × {times} from 40 mm; 3 N\n{HEADER}");
         for place_mm in [20.0, 45.0, 60.0, 75.0, 120.0, 200.0] {
             let row = covered_at(&mut beams, place_mm, 3.0);
