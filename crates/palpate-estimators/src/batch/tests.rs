@@ -81,8 +81,8 @@ fn contacts_of_every_method_have_a_force_where_the_locator_tells_one() {
     let mut told = Vec::new();
     for (setup, presses) in benches() {
         for locator in locators(&setup, &presses) {
-            let readings = presses.touched().rows.into_iter().map(|row| row.reading);
-            let estimates = readings.map(|reading| locator.locate(&reading).unwrap());
+            let touched = presses.touched();
+            let estimates = touched.rows.iter().map(|row| locator.locate(&row.reading).unwrap());
             let found = estimates.filter(|estimate| estimate.status == Status::Located);
             let forces: Vec<Option<f64>> = found.map(|estimate| estimate.contact.force_n).collect();
             let is_as_told = |force_n: &Option<f64>| force_n.is_some() == locator.tells_force();
