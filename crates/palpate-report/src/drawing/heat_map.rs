@@ -32,7 +32,7 @@ const OVERLAP: f64 = 0.5;
 /// A quantity over a plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatMap {
-    /// Heading, in one line.
+    /// Heading, in one line or two.
     pub title: String,
     /// The plane, parted into cells of one value each.
     pub cells: Cells,
@@ -90,7 +90,7 @@ pub fn heat_map_to_svg(map: &HeatMap) -> String {
     let width_px = map.width_px.clamp(320, 4000);
     let layout = Layout::new(map, f64::from(width_px));
     let mut svg = Svg::new(width_px, layout.height.ceil() as u32);
-    svg.text(&layout.title(map));
+    layout.title.iter().for_each(|line| svg.text(line));
     for (panel, plot) in map.panels.iter().zip(&layout.plots) {
         draw_cells(&mut svg, map, panel, *plot, &layout.colours);
         draw_dots(&mut svg, map, *plot);
@@ -106,9 +106,22 @@ fn sides_mm(map: &HeatMap) -> [f64; 2] {
     [extent.length_m() * 1e3, extent.width_m().unwrap_or(extent.length_m()) * 1e3]
 }
 
+/// The lines of a title at the top of an image.
+fn title_labels(title: &str, width: f64) -> Vec<Label> {
+    const MOST_LINES: usize = 2;
+    let lines = text::wrap(title, TITLE_SIZE, width - 2.0 * MARGIN, MOST_LINES).into_iter().enumerate();
+    let label = |(i, text): (usize, String)| {
+        let at = (MARGIN, MARGIN + (i as f64 + 0.5) * TITLE_LINE);
+        Label { text, at, anchor: Anchor::Start, size: TITLE_SIZE, colour: INK }
+    };
+    lines.map(label).collect()
+}
+
 /// Layout of a figure of maps, in pixels.
 struct Layout {
+    width: f64,
     height: f64,
+    title: Vec<Label>,
     plots: Vec<Rect>,
     bar: Rect,
     colours: AxisScale,
@@ -131,7 +144,8 @@ impl Layout {
         let aspect = width_mm / length_mm;
         let map_width = each.min(MOST_HEIGHT / aspect).max(20.0);
         let map_height = map_width * aspect;
-        let top = MARGIN + TITLE_LINE;
+        let title = title_labels(&map.title, width);
+        let top = MARGIN + title.len().max(1) as f64 * TITLE_LINE;
         let row_height = NAME_LINE + map_height + FOOT;
         let plot = |i: usize| {
             let (column, row) = ((i % columns) as f64, (i / columns) as f64);
@@ -150,13 +164,20 @@ impl Layout {
         let (x, y) = (axis(length_mm), axis(width_mm));
         let x_ticks = choose_ticks(&x, None, &|ticks| columns_fit(&x, ticks, map_width));
         let y_ticks = choose_ticks(&y, None, &|ticks| rows_fit(&y, ticks, map_height));
-        Self { height, plots, bar, colours: colours(map), x: (x, x_ticks), y: (y, y_ticks) }
+        let (x, y) = ((x, x_ticks), (y, y_ticks));
+        Self { width, height, title, plots, bar, colours: colours(map), x, y }
     }
 
-    fn title(&self, map: &HeatMap) -> Label {
-        let at = (MARGIN, MARGIN + 0.5 * TITLE_LINE);
-        let text = text::fit(&map.title, TITLE_SIZE, self.bar.right + BAR_LABELS - MARGIN);
-        Label { text, at, anchor: Anchor::Start, size: TITLE_SIZE, colour: INK }
+    /// Room for the name of a map.
+    fn name_room(&self, plot: Rect) -> f64 {
+        let is_last_of_row = !self.plots.iter().any(|other| other.top == plot.top && other.left > plot.left);
+        // To the right of the name the next map's axis has its own, or the colour bar.
+        let is_beneath_bar = plot.top > self.bar.bottom;
+        if is_last_of_row && is_beneath_bar {
+            self.width - MARGIN - plot.left
+        } else {
+            plot.width() + 0.5 * GAP
+        }
     }
 
     /// Name and ticks of one map.
@@ -169,8 +190,7 @@ impl Layout {
             colour: QUIET_INK,
         };
         let mut labels = tick_labels(&plot, (&self.x.0, &self.x.1), (&self.y.0, &self.y.1));
-        // To the right of the name, the next map's axis has its own.
-        let name = text::fit(&panel.name, NAME_SIZE, plot.width() + 0.5 * GAP);
+        let name = text::fit(&panel.name, NAME_SIZE, self.name_room(plot));
         let above = plot.top - NAME_RISE;
         labels.push(Label {
             size: NAME_SIZE,

@@ -26,12 +26,24 @@ fn texts_of_maps_lie_inside_the_image_and_apart() {
         for width_m in [0.02, 0.1, 0.3, 0.9] {
             for values in [|i| i as f64, |i| 10_f64.powi(i as i32), |_| f64::NAN] {
                 let case = format!("{panels} panels, {width_m} m wide");
-                let seen = see(&heat_map_to_svg(&map(panels, width_m, values)));
-                seen.assert_texts_inside(&case);
-                seen.assert_texts_apart(&case);
+                for width_px in [360, 860] {
+                    let map = HeatMap { width_px, ..map(panels, width_m, values) };
+                    let seen = see(&heat_map_to_svg(&map));
+                    seen.assert_texts_inside(&case);
+                    seen.assert_texts_apart(&case);
+                }
             }
         }
     }
+}
+
+#[test]
+fn titles_and_names_are_whole_on_a_phone() {
+    let title = "The least standard deviation of a located contact".to_owned();
+    let mut map = HeatMap { title, width_px: 360, ..map(2, 0.3, |i| i as f64) };
+    map.panels[1].name = "force unknown, estimated along".to_owned();
+    let svg = heat_map_to_svg(&map);
+    assert!(svg.contains(&map.panels[1].name) && !svg.contains('…'), "{svg}");
 }
 
 #[test]
