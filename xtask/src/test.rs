@@ -96,9 +96,9 @@ fn prerequisites(root: &Path, skips: Skips, missing: &mut Vec<String>) -> Outcom
 
 fn tests(root: &Path, skips: Skips, skipped: &Skipped, everything: &[&str]) -> Outcome {
     let mut command = if NEXTEST.is_there(root) {
-        // One more than there are cores: many a test waits for a board or a server.
+        // Two more than there are cores: many a test waits for a board or a server.
         let threads =
-            format!("--test-threads={}", thread::available_parallelism().map_or(2, |cores| cores.get() + 1));
+            format!("--test-threads={}", thread::available_parallelism().map_or(2, |cores| cores.get() + 2));
         cargo(root, &[&["nextest", "run", "--no-fail-fast", &threads], everything].concat())
     } else {
         cargo(root, &[&["test", "--lib", "--bins", "--tests", "--no-fail-fast"], everything].concat())

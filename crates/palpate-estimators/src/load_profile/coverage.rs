@@ -117,3 +117,22 @@ fn patches_are_held_wherever_they_lie() {
         }
     }
 }
+
+/// No other load has the force of one over the whole beam, so that its interval ends where centre and width are told as well. docs/load-profiles.md has the
+/// shares of 400 readings: PALPATE_READINGS=400.
+#[test]
+fn the_force_of_a_load_over_the_whole_beam_is_held() {
+    let readings = fixtures::readings(40);
+    let (beam, load) = (beam(), UniformLoad::along(0.0, 0.4, 4.0));
+    let sensors = LoadSensors::new(&beam, &layout(true)).unwrap();
+    let profiler = Profiler::new(sensors.clone());
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+    let mut held = Held::default();
+    for _ in 0..readings {
+        let reading = noisy(&sensors, &clean(&sensors, &[load]), &mut rng);
+        held.add(&profiler.profile(&reading).unwrap(), &[load]);
+    }
+    println!("a load over the whole beam: {held:?}");
+    let all = [held.told, held.force, held.centre, held.pressure, held.total];
+    assert!(all.into_iter().all(|count| 100 * count >= 90 * readings), "{held:?}");
+}

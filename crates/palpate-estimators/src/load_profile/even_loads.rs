@@ -19,6 +19,10 @@ use palpate_numerics::Cholesky;
 
 /// 95 % quantile of χ² of one.
 const RATIO_95: f64 = 3.84;
+/// The same of χ² of three: no other load has the force of one over the whole surface, so that it tells centre and width as well.
+const RATIO_95_OF_WHOLE: f64 = 7.81;
+/// Share of a side from which on a load is over the whole of it.
+const WHOLE: f64 = 0.95;
 /// Values of an interval that a median is of.
 const LOOKED_AT: usize = 16;
 /// Misfit that does not matter.
@@ -353,7 +357,22 @@ impl<'a> EvenLoads<'a> {
     /// The value at which the least misfit reaches the largest one that is not excluded, found by steps of `step` to begin with; `None` where there is
     /// no end but that of the surface.
     fn end(&self, aim: Aim, step: f64) -> Option<f64> {
-        let most = self.best.misfit + RATIO_95;
+        let (end, unknowns) = self.end_at(aim, step, RATIO_95)?;
+        if unknowns.chunks(self.each()).any(|load| self.is_whole(load)) {
+            return self.end_at(aim, step, RATIO_95_OF_WHOLE).map(|(end, _)| end);
+        }
+        Some(end)
+    }
+
+    /// True of a load over the whole surface.
+    fn is_whole(&self, load: &[f64]) -> bool {
+        let ends_m = self.ends_m(load);
+        (0..self.dimensions).all(|axis| ends_m[axis][1] - ends_m[axis][0] >= WHOLE * self.table.side_m(axis))
+    }
+
+    /// The same for misfits that exceed the least by a given ratio at most, with the unknowns there.
+    fn end_at(&self, aim: Aim, step: f64, ratio: f64) -> Option<(f64, Vec<f64>)> {
+        let most = self.best.misfit + ratio;
         let stiffness = 1.0 / (step * step);
         let start = self.value_at(aim, &self.best.unknowns);
         let (mut inside, mut from, mut way) = (self.best.clone(), start, 2.0 * step);
@@ -365,9 +384,9 @@ impl<'a> EvenLoads<'a> {
             }
             let (was, is) = (self.value_at(aim, &inside.unknowns), self.value_at(aim, &found.unknowns));
             (inside, from) = (found, t);
-            // It does not follow.
-            if way.abs() > 8.0 * step.abs() && (is - was).abs() < 1e-6 * step.abs() {
-                return (!self.is_at_edge(aim, &inside.unknowns)).then_some(is);
+            // It does not follow. (One that hardly does may be told far better than to first order, as the force of a load that can be no wider.)
+            if way.abs() > 8.0 * step.abs() && (is - was).abs() < 1e-9 * step.abs() {
+                return (!self.is_at_edge(aim, &inside.unknowns)).then_some((is, inside.unknowns));
             }
             way *= 2.0;
         }
@@ -380,7 +399,7 @@ impl<'a> EvenLoads<'a> {
         (aim, stiffness, most): (Aim, f64, f64),
         mut inside: (f64, Minimum),
         mut outside: (f64, Minimum),
-    ) -> Option<f64> {
+    ) -> Option<(f64, Vec<f64>)> {
         for _ in 0..MOST_HALVINGS {
             if outside.1.misfit - most < 10.0 * NEGLIGIBLE || most - inside.1.misfit < 10.0 * NEGLIGIBLE {
                 break;
@@ -393,7 +412,8 @@ impl<'a> EvenLoads<'a> {
         let [low, high] =
             [&inside, &outside].map(|(_, minimum)| (minimum.misfit, self.value_at(aim, &minimum.unknowns)));
         let share = (most - low.0) / (high.0 - low.0).max(f64::MIN_POSITIVE);
-        (!self.is_at_edge(aim, &inside.1.unknowns)).then_some(low.1 + share * (high.1 - low.1))
+        let end = low.1 + share * (high.1 - low.1);
+        (!self.is_at_edge(aim, &inside.1.unknowns)).then_some((end, inside.1.unknowns))
     }
 
     /// True for a value of a load whose centre is at an end of its range. The value has no bound then: a narrower load could be nearer to the edge, and

@@ -2,7 +2,7 @@
 //!
 //! The influences are extrapolated there, and how surely depends on sensors that may be there, of which presses tell nothing. An interval of the place that
 //! reaches beyond the outermost press reaches the end of the surface: nothing there is excluded. Where the force is not known, it and the place trade off,
-//! and the force's interval holds every force as well. On a plane that of 99 % has to stay within the presses.
+//! and the force's interval holds every force as well. On a plane the interval of 99 % says whether one reaches there.
 //!
 //! On a line intervals are by the likelihood ratio ([`crate::trade_off`]), in which one channel may be anything: by the posterior, contacts beside the end would be
 //! excluded by the prior. Where the force is known, a contact beyond the grid of places may be explained best at either
