@@ -2,12 +2,13 @@
 
 use crate::fit::LocatorFault;
 use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
 use std::ops::RangeInclusive;
 
 /// Least nodes along a line: what few presses leave open rises and falls between two of them, which cubics over a node or two a press miss.
-pub(super) const LEAST_ALONG_LINE: usize = 60;
+const LEAST_ALONG_LINE: usize = 60;
 /// Least nodes of any other axis, those of a cubic.
-pub(super) const LEAST_NODES: usize = 4;
+const LEAST_NODES: usize = 4;
 
 /// Evenly spaced nodes.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -35,14 +36,18 @@ impl Axis {
     }
 
     /// The same of positions along a side of so many metres: beyond half the largest gap, contacts are less likely up to the whole gap, but
-    /// nowhere beyond the side's ends. There are at least and at most so many `nodes`.
+    /// nowhere beyond the side's ends. The side is number `k` of the extent's.
     pub fn of_positions(
         positions_m: Vec<f64>,
-        side_m: f64,
+        (extent, k): (Extent, usize),
         length_m: f64,
-        nodes: RangeInclusive<usize>,
+        most: usize,
     ) -> Self {
-        Self::beyond(positions_m, 1.0, (0.0, side_m), length_m, nodes)
+        let (sides_m, least) = match extent.width_m() {
+            None => ([extent.length_m(), 0.0], LEAST_ALONG_LINE),
+            Some(width_m) => ([extent.length_m(), width_m], LEAST_NODES),
+        };
+        Self::beyond(positions_m, 1.0, (0.0, sides_m[k]), length_m, least..=most)
     }
 
     /// Nodes up to so many gaps beyond the values.

@@ -15,12 +15,10 @@ use super::cumulative::CumulativeInfluence;
 use ndarray::{Array1, Array2};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, UniformLoad};
-use palpate_numerics::Cholesky;
+use palpate_numerics::{Cholesky, chi_squared_critical_value};
 
 /// 95 % quantile of χ² of one.
 const RATIO_95: f64 = 3.84;
-/// The same of χ² of three: no other load has the force of one over the whole surface, so that it tells centre and width as well.
-const RATIO_95_OF_WHOLE: f64 = 7.81;
 /// Share of a side from which on a load is over the whole of it.
 const WHOLE: f64 = 0.95;
 /// Values of an interval that a median is of.
@@ -359,7 +357,9 @@ impl<'a> EvenLoads<'a> {
     fn end(&self, aim: Aim, step: f64) -> Option<f64> {
         let (end, unknowns) = self.end_at(aim, step, RATIO_95)?;
         if unknowns.chunks(self.each()).any(|load| self.is_whole(load)) {
-            return self.end_at(aim, step, RATIO_95_OF_WHOLE).map(|(end, _)| end);
+            // No other load has the force of this one, so that it tells centres and widths as well.
+            let ratio = chi_squared_critical_value(0.05, self.each());
+            return self.end_at(aim, step, ratio).map(|(end, _)| end);
         }
         Some(end)
     }

@@ -28,7 +28,7 @@ pub use locator::{ForceLinearLocator, Scatter};
 pub use prior::Source;
 
 use super::config::Structure;
-use super::grid::{Axis, LEAST_ALONG_LINE, LEAST_NODES};
+use super::grid::Axis;
 use super::measured::MeasuredError;
 use crate::fit::FitTask;
 use crate::offset_course::OffsetCourse;
@@ -41,7 +41,6 @@ use palpate_numerics::{mean, mean_and_variance};
 pub(crate) use presses::FEW;
 use presses::{Presses, shares};
 use prior::Prior;
-use std::ops::RangeInclusive;
 
 /// Distinct positions without which a reading cannot be a function of anything.
 const LEAST_POSITIONS: usize = 2;
@@ -165,16 +164,15 @@ pub(super) fn offset_course(task: FitTask, asked: &Recording) -> Result<Option<O
 /// The grid: the span of the positions that were pressed and their largest gap beyond.
 fn axes(presses: &Presses, prior: &Prior, extent: Extent) -> [Axis; 2] {
     let positions_m = presses.positions_m();
-    let axis = |k: usize, size_m: f64, nodes: RangeInclusive<usize>| {
+    let axis = |k: usize, most: usize| {
         let values = positions_m.iter().map(|position_m| position_m[k]).collect();
         // Beside a point sensor influences bend within no length at all.
         let length_m = if prior.source.is_some() { 0.0 } else { prior.lengths_m[k] };
-        Axis::of_positions(values, size_m, length_m, nodes)
+        Axis::of_positions(values, (extent, k), length_m, most)
     };
-    match extent.width_m() {
-        None => [axis(0, extent.length_m(), LEAST_ALONG_LINE..=MOST_ALONG), Axis::NONE],
-        Some(width_m) => [(0, extent.length_m()), (1, width_m)]
-            .map(|(k, size_m)| axis(k, size_m, LEAST_NODES..=MOST_OF_PLANE)),
+    match extent {
+        Extent::Line { .. } => [axis(0, MOST_ALONG), Axis::NONE],
+        Extent::Plane { .. } => [0, 1].map(|k| axis(k, MOST_OF_PLANE)),
     }
 }
 

@@ -5,7 +5,7 @@ use super::locator::{MeasuredLocator, NuisanceRole, Stored};
 use super::presses::{Presses, nuisance_coordinates};
 use super::table::Table;
 use crate::fit::{Fit, FitTask};
-use crate::influence::grid::{Axis, LEAST_ALONG_LINE, LEAST_NODES};
+use crate::influence::grid::Axis;
 use crate::influence::inversion::{Layers, Stencil};
 use crate::influence::noise::{Noise, Whitening};
 use crate::recording::Recording;
@@ -246,18 +246,15 @@ impl Presses {
         let extent = setup.surface().extent();
         let lengths = &process.hyperparameters().length_scales;
         let values = |k: usize| self.coordinates.column(k).to_vec();
-        let positions =
-            |k: usize, side_m: f64, nodes| Axis::of_positions(values(k), side_m, lengths[k], nodes);
-        let nodes = match extent {
-            Extent::Line { .. } => LEAST_ALONG_LINE..=MOST_ALONG,
-            Extent::Plane { .. } => LEAST_NODES..=MOST_OF_PLANE,
+        let positions = |k: usize, most| Axis::of_positions(values(k), (extent, k), lengths[k], most);
+        let [along, across] = match extent {
+            Extent::Line { .. } => [positions(0, MOST_ALONG), Axis::NONE],
+            Extent::Plane { .. } => [0, 1].map(|k| positions(k, MOST_OF_PLANE)),
         };
-        let along = positions(0, extent.length_m(), nodes);
-        let across = extent.width_m().map(|width_m| positions(1, width_m, LEAST_NODES..=MOST_OF_PLANE));
         let first = self.dimensions();
         let nuisance =
             self.has_nuisance.then(|| Axis::over(values(first), lengths[first], most_nuisance_nodes(extent)));
-        [along, across.unwrap_or(Axis::NONE), nuisance.unwrap_or(Axis::NONE)]
+        [along, across, nuisance.unwrap_or(Axis::NONE)]
     }
 }
 

@@ -152,12 +152,17 @@ fn contacts_of_known_force_at_either_end_of_a_grid_that_reaches_it_are_told() {
     }
 }
 
+/// A beam that is pressed so often at each of six places, the outermost 40 mm from the ends.
+pub(super) fn six_places(seed: u64, times: usize) -> Bench {
+    beam(seed, (6, times), (40.0, 360.0), Pressed::Variously)
+}
+
 /// From six presses 53 % were covered 60 mm from the end by errors of each channel by itself.
 #[test]
 fn contacts_between_few_places_of_a_beam_are_in_their_intervals() {
     for times in [1, 3] {
         let beam = |seed: u64| {
-            let bench = beam(seed, (6, times), (40.0, 360.0), Pressed::Variously);
+            let bench = six_places(seed, times);
             let locator = bench.fit(Structure::ForceLinear).unwrap();
             (bench, locator)
         };

@@ -31,6 +31,7 @@ impl Few {
                 readings.for_each(|value| *value = value.round());
             }
             let locator = bench.fit(Structure::Auto).unwrap();
+            assert!(locator.stored.shared_errors.is_empty(), "gauges of strain share few errors");
             let noise: Vec<f64> = locator.channels().map(|(.., noise)| noise).collect();
             few.least_noise = noise.iter().copied().fold(few.least_noise, f64::min);
             few.noise.push(mean(noise.iter().map(|noise| noise.ln())).exp());
