@@ -76,6 +76,7 @@ export class Page {
       r: () => (this.calibration.guides ? this.calibration.key("redo") : this.record()),
       b: () => this.calibration.key("begin"),
       s: () => this.calibration.key("skip"),
+      u: () => this.calibration.key("untouched"),
       q: () => this.calibration.key("stop"),
       f: () => this.calibration.key("finish"),
       space: () => (this.replay.player === null ? this.pause() : this.replay.toggle()),

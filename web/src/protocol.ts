@@ -129,7 +129,7 @@ export interface RecordingContent {
 
 export type CalibrationPhase = "ready" | "pressing" | "pressed" | "fitting" | "assessing" | "done";
 export type Waiting = "untouched" | "press" | "rest" | "release" | "nothing";
-export type CalibrationStep = "begin" | "redo" | "skip" | "stop" | "finish";
+export type CalibrationStep = "begin" | "redo" | "skip" | "untouched" | "stop" | "finish";
 
 /** A place to press. */
 export interface PlaceRecord {
@@ -156,6 +156,7 @@ export interface CalibrationRecord {
   bad_frames: number;
   presses: string;
   problem: string | null;
+  hint: string | null;
   machine: MachineRecord | null;
   outcome: CalibrationOutcome | null;
 }

@@ -21,6 +21,7 @@ const PRESSING: CalibrationRecord = {
   bad_frames: 0,
   presses: "presses.csv",
   problem: null,
+  hint: null,
   machine: null,
   outcome: null,
 };

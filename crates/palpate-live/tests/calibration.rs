@@ -3,13 +3,16 @@
 use palpate_core::Status;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
-use palpate_estimators::recording::{Recording, Row};
+use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulatedBench;
 
-use palpate_live::calibration::{Guide, Press, Progress, Waiting};
+use palpate_live::calibration::{Doubt, Guide, Press, Progress, RestingRow, Waiting};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_rig::Rig;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
 use std::time::Duration;
 
 const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
@@ -43,12 +46,15 @@ impl<'a> Hand<'a> {
     }
 
     /// Does what the guide waits for, for at most so many readings; the rows that were taken, each with the mean reading of its stretch at rest.
-    fn obey(&mut self, guide: &mut Guide, most: usize) -> Vec<(Row, Vec<f64>)> {
+    fn obey(&mut self, guide: &mut Guide, most: usize) -> Vec<RestingRow> {
         let mut rows = Vec::new();
         for _ in 0..most {
             let (at, reading) = self.reading();
-            if let Progress::Taken { row, mean } = guide.add(at, &reading) {
-                rows.push((row, mean));
+            match guide.add(at, &reading) {
+                Progress::Pressed { untouched, press } => rows.extend(untouched.into_iter().chain([press])),
+                Progress::Untouched(untouched) => rows.push(untouched),
+                Progress::Waits(_) | Progress::None => {}
+                other => panic!("{other:?}"),
             }
             self.contact = match guide.waiting() {
                 Waiting::Press | Waiting::Rest => guide
@@ -73,8 +79,8 @@ fn plan(rig: &Rig) -> Vec<Press> {
         .collect()
 }
 
-fn fitted(rig: &Rig, taken: Vec<(Row, Vec<f64>)>) -> Locator {
-    let rows = taken.into_iter().map(|(row, _)| row).collect();
+fn fitted(rig: &Rig, taken: Vec<RestingRow>) -> Locator {
+    let rows = taken.into_iter().map(|taken| taken.row).collect();
     let recording = Recording::new(rig.setup.layout(), "calibration", rows);
     rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).unwrap()
 }
@@ -87,11 +93,11 @@ fn presses_are_taken_at_rest_and_the_locator_is_near_the_limit() {
     let mut hand = Hand::new(&rig.setup);
     let rows = hand.obey(&mut guide, 100_000);
     assert_eq!(guide.waiting(), Waiting::Nothing);
-    let presses: Vec<&(Row, Vec<f64>)> = rows.iter().filter(|(row, _)| row.touches()).collect();
+    let presses: Vec<&RestingRow> = rows.iter().filter(|taken| taken.row.touches()).collect();
     assert_eq!(presses.len(), plan.len());
     // An untouched row before the first press, and one after each.
     assert_eq!(rows.len() - presses.len(), plan.len() + 1);
-    for ((row, mean), press) in presses.into_iter().zip(&plan) {
+    for (RestingRow { row, mean }, press) in presses.into_iter().zip(&plan) {
         assert_eq!((row.position, row.force_n), (press.position, press.force_n));
         let clean = hand.bench.clean(&[Contact { position: press.position, force_n: FORCE_N }]);
         // At rest within a percent of the reading. The noise of a reading is 5 µm, that of a mean of 80 readings a ninth of it.
@@ -172,11 +178,11 @@ fn presses_can_be_taken_back_left_out_and_ended() {
     guide.skip();
     assert_eq!(guide.plan().len(), 8);
     let rows = hand.obey(&mut guide, 2000);
-    assert!(rows.iter().filter(|(row, _)| row.touches()).count() >= 2);
+    assert!(rows.iter().filter(|taken| taken.row.touches()).count() >= 2);
     guide.stop();
     assert_eq!((guide.waiting(), guide.next_press()), (Waiting::Nothing, None));
     guide.extend([Press { position: Position::along(0.2), force_n: Some(FORCE_N), depth_m: None }]);
-    assert_eq!(hand.obey(&mut guide, 2000).iter().filter(|(row, _)| row.touches()).count(), 1);
+    assert_eq!(hand.obey(&mut guide, 2000).iter().filter(|taken| taken.row.touches()).count(), 1);
 }
 
 #[test]
@@ -209,4 +215,98 @@ fn a_press_that_is_held_for_long_is_not_taken_for_an_untouched_surface() {
         assert_eq!(guide.add(at, &reading), Progress::None);
     }
     assert_eq!(guide.waiting(), Waiting::Release);
+}
+
+/// Readings of two channels at 100 Hz with a standard deviation of 1, after a course in seconds.
+fn course(seed: u64, seconds: f64, mean: impl Fn(f64) -> [f64; 2]) -> Vec<(Duration, [f64; 2])> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut noisy =
+        |mean: [f64; 2]| mean.map(|mean| mean + Distribution::<f64>::sample(&StandardNormal, &mut rng));
+    (0..(100.0 * seconds) as u64)
+        .map(|i| (Duration::from_millis(10 * i), noisy(mean(i as f64 * 0.01))))
+        .collect()
+}
+
+fn presses_at(count: usize) -> Vec<Press> {
+    vec![Press { position: Position::along(0.1), force_n: Some(2.0), depth_m: None }; count]
+}
+
+#[test]
+fn drift_is_never_a_press() {
+    for drift_per_s in [1.0, 5.0, 20.0] {
+        let mut guide = Guide::new(presses_at(2));
+        for (at, reading) in course(1, 90.0, |s| [1000.0 + drift_per_s * s, 2000.0 - 0.5 * drift_per_s * s]) {
+            let progress = guide.add(at, &reading);
+            assert!(!matches!(progress, Progress::Pressed { .. }), "{drift_per_s}/s at {at:?}: {progress:?}");
+        }
+    }
+}
+
+#[test]
+fn a_drift_that_begins_late_is_learnt_anew() {
+    let mut guide = Guide::new(presses_at(1));
+    let drift = |s: f64| 20.0 * (s - 5.0).max(0.0);
+    let progress: Vec<Progress> = course(2, 300.0, |s| [drift(s), drift(s)])
+        .into_iter()
+        .map(|(at, reading)| guide.add(at, &reading))
+        .collect();
+    assert!(!progress.iter().any(|progress| matches!(progress, Progress::Pressed { .. })));
+}
+
+#[test]
+fn a_firm_press_replaces_a_light_touch_before_it() {
+    let mut guide = Guide::new(presses_at(2));
+    let force = |s: f64| match s {
+        2.0..4.0 => 0.05,
+        4.0..6.0 => 1.0,
+        _ => 0.0,
+    };
+    let mut replaced = None;
+    for (at, reading) in course(3, 10.0, |s| [3000.0 * force(s), 1000.0 * force(s)]) {
+        if let Progress::Replaced(press) = guide.add(at, &reading) {
+            replaced = Some(press.mean[0]);
+        }
+    }
+    assert!(replaced.is_some_and(|mean| (mean - 3000.0).abs() < 5.0), "{replaced:?}");
+    assert_eq!((guide.waiting(), guide.taken()), (Waiting::Press, 1));
+}
+
+#[test]
+fn a_touch_that_stays_is_released_by_learning_the_untouched_reading_anew() {
+    let mut guide = Guide::new(presses_at(2));
+    // The offsets step once and stay.
+    let step = |s: f64| if s < 2.0 { 0.0 } else { 300.0 };
+    for (at, reading) in course(4, 20.0, |s| [step(s), step(s)]) {
+        guide.add(at, &reading);
+    }
+    assert_eq!(guide.waiting(), Waiting::Release);
+    assert!(guide.explain().unwrap().contains("100 % of the press"), "{:?}", guide.explain());
+    assert!(guide.redo());
+    guide.relearn();
+    for (at, reading) in course(5, 3.0, |_| [300.0, 300.0]) {
+        guide.add(at + Duration::from_secs(20), &reading);
+    }
+    assert_eq!((guide.waiting(), guide.taken()), (Waiting::Press, 0));
+}
+
+#[test]
+fn a_press_far_off_its_repeats_is_asked_for_again_and_confirmed_by_a_second_one() {
+    let mut guide = Guide::new(presses_at(3));
+    let force = |s: f64| match (s / 4.0).floor() as i32 {
+        press @ 0..=3 if s % 4.0 > 1.5 && s % 4.0 < 3.5 => [1.0, 0.6, 0.6, 1.0][press as usize],
+        _ => 0.0,
+    };
+    let (mut doubts, mut sizes) = (Vec::new(), Vec::new());
+    for (at, reading) in course(6, 17.0, |s| [3000.0 * force(s), 1000.0 * force(s)]) {
+        match guide.add(at, &reading) {
+            Progress::AskedAgain(doubt) => doubts.push(doubt),
+            Progress::Pressed { press, .. } => sizes.push((press.mean[0] / 100.0).round()),
+            _ => {}
+        }
+    }
+    assert_eq!(sizes, [30.0, 18.0, 30.0]);
+    assert!(
+        matches!(doubts[..], [Doubt::OffRepeats { percent }] if (percent - 40.0).abs() < 1.0),
+        "{doubts:?}"
+    );
 }

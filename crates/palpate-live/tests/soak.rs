@@ -34,6 +34,7 @@ fn every_line_is_accounted_for_and_memory_stays_flat() {
         walk_per_root_s: 1e-8,
         creep: 0.02,
         creep_s: 5.0,
+        ..FaultConfig::default()
     };
     let mut board = SimulatedBoard::new(
         &rig.setup,

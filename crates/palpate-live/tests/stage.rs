@@ -100,8 +100,12 @@ fn a_machine_calibrates_by_itself_to_the_limit() {
         let clean = bench.clean(machine.contact().as_slice());
         let at = Duration::from_millis(10) * reading_number;
         match guide.add(at, &bench.measure(&clean)) {
-            Progress::Taken { row, .. } => rows.push(row),
+            Progress::Pressed { untouched, press } => {
+                rows.extend(untouched.into_iter().chain([press]).map(|row| row.row))
+            }
+            Progress::Untouched(untouched) => rows.push(untouched.row),
             Progress::Waits(_) | Progress::None => {}
+            other => panic!("{other:?}"),
         }
         match (guide.waiting(), guide.next_press()) {
             (Waiting::Press, Some((_, press))) => {

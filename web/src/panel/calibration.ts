@@ -14,6 +14,7 @@ const BUTTONS: { id: string; step: CalibrationStep }[] = [
   { id: "calibration-begin", step: "begin" },
   { id: "calibration-redo", step: "redo" },
   { id: "calibration-skip", step: "skip" },
+  { id: "calibration-untouched", step: "untouched" },
   { id: "calibration-stop", step: "stop" },
   { id: "calibration-finish", step: "finish" },
 ];
@@ -109,6 +110,7 @@ export class CalibrationPanel {
       begin: (state.phase === "ready" && state.left > 0) || state.phase === "pressed",
       redo: (pressing || state.phase === "pressed") && state.taken > 0 && state.machine === null,
       skip: pressing && state.machine === null,
+      untouched: pressing && state.machine === null,
       stop: pressing,
       finish: waits && state.taken > 0,
     };
@@ -189,6 +191,7 @@ function whyWords(state: CalibrationRecord): string {
         : `${state.taken} presses are on disk; ${state.left} are left. Go on, or fit those that there are.`;
     case "pressing":
       if (state.machine?.runs === true) return motionWords(state.machine, state);
+      if (state.hint !== null) return state.hint;
       if (state.waiting === "rest") return "The reading comes to rest; then it is taken by itself.";
       if (state.waiting === "untouched") return "The noise and the untouched reading are learnt.";
       if (state.last_percent === null) return state.waiting === "release" ? "The press is on disk." : "";

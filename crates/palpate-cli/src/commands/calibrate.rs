@@ -57,6 +57,8 @@ pub struct Arguments {
     seed: u64,
 }
 
+/// Keys of a calibration by hand.
+const KEYS: &str = "keys, each with Enter: r takes the last press back, s leaves the next out, u learns the untouched reading anew, q ends here";
 /// Longest time without a look at keys, signals and the machine.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
@@ -164,7 +166,7 @@ fn press_all(
     let mut machine = machine(arguments, stage)?;
     let extent = rig.setup.surface().extent();
     if machine.is_none() {
-        remark!("r and Enter takes the last press back, s leaves the next out, q ends here");
+        remark!("{KEYS}");
         ask(&calibration, extent);
     }
     let mut ended = false;
@@ -272,10 +274,15 @@ fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
                 let force = force.map_or(String::new(), |force_n| format!(" of {force_n:.3} N"));
                 remark!("taken: press {}{force}{off}", calibration.journal().presses());
             }
+            Note::Replaced => {
+                remark!("the reading grew: press {} is taken anew", calibration.journal().presses())
+            }
+            Note::AskedAgain(doubt) => remark!("not taken: {doubt}"),
+            Note::StillWaiting(words) => remark!("{words}"),
             Note::Saturated(name) => remark!("channel {name} reads the end of its range"),
             Note::Ended | Note::Waits(_) | Note::Untouched | Note::Overload(_) => {}
         }
-        if let (Some(extent), Note::Taken | Note::Untouched | Note::Waits(_)) = (hand, note) {
+        if let (Some(extent), Note::Taken | Note::AskedAgain(_) | Note::Waits(_)) = (hand, note) {
             ask(calibration, extent);
         }
     }
@@ -331,8 +338,9 @@ fn press_key(
             }
         }
         "s" => calibration.skip(),
+        "u" => calibration.relearn_untouched(),
         "q" => calibration.stop(),
-        _ => remark!("r and Enter takes the last press back, s leaves the next out, q ends here"),
+        _ => remark!("{KEYS}"),
     }
     ask(calibration, extent);
     Ok(())

@@ -52,6 +52,18 @@ pub struct Arguments {
     /// Time constant of the creep
     #[arg(long, value_name = "TIME", default_value = "5 s", value_parser = input::time)]
     creep_time: f64,
+    /// Hysteresis of each channel: its width as a share of the channel's range under the finger
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = input::share)]
+    hysteresis: f64,
+    /// Share of the largest reading of a touch that remains after it
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = input::share)]
+    residue: f64,
+    /// Time constant in which the residue fades
+    #[arg(long, value_name = "TIME", default_value = "20 s", value_parser = input::time)]
+    residue_time: f64,
+    /// Step of the channels' converters, in their SI unit or raw [default: continuous values]
+    #[arg(long, value_name = "NUMBER", default_value_t = 0.0)]
+    converter_step: f64,
     /// A script of the finger: CSV of time in s, x and y in mm, force in N [default: a random finger]
     #[arg(long, value_name = "FILE.csv")]
     finger: Option<PathBuf>,
@@ -125,6 +137,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         walk_per_root_s: arguments.walk,
         creep: arguments.creep,
         creep_s: arguments.creep_time,
+        hysteresis: arguments.hysteresis,
+        residue: arguments.residue,
+        residue_s: arguments.residue_time,
+        converter_step: arguments.converter_step,
     };
     let board = SimulatedBoard::new(&rig.setup, &config, finger)
         .map_err(|error| Complaint::about(&arguments.rig, error))?;

@@ -1,13 +1,54 @@
-//! The guide of a calibration: which press comes next, and when its reading is taken.
+//! The guide of a calibration: which press comes next, and when its reading is recorded.
 //!
-//! Means of a stretch tell that a surface is at rest; what is taken of it is its last reading alone. A locator learns from the rows how noisy a reading
-//! is, and readings in use are single ones: from means it would learn noise that is too small by the root of their number.
+//! Means of a stretch show that a surface is at rest; the single reading in its middle is recorded. A locator learns from the rows how noisy a reading
+//! is, and readings in use are single ones: from means it would learn noise that is too small by the root of their number. The last reading of a stretch
+//! may be the first of a lift.
+//!
+//! The untouched row of a press is recorded together with the press, so that it is the last reading before the touch, whatever drifted in between.
 
-use super::settling::{Baseline, Stretch};
+use super::baseline::{Baseline, NOISE_LIMIT_SD};
+use super::repeat_check::{Doubt, RepeatCheck, TouchReading};
+use super::stretch::{Stretch, mean};
 use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
 use serde::Serialize;
 use std::time::Duration;
+
+/// Readings in a row that deviate where something touches: one or two may be glitches.
+const ONSET_READINGS: u32 = 3;
+/// Step of the untouched reading that is followed at once, in standard deviations of the noise; a larger one may be a light finger, and has to last
+/// for [`PATIENCE`].
+const FOLLOWED_STEP_SD: f64 = 2.0;
+/// Share of the largest press below which a deviation is no touch: creep and hysteresis leave as much.
+const RESIDUE_SHARE: f64 = 0.005;
+/// Share of a press by which its reading may change between both halves of a stretch at rest: soft surfaces creep, and hands tremble.
+const REST_SHARE: f64 = 0.005;
+/// The same after [`PATIENCE`], so that a hand that never rests is not asked to for ever.
+const PATIENT_REST_SHARE: f64 = 0.02;
+/// Share of a press by which the untouched reading may change while the surface recovers from creep.
+const RECOVERY_SHARE: f64 = 0.001;
+/// Time after which rest is judged less strictly.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Time after which a recovering surface counts as at rest.
+const RECOVERY: Duration = Duration::from_millis(1500);
+/// Share of a press that may remain once it was lifted, and share of the largest press that hysteresis may leave.
+const LIFTED_SHARE: f64 = 0.1;
+const HYSTERESIS_SHARE: f64 = 0.03;
+/// Share of a press below which a reading at rest by noise alone for [`PARTLY_LIFTED`] counts as lifted.
+const PARTLY_LIFTED_SHARE: f64 = 0.5;
+const PARTLY_LIFTED: Duration = Duration::from_secs(2);
+/// Share of the largest deviation of a touch below which a reading at rest is what a lift left.
+const LIFT_TAIL_SHARE: f64 = 1.0 / 3.0;
+/// Cosine of the angle to the last press below which a deviation goes against it.
+const AGAINST: f64 = -0.8;
+/// Share of a press that comes within a second; what comes more slowly is drift.
+const ONSET_SHARE: f64 = 0.2;
+/// Growth of a reading, without a lift, that shows the recorded touch to have been a light one before the press.
+const GROWTH: f64 = 1.2;
+/// Time for which a finger may linger lightly before it presses: a doubtful touch that rests for longer is asked for again.
+const LINGER: Duration = Duration::from_millis(1200);
+/// Silence after which the untouched reading is learnt anew: a board may have restarted.
+const SILENCE: Duration = Duration::from_secs(5);
 
 /// A press that is planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,16 +65,25 @@ pub struct Press {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Waiting {
-    /// The surface is to be left alone, so that its untouched reading is learnt.
+    /// The untouched reading is learnt; the surface must be left alone.
     Untouched,
     /// The next press.
     Press,
-    /// The reading is to come to rest.
+    /// The reading must come to rest.
     Rest,
-    /// The surface is to be let go.
+    /// The surface must be let go.
     Release,
-    /// Nothing: all presses are done, or somebody ended it.
+    /// All presses are done, or the calibration was ended.
     Nothing,
+}
+
+/// A row of the recording with the mean reading of its stretch at rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RestingRow {
+    /// The row, whose reading is the one in the middle of the stretch.
+    pub row: Row,
+    /// Mean reading of the stretch.
+    pub mean: Vec<f64>,
 }
 
 /// Outcome of a reading.
@@ -41,40 +91,101 @@ pub enum Waiting {
 pub enum Progress {
     /// No change.
     None,
-    /// Something else is waited for.
+    /// The guide waits for another step.
     Waits(Waiting),
-    /// A row of the recording was taken: of a press, or of the untouched surface.
-    Taken {
-        /// The row, whose reading is the last of the stretch at rest.
-        row: Row,
-        /// Mean reading of that stretch.
-        mean: Vec<f64>,
+    /// A press was recorded.
+    Pressed {
+        /// The untouched surface before it, unless it is recorded already.
+        untouched: Option<RestingRow>,
+        /// The press.
+        press: RestingRow,
     },
+    /// The last press grew without a lift: this row replaces it.
+    Replaced(RestingRow),
+    /// The untouched surface after the last press was recorded.
+    Untouched(RestingRow),
+    /// The press is asked for again.
+    AskedAgain(Doubt),
+}
+
+/// A touch from its onset on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Touch {
+    /// Deviating readings in a row before the onset.
+    onset: u32,
+    /// Largest deviation of [`ONSET_READINGS`] readings in a row, in standard deviations of the noise.
+    peak: f64,
+    /// Deviations of the last two readings.
+    recent: [f64; 2],
+    /// Largest change within a second.
+    fastest: f64,
+    /// Instant from which on its reading rests and is doubtful.
+    doubtful_since: Option<Duration>,
 }
 
 /// The guide of a calibration.
 #[derive(Clone, Debug)]
 pub struct Guide {
     plan: Vec<Press>,
-    /// Press of the plan that is next.
+    /// Index of the next press.
     next: usize,
     waiting: Waiting,
+    /// Instant from which on it waits, or at which the untouched reading was followed last.
+    since: Duration,
     stretch: Stretch,
+    /// Untouched reading, which follows the drift while nothing touches.
     baseline: Option<Baseline>,
-    /// Mean reading of the press that is held or was let go last.
+    /// The last untouched reading at rest, which is recorded with the next press.
+    untouched: Option<RestingRow>,
+    /// Mean untouched reading that was learnt, or was recorded with a press, last: a reading that returns to it is no press.
+    reference: Vec<f64>,
+    touch: Touch,
+    /// Deviation of the press that is let go: recorded, or asked for again.
     pressed: Vec<f64>,
+    is_recorded: bool,
+    /// Size of what a finger may still hold after the last lift, in standard deviations of the noise; 0 once it let go of that.
+    lingering: f64,
+    /// True from a lift until the untouched reading is at rest by noise alone: soft surfaces creep back.
+    is_recovering: bool,
+    checks: RepeatCheck,
 }
 
 impl Guide {
     /// A guide through a plan.
     pub fn new(plan: Vec<Press>) -> Self {
         let waiting = if plan.is_empty() { Waiting::Nothing } else { Waiting::Untouched };
-        Self { plan, next: 0, waiting, stretch: Stretch::default(), baseline: None, pressed: Vec::new() }
+        Self {
+            plan,
+            next: 0,
+            waiting,
+            since: Duration::ZERO,
+            stretch: Stretch::default(),
+            baseline: None,
+            untouched: None,
+            reference: Vec::new(),
+            touch: Touch::default(),
+            pressed: Vec::new(),
+            is_recorded: false,
+            lingering: 0.0,
+            is_recovering: false,
+            checks: RepeatCheck::default(),
+        }
     }
 
-    /// The press that is next, and how many are planned; `None` after the last.
+    /// The same guide, which compares presses with these rows of before too.
+    pub fn with_rows(mut self, rows: &[Row]) -> Self {
+        self.checks = RepeatCheck::new(rows);
+        self
+    }
+
+    /// The press that is next, and its number in the plan from 0; `None` after the last.
     pub fn next_press(&self) -> Option<(usize, Press)> {
         self.plan.get(self.next).map(|press| (self.next, *press))
+    }
+
+    /// Number of presses of the plan that are recorded.
+    pub fn taken(&self) -> usize {
+        self.next
     }
 
     /// Presses of the plan.
@@ -87,23 +198,67 @@ impl Guide {
         self.waiting
     }
 
+    /// Mean untouched reading by now; `None` before it is learnt.
+    pub fn untouched_reading(&self) -> Option<&[f64]> {
+        self.baseline.as_ref().map(|baseline| baseline.mean.as_slice())
+    }
+
+    /// What is waited for and what is read, in a sentence; `None` where the step says enough.
+    pub fn explain(&self) -> Option<String> {
+        let Some(baseline) = &self.baseline else {
+            return (self.waiting == Waiting::Untouched)
+                .then(|| "the reading must rest for a second; it still changes".to_owned());
+        };
+        let latest = mean(&self.stretch.latest()?);
+        let size = baseline.size(&latest);
+        match self.waiting {
+            Waiting::Press => {
+                let smallest = self.checks.smallest_size(baseline)?;
+                Some(format!(
+                    "the reading is {:.1} % of the smallest press off the untouched one",
+                    100.0 * size / smallest
+                ))
+            }
+            Waiting::Rest => {
+                let percent = 100.0 * baseline.change(&self.stretch.latest()?) / size.max(1.0);
+                Some(format!(
+                    "the reading must rest; it changes by {percent:.1} % in 0.2 s ({:.1} % at most)",
+                    100.0 * REST_SHARE
+                ))
+            }
+            Waiting::Release => Some(format!(
+                "the reading is still at {:.0} % of the press; if nothing touches, take this reading as untouched",
+                100.0 * size / baseline.size_of(&self.pressed).max(1.0)
+            )),
+            Waiting::Untouched | Waiting::Nothing => None,
+        }
+    }
+
     /// Takes a reading at an instant.
     pub fn add(&mut self, at: Duration, reading: &[f64]) -> Progress {
+        if self.stretch.last_at().is_some_and(|last| at.saturating_sub(last) > SILENCE) {
+            self.relearn();
+        }
         self.stretch.add(at, reading);
-        match (self.waiting, &self.baseline) {
-            (Waiting::Untouched, _) => self.learn_baseline(at, reading),
-            (Waiting::Press, Some(baseline)) if baseline.is_pressed(reading) => self.wait(Waiting::Rest),
-            (Waiting::Rest, Some(baseline)) => match baseline.settled(&self.stretch) {
-                // A press that was let go before it came to rest.
-                Some(mean) if !baseline.is_pressed(&mean) => self.wait(Waiting::Press),
-                Some(mean) => self.take_press(at, reading, mean),
-                None => Progress::None,
-            },
-            (Waiting::Release, Some(baseline)) => match baseline.released(&self.stretch, &self.pressed) {
-                Some(mean) => self.take_untouched(at, reading, mean),
-                None => Progress::None,
-            },
-            _ => Progress::None,
+        match (self.waiting, self.baseline.take()) {
+            (Waiting::Nothing, baseline) => {
+                self.baseline = baseline;
+                Progress::None
+            }
+            (Waiting::Untouched, _) | (_, None) => self.learn_baseline(at),
+            (waiting, Some(mut baseline)) => {
+                self.touch.follow(&baseline, reading, self.stretch.second_ago());
+                let progress = match waiting {
+                    Waiting::Press => self.await_press(at, &mut baseline),
+                    Waiting::Rest => self.await_rest(at, &mut baseline),
+                    _ => self.await_release(at, &mut baseline),
+                };
+                // A step that asks for the untouched reading has forgotten the old one.
+                if self.waiting != Waiting::Untouched {
+                    self.baseline = Some(baseline);
+                }
+                progress
+            }
         }
     }
 
@@ -113,6 +268,8 @@ impl Guide {
             return false;
         }
         self.next -= 1;
+        self.checks.forget_last();
+        self.is_recorded = false;
         self.restart();
         true
     }
@@ -121,7 +278,20 @@ impl Guide {
     pub fn skip(&mut self) {
         if self.next < self.plan.len() {
             self.plan.remove(self.next);
+            self.checks.forget_request();
+            self.is_recorded = false;
             self.restart();
+        }
+    }
+
+    /// Learns the untouched reading anew: the operator says that nothing touches, or the source was away.
+    pub fn relearn(&mut self) {
+        self.stretch.clear();
+        self.touch = Touch::default();
+        if self.waiting != Waiting::Nothing {
+            self.baseline = None;
+            self.untouched = None;
+            self.waiting = Waiting::Untouched;
         }
     }
 
@@ -139,7 +309,7 @@ impl Guide {
         }
     }
 
-    /// Forgets the readings of the last stretch of time, as those before a machine moved; what is learnt stays.
+    /// Forgets the readings of the last seconds, as those before a machine moved; what is learnt stays.
     pub fn forget_readings(&mut self) {
         self.stretch.clear();
     }
@@ -149,48 +319,239 @@ impl Guide {
         self.waiting = match self.waiting {
             _ if self.next >= self.plan.len() => Waiting::Nothing,
             _ if self.baseline.is_none() => Waiting::Untouched,
-            // What is pressed now is no press of the plan.
-            Waiting::Rest | Waiting::Release => Waiting::Release,
+            // The present touch belongs to no press of the plan.
+            Waiting::Rest => {
+                self.pressed = self.present_deviation();
+                Waiting::Release
+            }
+            Waiting::Release => Waiting::Release,
             Waiting::Untouched | Waiting::Press | Waiting::Nothing => Waiting::Press,
         };
     }
 
-    fn wait(&mut self, waiting: Waiting) -> Progress {
+    /// Deviation of the last reading from the untouched one.
+    fn present_deviation(&self) -> Vec<f64> {
+        match (&self.baseline, self.stretch.last()) {
+            (Some(baseline), Some(reading)) => baseline.deviation(reading),
+            _ => Vec::new(),
+        }
+    }
+
+    fn wait(&mut self, at: Duration, waiting: Waiting) -> Progress {
         self.waiting = waiting;
-        self.stretch.clear();
+        self.since = at;
         Progress::Waits(waiting)
     }
 
-    fn learn_baseline(&mut self, at: Duration, reading: &[f64]) -> Progress {
-        match Baseline::learn(&self.stretch) {
-            Some(baseline) => {
-                let mean = baseline.mean.clone();
-                self.baseline = Some(baseline);
-                self.take_untouched(at, reading, mean)
+    fn learn_baseline(&mut self, at: Duration) -> Progress {
+        let Some(baseline) = Baseline::learn(&self.stretch) else { return Progress::None };
+        self.reference.clone_from(&baseline.mean);
+        self.untouched = Some(self.untouched_row(baseline.mean.clone()));
+        self.baseline = Some(baseline);
+        self.begin_press(at)
+    }
+
+    /// Waits for the next press, or ends with the untouched row after the last one.
+    fn begin_press(&mut self, at: Duration) -> Progress {
+        self.touch = Touch::default();
+        if self.next < self.plan.len() {
+            return self.wait(at, Waiting::Press);
+        }
+        self.wait(at, Waiting::Nothing);
+        self.untouched.take().map_or(Progress::Waits(Waiting::Nothing), Progress::Untouched)
+    }
+
+    /// Follows the untouched reading until something touches.
+    fn await_press(&mut self, at: Duration, baseline: &mut Baseline) -> Progress {
+        let recovery = if self.is_recovering { self.checks.largest_size(baseline) } else { 0.0 };
+        let least = NOISE_LIMIT_SD.max(RESIDUE_SHARE * recovery);
+        if self.touch.has_begun(least) {
+            return self.wait(at, Waiting::Rest);
+        }
+        if let Some(latest) = self.stretch.latest() {
+            let mean = mean(&latest);
+            let step = if self.is_recovering || at.saturating_sub(self.since) > PATIENCE {
+                least
+            } else {
+                FOLLOWED_STEP_SD
+            };
+            if baseline.size(&mean) <= step && baseline.is_at_rest(&latest, RECOVERY_SHARE * recovery) {
+                self.since = at;
+                self.is_recovering &= !baseline.is_at_rest(&latest, 0.0);
+                baseline.mean.clone_from(&mean);
+                self.untouched = Some(self.untouched_row(mean));
+                self.touch.fastest = 0.0;
             }
-            None => Progress::None,
         }
+        Progress::None
     }
 
-    fn take_press(&mut self, at: Duration, reading: &[f64], mean: Vec<f64>) -> Progress {
+    /// Records a press once its reading is at rest.
+    fn await_rest(&mut self, at: Duration, baseline: &mut Baseline) -> Progress {
+        let Some(latest) = self.stretch.latest() else { return Progress::None };
+        let mean = mean(&latest);
+        let size = baseline.size(&mean);
+        if size <= NOISE_LIMIT_SD || size < LIFT_TAIL_SHARE * self.touch.peak {
+            // The surface was let go before its reading came to rest.
+            return match baseline.is_at_rest(&latest, 0.0) {
+                true => self.return_to_untouched(at, mean, baseline),
+                false => Progress::None,
+            };
+        }
+        let share = if at.saturating_sub(self.since) > PATIENCE { PATIENT_REST_SHARE } else { REST_SHARE };
+        if !baseline.is_at_rest(&latest, share * size) {
+            self.touch.doubtful_since = None;
+            return Progress::None;
+        }
+        if self.is_return(&mean, baseline) || self.is_late_lift(&mean, baseline) {
+            self.lingering = 0.0;
+            return self.return_to_untouched(at, mean, baseline);
+        }
+        if self.touch.fastest < ONSET_SHARE * size {
+            self.relearn();
+            return Progress::AskedAgain(Doubt::Drift);
+        }
+        self.take_press(at, mean, baseline)
+    }
+
+    fn take_press(&mut self, at: Duration, mean: Vec<f64>, baseline: &Baseline) -> Progress {
         let Some(press) = self.plan.get(self.next).copied() else { return Progress::None };
+        let touch = TouchReading { deviation: baseline.deviation(&mean), reading: mean.clone() };
+        let doubt = self.checks.doubt(&press, &touch, baseline);
+        if doubt.is_some() && at.saturating_sub(*self.touch.doubtful_since.get_or_insert(at)) < LINGER {
+            return Progress::None;
+        }
+        self.pressed.clone_from(&touch.deviation);
+        self.wait(at, Waiting::Release);
+        if let Some(doubt) = doubt {
+            self.checks.refuse(touch);
+            self.is_recorded = false;
+            return Progress::AskedAgain(doubt);
+        }
+        self.checks.record(&press, touch);
         self.next += 1;
-        self.pressed.clone_from(&mean);
-        self.wait(Waiting::Release);
-        Progress::Taken { row: row(press.position, press.force_n, at, reading), mean }
+        self.is_recorded = true;
+        let untouched = self.untouched.take();
+        if let Some(untouched) = &untouched {
+            let change = untouched.mean.iter().zip(&self.reference).map(|(mean, before)| mean - before);
+            self.checks.add_residue(change.collect(), baseline);
+            self.reference.clone_from(&untouched.mean);
+        }
+        Progress::Pressed { untouched, press: self.press_row(&press, mean) }
     }
 
-    /// The untouched surface: its row, and the baseline from now on.
-    fn take_untouched(&mut self, at: Duration, reading: &[f64], mean: Vec<f64>) -> Progress {
-        if let Some(baseline) = &mut self.baseline {
-            baseline.mean.clone_from(&mean);
+    /// Waits until a press is lifted, or takes its place by a firmer one.
+    fn await_release(&mut self, at: Duration, baseline: &mut Baseline) -> Progress {
+        let Some(latest) = self.stretch.latest() else { return Progress::None };
+        let mean = mean(&latest);
+        let (size, pressed) = (baseline.size(&mean), baseline.size_of(&self.pressed));
+        if size > GROWTH * pressed && baseline.is_at_rest(&latest, REST_SHARE * size) {
+            return self.replace_press(at, mean, baseline);
         }
-        self.wait(if self.next < self.plan.len() { Waiting::Press } else { Waiting::Nothing });
-        Progress::Taken { row: row(Position::default(), Some(0.0), at, reading), mean }
+        let largest = self.checks.largest_size(baseline).max(pressed);
+        let by_hysteresis = (HYSTERESIS_SHARE * largest).min(PARTLY_LIFTED_SHARE * pressed);
+        let limit = NOISE_LIMIT_SD.max(LIFTED_SHARE * pressed).max(by_hysteresis);
+        let is_lifted = if size <= limit {
+            // Time since the reading fell below the limit.
+            let waited = at.saturating_sub(self.since);
+            baseline.is_at_rest(&latest, 0.0)
+                || waited > RECOVERY && baseline.is_at_rest(&latest, RECOVERY_SHARE * largest)
+        } else {
+            // A touch that was not recorded may have been none: what rests for long is the untouched surface.
+            let (share, patience) = if self.is_recorded {
+                (PARTLY_LIFTED_SHARE, PARTLY_LIFTED)
+            } else {
+                (f64::INFINITY, PATIENCE)
+            };
+            if size > share * pressed || !baseline.is_at_rest(&latest, 0.0) {
+                self.since = at;
+            }
+            at.saturating_sub(self.since) > patience
+        };
+        if !is_lifted {
+            return Progress::None;
+        }
+        self.lingering = limit.max(size);
+        self.is_recovering = !baseline.is_at_rest(&latest, 0.0);
+        self.return_to_untouched(at, mean, baseline)
+    }
+
+    /// A firmer touch without a lift in between: the light one before was not the press.
+    fn replace_press(&mut self, at: Duration, mean: Vec<f64>, baseline: &Baseline) -> Progress {
+        if !self.is_recorded {
+            return self.wait(at, Waiting::Rest);
+        }
+        let Some(press) = self.next.checked_sub(1).and_then(|last| self.plan.get(last)).copied() else {
+            return Progress::None;
+        };
+        let deviation = baseline.deviation(&mean);
+        self.checks.forget_last();
+        self.checks.record(&press, TouchReading { deviation: deviation.clone(), reading: mean.clone() });
+        self.pressed = deviation;
+        self.since = at;
+        Progress::Replaced(self.press_row(&press, mean))
+    }
+
+    fn return_to_untouched(&mut self, at: Duration, mean: Vec<f64>, baseline: &mut Baseline) -> Progress {
+        baseline.mean.clone_from(&mean);
+        self.untouched = Some(self.untouched_row(mean));
+        self.begin_press(at)
+    }
+
+    fn untouched_row(&self, mean: Vec<f64>) -> RestingRow {
+        self.resting_row(Position::default(), Some(0.0), mean)
+    }
+
+    fn press_row(&self, press: &Press, mean: Vec<f64>) -> RestingRow {
+        self.resting_row(press.position, press.force_n, mean)
+    }
+
+    fn resting_row(&self, position: Position, force_n: Option<f64>, mean: Vec<f64>) -> RestingRow {
+        let (at, reading) = self.stretch.middle().unwrap_or((Duration::ZERO, mean.as_slice()));
+        let (time_s, reading) = (Some(at.as_secs_f64()), reading.to_vec());
+        RestingRow { row: Row { position, force_n, nuisances: Vec::new(), time_s, reading }, mean }
+    }
+
+    /// True for a mean reading that has returned most of the way to the last untouched one: a finger that lingered has lifted.
+    fn is_return(&self, mean: &[f64], baseline: &Baseline) -> bool {
+        let from_reference = |reading: &[f64]| {
+            let difference: Vec<f64> =
+                reading.iter().zip(&self.reference).map(|(value, reference)| value - reference).collect();
+            baseline.length_of(&difference)
+        };
+        from_reference(mean) < 0.5 * from_reference(&baseline.mean)
+    }
+
+    /// True for a mean reading that goes against the last press by no more than a lingering finger may have held. This happens once after a press.
+    fn is_late_lift(&self, mean: &[f64], baseline: &Baseline) -> bool {
+        let deviation = baseline.deviation(mean);
+        let lengths = baseline.length_of(&deviation) * baseline.length_of(&self.pressed);
+        baseline.size_of(&deviation) <= self.lingering
+            && baseline.product_of(&deviation, &self.pressed) < AGAINST * lengths
     }
 }
 
-fn row(position: Position, force_n: Option<f64>, at: Duration, reading: &[f64]) -> Row {
-    let (time_s, reading) = (Some(at.as_secs_f64()), reading.to_vec());
-    Row { position, force_n, nuisances: Vec::new(), time_s, reading }
+impl Touch {
+    /// Follows the deviation of a reading; `second_ago` is the reading of a second ago.
+    fn follow(&mut self, baseline: &Baseline, reading: &[f64], second_ago: Option<&[f64]>) {
+        let size = baseline.size(reading);
+        self.peak = self.peak.max(size.min(self.recent[0]).min(self.recent[1]));
+        self.recent = [self.recent[1], size];
+        // After a machine moved, the first reading is all that there is: it is compared with the untouched one.
+        let change = match second_ago {
+            Some(before) if before != reading => {
+                let change: Vec<f64> =
+                    reading.iter().zip(before).map(|(value, before)| value - before).collect();
+                baseline.size_of(&change)
+            }
+            _ => size,
+        };
+        self.fastest = self.fastest.max(change);
+    }
+
+    /// True once [`ONSET_READINGS`] readings in a row deviate by more than `least` standard deviations.
+    fn has_begun(&mut self, least: f64) -> bool {
+        self.onset = if self.recent[1] > least { self.onset + 1 } else { 0 };
+        self.onset >= ONSET_READINGS
+    }
 }

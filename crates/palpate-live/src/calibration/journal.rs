@@ -147,6 +147,17 @@ impl Journal {
         Ok(())
     }
 
+    /// Replaces the last press by a row, which is on disk afterwards.
+    ///
+    /// # Errors
+    /// [`JournalError::Write`].
+    pub fn replace_last(&mut self, row: Row, depth_m: Option<f64>) -> Result<(), JournalError> {
+        if let Some(last) = self.rows.iter().rposition(Row::touches) {
+            self.rows.truncate(last);
+        }
+        self.add(row, depth_m)
+    }
+
     fn save(&self) -> Result<(), JournalError> {
         let mut rows = self.rows.clone();
         // An untouched row is told from a press by its force, where presses have one.

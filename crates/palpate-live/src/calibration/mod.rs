@@ -1,22 +1,25 @@
 //! Guided calibration: presses at the right places, each taken when its reading is at rest.
 //!
-//! The [`Guide`] is told readings with their instants and says what it waits for; it touches no device, file or clock. A [`Calibration`] feeds it with
-//! what a source brings, and keeps every press in the file of a [`Journal`] before the next one is asked for. A [`Machine`] presses where a
-//! person would; an [`Assessment`] tells the error of the outcome, and the gain of more presses.
+//! The [`Guide`] takes readings with their instants and says what it waits for; it uses no device, file or clock. A [`Calibration`] passes the readings of
+//! a source to it, and writes every press to the file of a [`Journal`] before the next one is asked for. A [`Machine`] presses in place of a person; an
+//! [`Assessment`] estimates the error of the locator, and the gain of more presses.
 
 mod assessment;
+mod baseline;
 mod guide;
 mod journal;
 mod machine;
 mod plan;
+mod repeat_check;
 mod repeats;
 mod run;
-mod settling;
+mod stretch;
 
 pub use assessment::{Assessment, Gain, HeldOut};
-pub use guide::{Guide, Press, Progress, Waiting};
+pub use guide::{Guide, Press, Progress, RestingRow, Waiting};
 pub use journal::{DepthKnowledge, Journal, JournalError};
 pub use machine::{Machine, MachineError, MachineNote, Motion};
 pub use plan::{PlanError, plan};
+pub use repeat_check::Doubt;
 pub use repeats::{Place, last_deviation_percent, places};
 pub use run::{Calibration, CalibrationError, Note};

@@ -1,7 +1,8 @@
 //! A calibration in progress: arrivals of a source in, rows on disk and notes out.
 
-use super::guide::{Guide, Press, Progress, Waiting};
+use super::guide::{Guide, Press, Progress, RestingRow, Waiting};
 use super::journal::{Journal, JournalError};
+use super::repeat_check::Doubt;
 use crate::event::{ChannelState, Event};
 use crate::frame::{BadFrame, Channel, ColumnsError, Decoder, Frame};
 use crate::input::{Arrival, Arrived};
@@ -31,6 +32,8 @@ pub enum CalibrationError {
 
 /// Frames without a reading among them after which it is said that there is none.
 const UNREAD: u64 = 100;
+/// Time between two explanations of a step that takes long.
+const EXPLAIN_EVERY: Duration = Duration::from_secs(5);
 
 /// Note on what a calibration has read or done.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,10 +48,16 @@ pub enum Note {
     Ended,
     /// Something else is waited for.
     Waits(Waiting),
-    /// A press was taken, and is on disk.
+    /// A press was recorded, and is on disk.
     Taken,
-    /// The untouched surface was taken, and is on disk where presses have a force.
+    /// The last press grew without a lift, and its row was replaced.
+    Replaced,
+    /// The untouched surface was recorded, and is on disk where presses have a force.
     Untouched,
+    /// The press is asked for again.
+    AskedAgain(Doubt),
+    /// A step takes long: what is waited for and what is read.
+    StillWaiting(String),
     /// A channel reads the end of its range; its name.
     Saturated(String),
     /// The load cell reads more than its limit, in newtons.
@@ -62,8 +71,6 @@ struct LoadCell {
     limit_n: Option<f64>,
     /// Its last reading.
     now_n: Option<f64>,
-    /// Its reading when nothing touched last.
-    untouched_n: Option<f64>,
 }
 
 /// A calibration that runs.
@@ -81,6 +88,8 @@ pub struct Calibration {
     last: Vec<f64>,
     /// True while readings are shown to the guide: not while a machine moves.
     is_guided: bool,
+    /// Step that is waited for, and the instant of its last explanation.
+    explained: (Waiting, Duration),
 }
 
 impl Calibration {
@@ -98,7 +107,7 @@ impl Calibration {
         let mut channels = Channel::all_of(setup);
         let load_cell = stage.and_then(|stage| {
             let name = stage.load_cell.clone()?;
-            Some(LoadCell { name, limit_n: stage.force_limit_n, now_n: None, untouched_n: None })
+            Some(LoadCell { name, limit_n: stage.force_limit_n, now_n: None })
         });
         if let Some(LoadCell { name, .. }) = &load_cell {
             channels.push(Channel {
@@ -109,8 +118,10 @@ impl Calibration {
         }
         let mut decoder = Decoder::new(&channels);
         decoder.set_columns(columns)?;
+        let guide = Guide::new(plan).with_rows(journal.rows());
         Ok(Self {
-            guide: Guide::new(plan),
+            explained: (guide.waiting(), Duration::ZERO),
+            guide,
             journal,
             decoder,
             labels: channels.into_iter().map(|channel| channel.label).collect(),
@@ -151,7 +162,12 @@ impl Calibration {
     /// Force at the load cell, in newtons, less what it read untouched; `None` without one, or before the first reading.
     pub fn cell_force_n(&self) -> Option<f64> {
         let cell = self.load_cell.as_ref()?;
-        Some(cell.now_n? - cell.untouched_n.unwrap_or(0.0))
+        Some(cell.now_n? - self.cell_untouched_n())
+    }
+
+    /// Untouched reading of the load cell, in newtons; 0 before it is learnt.
+    fn cell_untouched_n(&self) -> f64 {
+        self.guide.untouched_reading().and_then(|reading| reading.last().copied()).unwrap_or(0.0)
     }
 
     /// Takes what a source brought; what follows is added to `notes`.
@@ -166,10 +182,13 @@ impl Calibration {
             Arrival::Message(bytes) => self.decoder.receive_message(bytes, hand_on),
             Arrival::Opened(name) => {
                 self.decoder.open();
+                // Offsets of a board that was away may have moved.
+                self.guide.relearn();
                 notes.push(Note::Opened(name.clone()));
             }
             Arrival::Joined(name) => {
                 self.decoder.join();
+                self.guide.relearn();
                 notes.push(Note::Opened(name.clone()));
             }
             Arrival::Lost(why) => {
@@ -209,9 +228,10 @@ impl Calibration {
                 notes.push(Note::Saturated(name));
             }
         });
+        let untouched_n = self.cell_untouched_n();
         if let Some(cell) = &mut self.load_cell {
             cell.now_n = Some(reading[channels]);
-            let force_n = reading[channels] - cell.untouched_n.unwrap_or(0.0);
+            let force_n = reading[channels] - untouched_n;
             if cell.limit_n.is_some_and(|limit_n| force_n.abs() > limit_n) {
                 notes.push(Note::Overload(force_n));
             }
@@ -219,35 +239,60 @@ impl Calibration {
         if !self.is_guided {
             return Ok(());
         }
-        let press = self.guide.next_press().map(|(_, press)| press);
-        match self.guide.add(at, reading) {
-            Progress::None => {}
+        let last_press = |guide: &Guide| Some(guide.plan()[guide.taken().checked_sub(1)?]);
+        let progress = self.guide.add(at, reading);
+        let depth_m = last_press(&self.guide).and_then(|press| press.depth_m);
+        match progress {
+            Progress::None => self.explain(at, notes),
             Progress::Waits(waiting) => notes.push(Note::Waits(waiting)),
-            Progress::Taken { row, mean } => {
-                let depth_m = press.and_then(|press| press.depth_m).filter(|_| row.touches());
-                notes.push(if row.touches() { Note::Taken } else { Note::Untouched });
-                let row = self.weighed(row, &mean)?;
+            Progress::AskedAgain(doubt) => notes.push(Note::AskedAgain(doubt)),
+            Progress::Pressed { untouched, press } => {
+                if let Some(untouched) = untouched {
+                    self.journal.add(self.without_cell(untouched.row), None)?;
+                }
+                let row = self.weighed(press)?;
                 self.journal.add(row, depth_m)?;
+                notes.push(Note::Taken);
+            }
+            Progress::Replaced(press) => {
+                let row = self.weighed(press)?;
+                self.journal.replace_last(row, depth_m)?;
+                notes.push(Note::Replaced);
+            }
+            Progress::Untouched(untouched) => {
+                self.journal.add(self.without_cell(untouched.row), None)?;
+                notes.push(Note::Untouched);
             }
         }
         Ok(())
     }
 
-    /// A row whose force is that of the load cell, where there is one: the mean of the stretch at rest, as a force is no reading that is located.
-    fn weighed(&mut self, mut row: Row, mean: &[f64]) -> Result<Row, CalibrationError> {
-        let Some(cell) = &mut self.load_cell else { return Ok(row) };
-        let Some(&read_n) = mean.last() else { return Ok(row) };
-        row.reading.pop();
-        if row.touches() {
-            let force_n = read_n - cell.untouched_n.unwrap_or(0.0);
-            if force_n <= 0.0 {
-                return Err(CalibrationError::LoadCell { name: cell.name.clone(), force_n });
-            }
-            row.force_n = Some(force_n);
-        } else {
-            cell.untouched_n = Some(read_n);
+    /// Explains a step that takes long, except the wait for a press.
+    fn explain(&mut self, at: Duration, notes: &mut Vec<Note>) {
+        let waiting = self.guide.waiting();
+        let (explained, since) = self.explained;
+        if explained != waiting {
+            self.explained = (waiting, at);
+        } else if waiting != Waiting::Press && at.saturating_sub(since) >= EXPLAIN_EVERY {
+            self.explained.1 = at;
+            notes.extend(self.guide.explain().map(Note::StillWaiting));
         }
-        Ok(row)
+    }
+
+    /// The row of a press with the force of the load cell, where there is one: the mean of the stretch at rest, as a force is no reading that is located.
+    fn weighed(&self, press: RestingRow) -> Result<Row, CalibrationError> {
+        let Some(cell) = &self.load_cell else { return Ok(press.row) };
+        let force_n = press.mean.last().map_or(0.0, |read_n| read_n - self.cell_untouched_n());
+        if force_n <= 0.0 {
+            return Err(CalibrationError::LoadCell { name: cell.name.clone(), force_n });
+        }
+        Ok(Row { force_n: Some(force_n), ..self.without_cell(press.row) })
+    }
+
+    /// A row without the value of the load cell.
+    fn without_cell(&self, mut row: Row) -> Row {
+        row.reading.truncate(row.reading.len() - usize::from(self.load_cell.is_some()));
+        row
     }
 
     /// Shows readings to the guide from now on, or not: those that are taken while a machine moves mean nothing.
@@ -268,6 +313,11 @@ impl Calibration {
         }
         self.journal.take_back()?;
         Ok(true)
+    }
+
+    /// Learns the untouched reading anew: the operator says that nothing touches.
+    pub fn relearn_untouched(&mut self) {
+        self.guide.relearn();
     }
 
     /// Leaves out the press that is next.

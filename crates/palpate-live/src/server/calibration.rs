@@ -139,6 +139,8 @@ pub struct CalibrationRecord {
     bad_frames: u64,
     presses: String,
     problem: Option<String>,
+    /// Why a press is asked for again, or what a step that takes long waits for.
+    hint: Option<String>,
     /// The machine, where one presses.
     machine: Option<MachineRecord>,
     outcome: Option<OutcomeRecord>,
@@ -259,6 +261,7 @@ impl Calibrator {
             source: None,
             last_percent: None,
             problem: None,
+            hint: None,
             machine: MachineState::default(),
         };
         let shared = Arc::new(Mutex::new(shared));
@@ -303,6 +306,17 @@ impl Calibrator {
         self.with_hand(|calibration| match calibration.redo()? {
             true => Ok(()),
             false => Err(CalibratorError::NoPress),
+        })
+    }
+
+    /// Learns the untouched reading anew: the operator says that nothing touches.
+    ///
+    /// # Errors
+    /// [`CalibratorError::NotBegun`], or [`CalibratorError::MachinePresses`].
+    pub fn relearn_untouched(&self) -> Result<(), CalibratorError> {
+        self.with_hand(|calibration| {
+            calibration.relearn_untouched();
+            Ok(())
         })
     }
 
@@ -433,6 +447,7 @@ impl Calibrator {
             bad_frames: 0,
             presses: self.plan.presses.display().to_string(),
             problem: state.problem.clone(),
+            hint: None,
             machine: None,
             outcome: state.outcome.clone(),
         };
@@ -468,6 +483,7 @@ impl Calibrator {
         let values = calibration.last_reading().iter().zip(&self.channels);
         record.reading = values.map(|(value, channel)| value / channel.unit.factor()).collect();
         record.bad_frames = calibration.bad_frames().values().sum();
+        record.hint.clone_from(&shared.hint);
         record.problem = record.problem.take().or_else(|| shared.problem.clone());
         record.machine = self
             .machine_record(calibration.journal().rows(), to_come)

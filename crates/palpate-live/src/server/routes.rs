@@ -118,6 +118,7 @@ enum Step {
     Begin,
     Redo,
     Skip,
+    Untouched,
     Stop,
     Finish,
 }
@@ -139,6 +140,7 @@ async fn calibrate(
             Step::Begin => live.begin_calibration()?,
             Step::Redo => live.calibrator()?.redo()?,
             Step::Skip => live.calibrator()?.skip()?,
+            Step::Untouched => live.calibrator()?.relearn_untouched()?,
             Step::Stop => live.calibrator()?.stop()?,
             Step::Finish => live.finish_calibration()?,
         }

@@ -10,6 +10,8 @@ pub struct Shared {
     pub source: Option<String>,
     pub last_percent: Option<f64>,
     pub problem: Option<String>,
+    /// Why a press is asked for again, or what a step that takes long waits for.
+    pub hint: Option<String>,
     pub machine: MachineState,
 }
 
@@ -37,8 +39,14 @@ impl Shared {
             }
             Note::Taken => {
                 self.last_percent = last_deviation_percent(self.calibration.journal().rows());
-                self.problem = None;
+                (self.problem, self.hint) = (None, None);
             }
+            Note::Replaced => {
+                self.last_percent = last_deviation_percent(self.calibration.journal().rows());
+                self.hint = Some("The reading grew: the press was taken anew.".to_owned());
+            }
+            Note::AskedAgain(doubt) => self.hint = Some(format!("Not taken: {doubt}. Press again.")),
+            Note::StillWaiting(words) => self.hint = Some(words),
             Note::Saturated(name) => {
                 self.problem = Some(format!("channel {name} reads the end of its range: press less, redo"));
             }

@@ -1,7 +1,6 @@
-//! Faults of a simulated board: frames that are lost or torn, channels that drift, soft surfaces that creep.
+//! Faults of a simulated board: the configuration of all of them, and frames that are lost or torn.
 
 use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::Range;
 
@@ -20,6 +19,14 @@ pub struct FaultConfig {
     pub creep: f64,
     /// Time constant of the creep, in s, greater than 0 where there is some.
     pub creep_s: f64,
+    /// Width of each channel's hysteresis as a share of its range under the finger, 0 to 1: a play operator.
+    pub hysteresis: f64,
+    /// Share of the largest reading of a touch that remains after it, 0 to 1.
+    pub residue: f64,
+    /// Time constant in which the residue fades, in s, greater than 0 where there is some.
+    pub residue_s: f64,
+    /// Step of the channels' converters, in their SI unit or raw; 0 for continuous values.
+    pub converter_step: f64,
 }
 
 /// Fate of a frame.
@@ -70,74 +77,9 @@ impl Faults {
     }
 }
 
-/// Slow changes of what the sensors read.
-pub struct Ageing {
-    rng: Xoshiro256PlusPlus,
-    offsets: Vec<f64>,
-    crept: Vec<f64>,
-}
-
-impl Ageing {
-    /// Channels without any change so far.
-    pub fn new(channels: usize, seed: u64) -> Self {
-        let rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0xA6_E109);
-        Self { rng, offsets: vec![0.0; channels], crept: vec![0.0; channels] }
-    }
-
-    /// Lets a step of time pass, and changes a faultless reading as it does.
-    ///
-    /// Of a reading r, the share c creeps: z' = (r − z)/τ, and (1 − c)·r + c·z is read.
-    pub fn act(&mut self, reading: &mut [f64], config: &FaultConfig, step_s: f64) {
-        let walk = config.walk_per_root_s * step_s.sqrt();
-        for (i, value) in reading.iter_mut().enumerate() {
-            if config.creep > 0.0 {
-                let share = -(-step_s / config.creep_s).exp_m1();
-                self.crept[i] += share * (*value - self.crept[i]);
-                *value = (1.0 - config.creep) * *value + config.creep * self.crept[i];
-            }
-            let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
-            self.offsets[i] += sign * config.drift_per_s * step_s;
-            if walk > 0.0 {
-                let drawn: f64 = StandardNormal.sample(&mut self.rng);
-                self.offsets[i] += walk * drawn;
-            }
-            *value += self.offsets[i];
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_line_and_a_creep_are_what_their_formulas_say() {
-        let config = FaultConfig { drift_per_s: 0.5, creep: 0.2, creep_s: 2.0, ..FaultConfig::default() };
-        let mut ageing = Ageing::new(2, 0);
-        let mut reading = [0.0; 2];
-        for _ in 0..1000 {
-            reading = [10.0, 10.0];
-            ageing.act(&mut reading, &config, 3e-3);
-        }
-        // After 3 s: the creep lacks exp(−3/2) of its share, and the lines are at ±1.5.
-        let crept = 10.0 - 2.0 * (-1.5_f64).exp();
-        assert!((reading[0] - (crept + 1.5)).abs() < 1e-9, "{reading:?}");
-        assert!((reading[1] - (crept - 1.5)).abs() < 1e-9, "{reading:?}");
-    }
-
-    #[test]
-    fn a_walk_spreads_with_the_root_of_time() {
-        let config = FaultConfig { walk_per_root_s: 2.0, ..FaultConfig::default() };
-        let mut ageing = Ageing::new(400, 7);
-        let mut reading = vec![0.0; 400];
-        for _ in 0..900 {
-            reading.fill(0.0);
-            ageing.act(&mut reading, &config, 0.01);
-        }
-        let variance = reading.iter().map(|x| x * x).sum::<f64>() / 400.0;
-        // 9 s of a variance of 4 a second; the variance of 400 draws is known to 7 %.
-        assert!((variance / 36.0 - 1.0).abs() < 0.25, "{variance}");
-    }
 
     #[test]
     fn faults_come_as_often_as_they_should_and_tear_a_part() {

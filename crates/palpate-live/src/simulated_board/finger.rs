@@ -158,6 +158,11 @@ impl Finger {
         Ok(())
     }
 
+    /// Usual force of its touches, in newtons.
+    pub fn typical_n(&self) -> f64 {
+        self.force_n.unwrap_or(self.typical_n)
+    }
+
     /// Holds it where a stage has it, or lifted.
     pub fn hold(&mut self, contact: Option<Contact>) {
         self.held = Some(contact);

@@ -1,17 +1,23 @@
 //! A board without hardware: sensors under a surface that a finger touches, and the frames that firmware would send.
 
+mod distortion;
 mod faults;
 mod finger;
+mod hand;
 mod link;
 
 pub use faults::FaultConfig;
 pub use finger::{Finger, ScriptError};
+pub use hand::{Hand, HandStyle};
 pub use link::{Link, LinkError, LinkUrl, LinkUrlError};
 
 use crate::frame::{self, Channel};
-use faults::{Ageing, Fate, Faults};
+use distortion::{Distortion, convert};
+use faults::{Fate, Faults};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::{SimulateError, SimulatedBench};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::surface::Extent;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -64,7 +70,7 @@ pub struct SimulatedBoard<'a> {
     channels: Vec<Channel>,
     finger: Finger,
     faults: Faults,
-    ageing: Ageing,
+    distortion: Distortion,
     rate_hz: f64,
     load_cell: Option<(LoadCell, Xoshiro256PlusPlus)>,
     frames: FrameForm,
@@ -91,11 +97,13 @@ impl<'a> SimulatedBoard<'a> {
     /// [`SimulateError`] for a surface without a model, or one whose equations are not solved.
     pub fn new(setup: &'a Setup, config: &BoardConfig, finger: Finger) -> Result<Self, SimulateError> {
         let bench = SimulatedBench::new(setup, config.seed)?;
+        let untouched = bench.clean(&[]);
+        let ranges = ranges(&bench, &untouched, setup.surface().extent(), finger.typical_n());
         let channels = Channel::all_of(setup);
         let faults = Faults::new(FaultConfig::default(), config.seed);
         Ok(Self {
             bench,
-            ageing: Ageing::new(channels.len(), config.seed),
+            distortion: Distortion::new(&untouched, &ranges, config.seed),
             channels,
             finger,
             faults,
@@ -146,8 +154,9 @@ impl<'a> SimulatedBoard<'a> {
         let time_s = self.next_at().as_secs_f64();
         let contact = self.finger.contact_at(time_s);
         let mut clean = self.bench.clean(contact.as_slice());
-        self.ageing.act(&mut clean, &self.faults.config, 1.0 / self.rate_hz);
-        let reading = self.bench.measure(&clean);
+        self.distortion.act(&mut clean, &self.faults.config, 1.0 / self.rate_hz);
+        let mut reading = self.bench.measure(&clean);
+        convert(&mut reading, &self.faults.config);
         let force_n = contact.map_or(0.0, |contact| contact.force_n);
         let mut frame = self.frame(&reading, force_n, time_s);
         self.count += 1;
@@ -195,4 +204,24 @@ impl<'a> SimulatedBoard<'a> {
         };
         (cells.join(",") + "\n").into_bytes()
     }
+}
+
+/// Positions along each side at which the range of a channel is sought.
+const RANGE_POSITIONS: u32 = 20;
+
+/// Largest deviation of each channel from its untouched reading, under a force on a grid of positions.
+fn ranges(bench: &SimulatedBench, untouched: &[f64], extent: Extent, force_n: f64) -> Vec<f64> {
+    let along =
+        |side_m: f64| (1..RANGE_POSITIONS).map(move |i| side_m * f64::from(i) / f64::from(RANGE_POSITIONS));
+    let across: Vec<f64> = extent.width_m().map_or_else(|| vec![0.0], |width_m| along(width_m).collect());
+    let mut ranges = vec![0.0_f64; untouched.len()];
+    for x_m in along(extent.length_m()) {
+        for y_m in &across {
+            let contact = Contact { position: Position { x_m, y_m: *y_m }, force_n };
+            for ((range, value), untouched) in ranges.iter_mut().zip(bench.clean(&[contact])).zip(untouched) {
+                *range = range.max((value - untouched).abs());
+            }
+        }
+    }
+    ranges
 }

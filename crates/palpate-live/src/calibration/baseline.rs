@@ -1,0 +1,214 @@
+//! The untouched reading of each channel with its noise, and readings compared with it.
+
+use super::stretch::{LONGEST_SPAN, REST_SPAN, Stretch, mean};
+
+/// Deviation of one reading that noise does not explain, in standard deviations: Gaussian noise reaches it once in 10¹⁴ values.
+pub const NOISE_LIMIT_SD: f64 = 8.0;
+/// Difference of the means of two halves of a stretch at rest, in standard deviations of that difference.
+const REST_SD: f64 = 3.5;
+/// Largest ratio of the variance about a line to that of successive differences: a logger that repeats every value 25 times has it. Above it, the surface moves.
+const LARGEST_CORRELATION: f64 = 25.0;
+/// Decimals that are tried for the resolution of a channel.
+const MOST_DECIMALS: i32 = 9;
+
+/// Noise and drift of a channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Noise {
+    /// Standard deviation of one reading.
+    sd: f64,
+    /// Factor by which the variance of a mean exceeds that of independent readings.
+    correlation: f64,
+    /// Drift while the noise was learnt, per second.
+    drift_per_s: f64,
+}
+
+/// Untouched reading and noise of each channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Baseline {
+    /// Mean untouched reading of each channel.
+    pub mean: Vec<f64>,
+    noise: Vec<Noise>,
+}
+
+impl Baseline {
+    /// The baseline of a stretch at rest, or one that drifts steadily for [`LONGEST_SPAN`]; `None` while the stretch is too short or the surface moves.
+    pub fn learn(stretch: &Stretch) -> Option<Self> {
+        let readings = stretch.for_noise()?;
+        let span_s = -readings.first()?.0;
+        let noise: Option<Vec<Noise>> =
+            (0..readings[0].1.len()).map(|channel| Noise::learn(&readings, channel)).collect();
+        let latest = stretch.latest()?;
+        let baseline = Self { mean: mean(&latest), noise: noise? };
+        let is_steady = span_s >= 0.95 * LONGEST_SPAN.as_secs_f64();
+        let still = Self {
+            noise: baseline.noise.iter().map(|noise| Noise { drift_per_s: 0.0, ..*noise }).collect(),
+            ..baseline.clone()
+        };
+        let all: Vec<&[f64]> = readings.iter().map(|(_, reading)| *reading).collect();
+        (is_steady || still.is_at_rest(&all, 0.0)).then_some(baseline)
+    }
+
+    /// Largest deviation of a reading from the baseline, in standard deviations of the noise.
+    pub fn size(&self, reading: &[f64]) -> f64 {
+        self.size_of(&self.deviation(reading))
+    }
+
+    /// Largest component of a deviation, in standard deviations of the noise.
+    pub fn size_of(&self, deviation: &[f64]) -> f64 {
+        deviation
+            .iter()
+            .zip(&self.noise)
+            .map(|(deviation, noise)| deviation.abs() / noise.sd)
+            .fold(0.0, f64::max)
+    }
+
+    /// Deviation of a reading from the baseline, channel by channel.
+    pub fn deviation(&self, reading: &[f64]) -> Vec<f64> {
+        reading.iter().zip(&self.mean).map(|(value, mean)| value - mean).collect()
+    }
+
+    /// Euclidean length of a deviation, each channel in standard deviations of its noise.
+    pub fn length_of(&self, deviation: &[f64]) -> f64 {
+        deviation
+            .iter()
+            .zip(&self.noise)
+            .map(|(deviation, noise)| (deviation / noise.sd).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    }
+
+    /// Inner product of two deviations, each channel in standard deviations of its noise.
+    pub fn product_of(&self, a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).zip(&self.noise).map(|((a, b), noise)| a * b / noise.sd.powi(2)).sum()
+    }
+
+    /// True where the means of both halves of readings agree within the noise, the drift and `allowed` standard deviations of the noise.
+    ///
+    /// A change below the noise of one reading is always allowed, as single readings are recorded.
+    pub fn is_at_rest(&self, readings: &[&[f64]], allowed: f64) -> bool {
+        let (first, second) = readings.split_at(readings.len() / 2);
+        let sd_of_difference = (1.0 / first.len() as f64 + 1.0 / second.len() as f64).sqrt();
+        let half_s = 0.5 * REST_SPAN.as_secs_f64();
+        let (first, second) = (mean(first), mean(second));
+        first.iter().zip(&second).zip(&self.noise).all(|((first, second), noise)| {
+            let by_noise = REST_SD * sd_of_difference * noise.correlation.sqrt();
+            // Twice the drift that was learnt, as a drift changes slowly.
+            let by_drift = 2.0 * noise.drift_per_s.abs() * half_s;
+            (first - second).abs() <= (by_noise.max(1.0) + allowed) * noise.sd + by_drift
+        })
+    }
+
+    /// Largest change between both halves of readings, in standard deviations of the noise.
+    pub fn change(&self, readings: &[&[f64]]) -> f64 {
+        let (first, second) = readings.split_at(readings.len() / 2);
+        let (first, second) = (mean(first), mean(second));
+        let change: Vec<f64> = first.iter().zip(&second).map(|(first, second)| second - first).collect();
+        self.size_of(&change)
+    }
+}
+
+impl Noise {
+    /// Noise of a channel from readings with their seconds; `None` where the channel moves.
+    ///
+    /// The variance of independent readings is half the mean square of successive differences, which a slow drift leaves unchanged (von Neumann 1941).
+    /// Filtered or repeated values have smaller differences than their scatter about a line: the ratio of both is the correlation.
+    fn learn(readings: &[(f64, &[f64])], channel: usize) -> Option<Self> {
+        let values: Vec<(f64, f64)> =
+            readings.iter().map(|(at_s, reading)| (*at_s, reading[channel])).collect();
+        let n = values.len() as f64;
+        let squares: f64 = values.windows(2).map(|pair| (pair[1].1 - pair[0].1).powi(2)).sum();
+        let of_differences = 0.5 * squares / (n - 1.0);
+        let (mean_s, mean) =
+            values.iter().fold((0.0, 0.0), |(s, v), (at_s, value)| (s + at_s / n, v + value / n));
+        let (mut across, mut along) = (0.0, 0.0);
+        for (at_s, value) in &values {
+            across += (at_s - mean_s) * (value - mean);
+            along += (at_s - mean_s).powi(2);
+        }
+        let drift_per_s = if along > 0.0 { across / along } else { 0.0 };
+        let residuals = values.iter().map(|(at_s, value)| value - mean - drift_per_s * (at_s - mean_s));
+        let about_line = residuals.map(|residual| residual * residual).sum::<f64>() / (n - 2.0).max(1.0);
+        // A channel that has not moved yet may do so by any step of its converter.
+        let least_sd = (0.5 * resolution(&values)).max(1e-9 * mean.abs()).max(f64::MIN_POSITIVE.sqrt());
+        let least = least_sd * least_sd;
+        let correlation = about_line.max(least) / of_differences.max(least);
+        (correlation <= LARGEST_CORRELATION).then(|| Self {
+            sd: about_line.max(of_differences).max(least).sqrt(),
+            correlation: correlation.max(1.0),
+            drift_per_s,
+        })
+    }
+}
+
+/// Decimal step of which all values are multiples, such as 1 for raw counts; 0 where there is none.
+fn resolution(values: &[(f64, f64)]) -> f64 {
+    let is_multiple = |value: f64, scale: f64| {
+        let scaled = value * scale;
+        (scaled - scaled.round()).abs() <= 1e-9 * scaled.abs().max(1.0)
+    };
+    (0..=MOST_DECIMALS)
+        .map(|decimals| 10f64.powi(decimals))
+        .find(|scale| values.iter().all(|(_, value)| is_multiple(*value, *scale)))
+        .map_or(0.0, f64::recip)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use std::time::Duration;
+
+    fn stretch(values: impl Iterator<Item = f64>) -> Stretch {
+        let mut stretch = Stretch::default();
+        values.enumerate().for_each(|(i, value)| stretch.add(Duration::from_millis(10 * i as u64), &[value]));
+        stretch
+    }
+
+    fn noise(count: usize) -> Vec<f64> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+        (0..count).map(|_| StandardNormal.sample(&mut rng)).collect()
+    }
+
+    #[test]
+    fn learns_the_noise_of_independent_readings() {
+        let baseline = Baseline::learn(&stretch(noise(250).into_iter())).unwrap();
+        assert!((0.85..1.15).contains(&baseline.noise[0].sd), "{baseline:?}");
+    }
+
+    #[test]
+    fn learns_the_noise_of_repeated_values() {
+        let values = noise(25);
+        let baseline = Baseline::learn(&stretch((0..250).map(|i| values[i / 10]))).unwrap();
+        assert!((0.6..1.4).contains(&baseline.noise[0].sd), "{baseline:?}");
+        assert!((4.0..25.0).contains(&baseline.noise[0].correlation), "{baseline:?}");
+    }
+
+    #[test]
+    fn accepts_a_steady_drift_after_three_seconds_only() {
+        let drifting = |count: usize| {
+            let values = noise(count);
+            stretch((0..count).map(move |i| values[i] + 0.2 * i as f64))
+        };
+        assert_eq!(Baseline::learn(&drifting(200)), None);
+        let baseline = Baseline::learn(&drifting(301)).unwrap();
+        assert!((baseline.noise[0].drift_per_s - 20.0).abs() < 0.5, "{baseline:?}");
+    }
+
+    #[test]
+    fn refuses_a_moving_surface() {
+        let values = noise(300);
+        assert_eq!(
+            Baseline::learn(&stretch((0..300).map(|i| values[i] + 300.0 * (0.02 * i as f64).sin()))),
+            None
+        );
+    }
+
+    #[test]
+    fn a_constant_channel_may_flip_by_its_resolution() {
+        let baseline = Baseline::learn(&stretch((0..250).map(|_| 512.0))).unwrap();
+        assert!(baseline.size(&[513.0]) < NOISE_LIMIT_SD);
+        assert!(baseline.size(&[520.0]) > NOISE_LIMIT_SD);
+    }
+}

@@ -1,0 +1,187 @@
+//! A hand that does what a guided calibration asks for, as people do it: beside the place, slowly, hovering, tapping, lifting early.
+
+use crate::calibration::{Press, Waiting};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::surface::Extent;
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Manner in which a hand presses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HandStyle {
+    /// Standard deviation of its place on either axis, in metres.
+    pub placement_m: f64,
+    /// Time in which the force comes, in seconds.
+    pub press_s: f64,
+    /// Time in which the force goes, in seconds.
+    pub lift_s: f64,
+    /// Time of its reaction to an instruction, in seconds.
+    pub reaction_s: f64,
+    /// Share of the force with which it hovers before each press and after it, 0 for none.
+    pub hover_share: f64,
+    /// Time for which it hovers, in seconds.
+    pub hover_s: f64,
+    /// Quick taps before each press.
+    pub taps: u32,
+    /// Share of presses that it lifts before their reading is at rest, 0 to 1.
+    pub early_lift: f64,
+}
+
+impl Default for HandStyle {
+    /// A hand that presses exactly and quickly.
+    fn default() -> Self {
+        Self {
+            placement_m: 0.0,
+            press_s: 0.2,
+            lift_s: 0.1,
+            reaction_s: 0.4,
+            hover_share: 0.0,
+            hover_s: 0.0,
+            taps: 0,
+            early_lift: 0.0,
+        }
+    }
+}
+
+/// Time of a tap, and of the pause after it, in seconds.
+const TAP_S: f64 = 0.12;
+/// Time after the onset at which an early lift begins, in seconds.
+const EARLY_LIFT_S: f64 = 0.15;
+
+/// A hand in the course of a calibration.
+#[derive(Clone, Debug)]
+pub struct Hand {
+    style: HandStyle,
+    extent: Extent,
+    rng: Xoshiro256PlusPlus,
+    position: Position,
+    force_n: f64,
+    motion: Vec<Leg>,
+    begun_s: f64,
+    presses: bool,
+}
+
+/// A part of a motion: the share of the force goes to `share` within `for_s`.
+#[derive(Clone, Copy, Debug)]
+struct Leg {
+    for_s: f64,
+    share: f64,
+}
+
+impl Hand {
+    /// A lifted hand over a surface.
+    pub fn new(style: HandStyle, extent: Extent, seed: u64) -> Self {
+        Self {
+            style,
+            extent,
+            rng: Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x4A_4D),
+            position: Position::default(),
+            force_n: 0.0,
+            motion: Vec::new(),
+            begun_s: 0.0,
+            presses: false,
+        }
+    }
+
+    /// Contact at a time in seconds, which never goes back, of a hand that is asked for a step; presses without a force have `force_n`.
+    pub fn contact_at(
+        &mut self,
+        time_s: f64,
+        waiting: Waiting,
+        press: Option<Press>,
+        force_n: f64,
+    ) -> Option<Contact> {
+        let has_stopped = self.is_over(time_s);
+        match (waiting, press) {
+            (Waiting::Press, Some(press)) if !self.presses && has_stopped => {
+                self.begin(time_s);
+                self.presses = true;
+                self.position = self.beside(press.position);
+                self.force_n = press.force_n.unwrap_or(force_n);
+                self.motion = self.pressing();
+            }
+            // A hand that was lifted early is asked for the press again.
+            (Waiting::Press, _) if self.presses && has_stopped && self.share_at(time_s) <= 0.0 => {
+                self.presses = false;
+            }
+            (Waiting::Release | Waiting::Untouched | Waiting::Nothing, _) if self.presses && has_stopped => {
+                let share = self.share_at(time_s);
+                self.begin(time_s);
+                self.presses = false;
+                self.motion = if share > 0.0 { self.lifting(share) } else { Vec::new() };
+            }
+            _ => {}
+        }
+        let share = self.share_at(time_s);
+        (share > 0.0).then_some(Contact { position: self.position, force_n: self.force_n * share })
+    }
+
+    fn begin(&mut self, time_s: f64) {
+        self.begun_s = time_s;
+    }
+
+    fn pressing(&mut self) -> Vec<Leg> {
+        let HandStyle { press_s, lift_s, reaction_s, hover_share, hover_s, taps, early_lift, .. } =
+            self.style;
+        let mut legs = vec![Leg { for_s: reaction_s, share: 0.0 }];
+        for _ in 0..taps {
+            legs.extend(
+                [(0.4, 0.8), (0.6, 0.0), (1.0, 0.0)].map(|(part, share)| Leg { for_s: part * TAP_S, share }),
+            );
+        }
+        if hover_share > 0.0 {
+            legs.extend([Leg { for_s: 0.1, share: hover_share }, Leg { for_s: hover_s, share: hover_share }]);
+        }
+        legs.push(Leg { for_s: press_s, share: 1.0 });
+        if self.rng.random::<f64>() < early_lift {
+            legs.extend([Leg { for_s: EARLY_LIFT_S, share: 1.0 }, Leg { for_s: lift_s, share: 0.0 }]);
+        }
+        legs
+    }
+
+    fn lifting(&self, share: f64) -> Vec<Leg> {
+        let HandStyle { lift_s, reaction_s, hover_share, hover_s, .. } = self.style;
+        let mut legs = vec![Leg { for_s: reaction_s, share }];
+        if hover_share > 0.0 {
+            legs.extend([
+                Leg { for_s: lift_s, share: hover_share },
+                Leg { for_s: hover_s, share: hover_share },
+            ]);
+        }
+        legs.push(Leg { for_s: lift_s, share: 0.0 });
+        legs
+    }
+
+    fn is_over(&self, time_s: f64) -> bool {
+        time_s - self.begun_s >= self.motion.iter().map(|leg| leg.for_s).sum()
+    }
+
+    /// Share of the force at a time: smooth between the ends of the legs.
+    fn share_at(&self, time_s: f64) -> f64 {
+        let mut left_s = time_s - self.begun_s;
+        let mut from = match self.motion.first() {
+            Some(first) => first.share,
+            None => return 0.0,
+        };
+        for leg in &self.motion {
+            if left_s < leg.for_s {
+                let part = left_s / leg.for_s;
+                return from + part * part * (3.0 - 2.0 * part) * (leg.share - from);
+            }
+            (from, left_s) = (leg.share, left_s - leg.for_s);
+        }
+        from
+    }
+
+    /// A place beside the one that is asked for, on the surface.
+    fn beside(&mut self, position: Position) -> Position {
+        let mut off = |at_m: f64, side_m: f64| {
+            let drawn: f64 = StandardNormal.sample(&mut self.rng);
+            (at_m + self.style.placement_m * drawn).clamp(0.0, side_m)
+        };
+        let x_m = off(position.x_m, self.extent.length_m());
+        let y_m = self.extent.width_m().map_or(0.0, |width_m| off(position.y_m, width_m));
+        Position { x_m, y_m }
+    }
+}
