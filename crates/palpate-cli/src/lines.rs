@@ -20,6 +20,8 @@ pub struct Lines {
     /// The last chunk, and how much of it has been taken.
     chunk: (Vec<u8>, usize),
     line: Vec<u8>,
+    /// True where a CR has ended the last line: an LF behind it belongs to the same end.
+    after_cr: bool,
     /// Lines that gave nothing.
     lost: u64,
     records: Records,
@@ -46,7 +48,7 @@ impl Lines {
     /// The lines of a file; `-` is stdin.
     pub fn open(path: &Path, records: Records) -> Result<Self, Failure> {
         let source = Chunks::open(path)?;
-        Ok(Self { count: 0, source, chunk: (Vec::new(), 0), line: Vec::new(), lost: 0, records })
+        Ok(Self { count: 0, source, chunk: (Vec::new(), 0), line: Vec::new(), after_cr: false, lost: 0, records })
     }
 
     /// Name of the source.
@@ -54,7 +56,7 @@ impl Lines {
         &self.source.name
     }
 
-    /// The next line, with its end; `None` after the last.
+    /// The next line, with its end, which is LF, CR or CRLF; `None` after the last.
     ///
     /// # Errors
     /// A complaint where the source cannot be read, and [`Failure::Interrupted`] once a signal came.
@@ -69,8 +71,12 @@ impl Lines {
                 self.chunk = (next, 0);
                 continue;
             }
+            if std::mem::take(&mut self.after_cr) && chunk[*taken] == b'\n' {
+                *taken += 1;
+                continue;
+            }
             let rest = &chunk[*taken..];
-            let end = rest.iter().position(|byte| *byte == b'\n').map(|at| at + 1);
+            let end = rest.iter().position(|byte| matches!(byte, b'\n' | b'\r')).map(|at| at + 1);
             let part = &rest[..end.unwrap_or(rest.len())];
             length += part.len();
             *taken += part.len();
@@ -78,7 +84,8 @@ impl Lines {
             if length <= MOST_BYTES {
                 self.line.extend_from_slice(part);
             }
-            if end.is_some() {
+            if let Some(end) = end {
+                self.after_cr = rest[end - 1] == b'\r';
                 break;
             }
         }

@@ -25,7 +25,9 @@ mod tables;
 mod tare;
 mod target;
 
+use crate::remark::remark;
 use clap::{Parser, Subcommand};
+use palpate_live::login::without_passwords;
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -56,6 +58,7 @@ enum Command {
     Profile(commands::profile::Arguments),
     Serve(commands::serve::Arguments),
     Record(commands::record::Arguments),
+    Recover(commands::recover::Arguments),
     Replay(commands::replay::Arguments),
     SimulatedBoard(commands::simulated_board::Arguments),
 }
@@ -83,6 +86,7 @@ fn main() -> ExitCode {
         Command::Profile(arguments) => commands::profile::run(&arguments),
         Command::Serve(arguments) => commands::serve::run(&arguments),
         Command::Record(arguments) => commands::record::run(&arguments),
+        Command::Recover(arguments) => commands::recover::run(&arguments),
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::SimulatedBoard(arguments) => commands::simulated_board::run(&arguments),
     };
@@ -94,7 +98,15 @@ fn main() -> ExitCode {
 
 /// Prints help, version, or a complaint about the arguments.
 fn answer(error: &clap::Error) -> ExitCode {
-    let printed = error.print().and_then(|()| std::io::stdout().flush());
+    let text = error.to_string();
+    let shown = without_passwords(&text);
+    let printed = match shown == text {
+        true => error.print().and_then(|()| std::io::stdout().flush()),
+        false => {
+            remark!("{}", shown.trim_end());
+            Ok(())
+        }
+    };
     match (error.use_stderr(), printed) {
         (true, _) => ExitCode::from(2),
         (false, Ok(())) => ExitCode::SUCCESS,

@@ -22,6 +22,15 @@ const WRAPS: [Duration; 2] = [Duration::from_micros(1 << 32), Duration::from_mil
 /// A step by the board's clock is that by the host's within this, in seconds, and within [`GREATEST_DRIFT`]; a clock that steps otherwise was set.
 const STEP_S: f64 = 2.0;
 
+/// Time from one reading to the next by the board's clock alone, which may wrap around; `None` where it was set back.
+pub fn step(from: Duration, to: Duration) -> Option<Duration> {
+    /// Share of the range of a clock below and above which a step back is one around its end.
+    const END: u32 = 16;
+    let around = |wrap: &Duration| from < *wrap && *wrap - from < *wrap / END && to < *wrap / END;
+    let wrapped = || WRAPS.iter().find(|wrap| around(wrap)).map(|wrap| *wrap - from + to);
+    to.checked_sub(from).or_else(wrapped)
+}
+
 /// Map from a board's clock to the host's, learnt from readings as they arrive.
 #[derive(Debug, Default)]
 pub struct DeviceClock {

@@ -20,6 +20,10 @@ pub enum Arrival {
     Opened(String),
     /// The device is there, and sends already: its bytes may begin amid a frame; its name.
     Joined(String),
+    /// The stream is there, and comes at any pace, as through a pipe: its readings have the times of the board's clock, where it tells them; its name.
+    Piped(String),
+    /// Bytes of a stream that waited when it was opened: old readings.
+    Backlog(Vec<u8>),
     /// Bytes of a stream, in order, cut anywhere.
     Bytes(Vec<u8>),
     /// Bytes of a message, as of UDP and MQTT: whole frames.

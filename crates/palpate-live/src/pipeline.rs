@@ -1,6 +1,7 @@
 //! The thread of a session: what sources and users bring goes in, and what follows goes to the sinks.
 
-use crate::input::{Arrival, Input};
+use crate::feed::FeedWatch;
+use crate::input::{Arrival, Command, Input};
 use crate::session::{Estimation, Output, Session};
 use crate::sink::{Batch, ChannelRecord, Sink, StateRecord};
 use crate::source::SourceUrl;
@@ -39,9 +40,16 @@ pub fn check_pace(estimation: &Estimation, from: &SourceUrl) -> Result<(), PaceE
     }
 }
 
-/// Runs a session until the source has ended, everybody who sends has gone, or it is to stop.
-pub fn run(session: &mut Session, clock: HostClock, inputs: &Receiver<Input>, sinks: &mut [Box<dyn Sink>]) {
+/// Runs a session until the source has ended, everybody who sends has gone, or it is to stop. Gives the fault of its feed: that there was no reading, or none
+/// towards the end. The same is an event as soon as it is noticed.
+pub fn run(
+    session: &mut Session,
+    clock: HostClock,
+    inputs: &Receiver<Input>,
+    sinks: &mut [Box<dyn Sink>],
+) -> Option<String> {
     let mut source = None;
+    let mut feed = FeedWatch::default();
     let mut next_state = Instant::now() + STATE_EVERY;
     loop {
         let mut outputs = Vec::new();
@@ -49,16 +57,23 @@ pub fn run(session: &mut Session, clock: HostClock, inputs: &Receiver<Input>, si
         match inputs.recv_timeout(next_state.saturating_duration_since(Instant::now())) {
             Ok(Input::Arrived(arrived)) => {
                 match &arrived.arrival {
-                    Arrival::Opened(name) | Arrival::Joined(name) => source = Some(name.clone()),
+                    Arrival::Opened(name) | Arrival::Joined(name) | Arrival::Piped(name) => {
+                        source = Some(name.clone());
+                    }
                     Arrival::Lost(_) => source = None,
                     Arrival::Ended => goes_on = false,
-                    Arrival::Bytes(_) | Arrival::Message(_) => {}
+                    Arrival::Backlog(_) | Arrival::Bytes(_) | Arrival::Message(_) => {}
                 }
                 session.receive(&arrived, &mut outputs);
+                feed.receive(&arrived, session);
             }
             Ok(Input::Command(command)) => session.command(clock.now(), command, &mut outputs),
             Err(RecvTimeoutError::Timeout) => {}
             Ok(Input::Stop) | Err(RecvTimeoutError::Disconnected) => goes_on = false,
+        }
+        let now = clock.now();
+        if let Some(text) = feed.report(now.elapsed, session) {
+            session.command(now, Command::Trouble(text), &mut outputs);
         }
         give(outputs, sinks);
         if Instant::now() >= next_state || !goes_on {
@@ -67,7 +82,7 @@ pub fn run(session: &mut Session, clock: HostClock, inputs: &Receiver<Input>, si
             next_state = Instant::now() + STATE_EVERY;
         }
         if !goes_on {
-            return;
+            return feed.fault(session);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Files that are written whole: under a temporary name first, so that nobody ever sees half of one.
 
+use std::fs::File;
 use std::io::{Error, Result, Write};
 use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
@@ -10,9 +11,17 @@ use tempfile::{Builder, NamedTempFile};
 /// # Errors
 /// The folder takes no file, or the disk is full; then the file of before is there still.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_with(path, |file| file.write_all(bytes))
+}
+
+/// Writes a file by a function, as [`write`] does.
+///
+/// # Errors
+/// As of [`write`], and the function's own.
+pub fn write_with(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<()> {
     let place = place(path)?;
     let mut file = temporary(folder_of(&place))?;
-    file.write_all(bytes)?;
+    fill(file.as_file_mut())?;
     if let Ok(replaced) = std::fs::metadata(&place) {
         file.as_file().set_permissions(replaced.permissions())?;
     }

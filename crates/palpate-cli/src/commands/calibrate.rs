@@ -353,11 +353,18 @@ fn stopped(arguments: &Arguments, calibration: &Calibration) -> Failure {
 /// Words on what is kept.
 fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
     let presses = calibration.journal().presses();
+    if presses == 0 {
+        return "no press was taken".to_owned();
+    }
     format!("{presses} presses are in {}, and --resume goes on", arguments.presses.display())
 }
 
 /// Fits the rig's estimator to the presses on disk, and says how good it is and what more presses would gain.
 fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure> {
+    if !arguments.presses.exists() {
+        let words = "the calibration ended before any press, so there is nothing to fit; run it again and press";
+        return Err(Failure::GoalMissed(words.to_owned()));
+    }
     let recording = input::read_recording(&rig.setup, &arguments.presses)?;
     let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
     let failed = |error: &(dyn std::error::Error + 'static)| match Failure::from_error(error) {

@@ -13,6 +13,7 @@ pub mod locate;
 mod outlets;
 pub mod profile;
 pub mod record;
+pub mod recover;
 pub mod replay;
 pub mod serve;
 pub mod simulate;

@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     recording.begin(&arguments.out).map_err(Complaint::new)?;
     sinks.push(Box::new(recording.clone()));
     let stop = Stop::after(arguments.seconds, to)?;
-    pipeline::run(&mut session, clock, &from, &mut sinks);
+    let fault = pipeline::run(&mut session, clock, &from, &mut sinks);
     drop((source, stop, sinks));
     let status = recording.end().unwrap_or_default();
     if let Some((url, lost)) = unpublished {
@@ -123,17 +123,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             lost => remark!("{} messages did not reach the broker {url}", format_count(lost)),
         }
     }
-    let labels = session.channels().iter().map(|channel| channel.label.as_str());
     let unprinted = unprinted.as_ref().and_then(|unprinted| unprinted.get());
-    finish(arguments, &status, session.counters(), labels, unprinted)
+    finish(arguments, &status, session.counters(), fault, unprinted)
 }
 
-/// Says what was recorded.
-fn finish<'a>(
+/// Says what was recorded; a `fault` of the feed is a failure.
+fn finish(
     arguments: &Arguments,
     status: &RecordingStatus,
     counters: &Counters,
-    labels: impl IntoIterator<Item = &'a str>,
+    fault: Option<String>,
     unprinted: Option<&std::io::Error>,
 ) -> Result<(), Failure> {
     let bad: u64 = counters.bad_frames.values().sum();
@@ -149,10 +148,7 @@ fn finish<'a>(
     );
     let lost =
         (status.lost > 0).then(|| format!("{} readings could not be recorded", format_count(status.lost)));
-    let most_often = counters.bad_frames.iter().max_by_key(|(_, count)| **count);
-    let unread =
-        most_often.filter(|_| status.readings == 0).map(|(cause, _)| cause.explain_no_reading(bad, labels));
-    let faults: Vec<String> = [lost, status.problem.clone(), unread].into_iter().flatten().collect();
+    let faults: Vec<String> = [lost, status.problem.clone(), fault].into_iter().flatten().collect();
     if !faults.is_empty() {
         return Err(Failure::DataLost(format!("{summary}; {}", faults.join("; "))));
     }

@@ -111,7 +111,7 @@ fn by_the_same(
         }
     }
     output::flush(out)?;
-    say_bad(&playback)?;
+    check_losses(arguments, &playback, count, "estimate")?;
     let all = format_count(count);
     match others {
         0 => remark!("{all} estimates, each as recorded to the last bit"),
@@ -134,6 +134,7 @@ fn by_another(
     let extent = session.extent();
     begin(arguments, extent, out)?;
     let mut first_ns = None;
+    let mut count = 0;
     let mut outputs = Vec::new();
     while let Some(recorded) = playback.next_recorded().map_err(Complaint::new)? {
         let Recorded::Reading { unix_ns, values, .. } = recorded else { continue };
@@ -143,6 +144,7 @@ fn by_another(
         session.receive(&Arrived { at, arrival: Arrival::Bytes(bytes) }, &mut outputs);
         for output in outputs.drain(..) {
             let Output::Sample(sample) = output else { continue };
+            count += 1;
             let line = Line {
                 number: sample.number,
                 time_s: sample.unix_ns as f64 * 1e-9,
@@ -155,14 +157,26 @@ fn by_another(
         }
     }
     output::flush(out)?;
-    say_bad(&playback)
+    check_losses(arguments, &playback, count, "reading")
 }
 
-fn say_bad(playback: &Playback) -> Result<(), Failure> {
-    match playback.bad_messages {
-        0 => Ok(()),
-        bad => Err(Failure::DataLost(format!("{} messages are damaged", format_count(bad)))),
+/// Fails where parts of the recording could not be read, or where it holds no such `record`; says what it holds of other programs.
+fn check_losses(
+    arguments: &Arguments,
+    playback: &Playback,
+    count: u64,
+    record: &str,
+) -> Result<(), Failure> {
+    let passed_over = playback.passed_over();
+    if passed_over.foreign > 0 {
+        remark!("{} messages on topics of other programs are left out", format_count(passed_over.foreign));
     }
+    let nothing = (count == 0).then(|| format!("it holds no {record}"));
+    let losses: Vec<String> = nothing.into_iter().chain(passed_over.loss()).collect();
+    if losses.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::DataLost(format!("{}: {}", arguments.recording.display(), losses.join("; "))))
 }
 
 fn check_channels(head: &Head, locator: &Locator) -> Result<(), Failure> {

@@ -9,6 +9,7 @@ mod compare;
 mod connections;
 mod design;
 mod digit;
+mod feeds;
 mod init;
 mod learnt;
 mod limit;

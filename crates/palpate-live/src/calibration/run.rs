@@ -180,7 +180,8 @@ impl Calibration {
         match &arrived.arrival {
             Arrival::Bytes(bytes) => self.decoder.receive(bytes, hand_on),
             Arrival::Message(bytes) => self.decoder.receive_message(bytes, hand_on),
-            Arrival::Opened(name) => {
+            Arrival::Backlog(bytes) => self.decoder.receive_waiting(bytes),
+            Arrival::Opened(name) | Arrival::Piped(name) => {
                 self.decoder.open();
                 // Offsets of a board that was away may have moved.
                 self.guide.relearn();
@@ -216,7 +217,11 @@ impl Calibration {
     fn unread(&self, cause: BadFrame) -> Option<Note> {
         let is_time = self.readings == 0 && self.bad.values().sum::<u64>() == UNREAD;
         is_time
-            .then(|| Note::Unread(cause.explain_no_reading(UNREAD, self.labels.iter().map(String::as_str))))
+            .then(|| {
+                let words = cause.explain_no_reading(UNREAD, self.labels.iter().map(String::as_str));
+                let last = self.decoder.last_bad().unwrap_or_default();
+                Note::Unread(format!("{words}; the last is `{last}`"))
+            })
     }
 
     fn add(&mut self, at: Duration, reading: &[f64], notes: &mut Vec<Note>) -> Result<(), CalibrationError> {

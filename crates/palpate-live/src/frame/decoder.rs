@@ -3,10 +3,14 @@
 use super::binary;
 use super::names::{Names, Role};
 use super::text::{Line, TextReader, is_text};
-use super::{BadFrame, Channel, Frame};
+use super::{BadFrame, Channel, Frame, quote};
 
 /// Most bytes of a line.
 const LONGEST_LINE: usize = 1 << 16;
+/// Most bytes of a message.
+pub const LONGEST_MESSAGE: usize = 1 << 17;
+/// Bytes of a frame that are kept for a quotation of at most 80 characters, of up to four bytes each.
+const QUOTED: usize = 320;
 
 /// Decoder of the frames of a source: text or binary, whichever it sends.
 ///
@@ -27,6 +31,8 @@ pub struct Decoder {
     torn_binary: bool,
     /// Bytes are left out until a frame ends, for there were too many.
     skips: bool,
+    /// Start of the last frame that was no reading, empty before there was one.
+    last_bad: Vec<u8>,
     scratch: Vec<u8>,
 }
 
@@ -73,6 +79,7 @@ impl Decoder {
             torn_line: false,
             torn_binary: false,
             skips: false,
+            last_bad: Vec::new(),
             scratch: Vec::new(),
         }
     }
@@ -102,6 +109,7 @@ impl Decoder {
     /// Begins a stream; names that a header gave are kept, for a board that was merely unplugged from the host does not say them again.
     pub fn open(&mut self) {
         self.form = Form::Unknown;
+        self.text.open();
         self.clear();
         (self.torn_line, self.torn_binary, self.skips) = (false, false, false);
     }
@@ -128,13 +136,37 @@ impl Decoder {
         }
     }
 
+    /// Takes bytes of a stream that waited for it to be opened: their readings are old, and only names in a header count.
+    pub fn receive_waiting(&mut self, bytes: &[u8]) {
+        self.receive(bytes, |_| {});
+        if !self.held.is_empty() {
+            // The frame that has begun is old, too; a line end may stand within it where it is binary.
+            self.clear();
+            (self.skips, self.torn_binary) = (true, true);
+        }
+    }
+
+    /// The last frame that was no reading, as a message can quote it; `None` before there was one.
+    pub fn last_bad(&self) -> Option<String> {
+        (!self.last_bad.is_empty()).then(|| quote(&self.last_bad))
+    }
+
+    /// Bytes since the end of the last frame.
+    pub fn unfinished(&self) -> &[u8] {
+        &self.held
+    }
+
     /// Takes a message: lines of text, or binary frames, all whole.
     pub fn receive_message(&mut self, bytes: &[u8], mut hand_on: impl FnMut(Result<Frame, BadFrame>)) {
+        if bytes.len() > LONGEST_MESSAGE {
+            self.keep_bad(bytes);
+            return hand_on(Err(BadFrame::TooLong));
+        }
         if is_text(bytes) {
-            bytes.split(|byte| *byte == b'\n').for_each(|line| self.read_line(line, &mut hand_on));
+            bytes.split(is_line_end).for_each(|line| self.read_line(line, &mut hand_on));
         } else {
             let frames = bytes.split(|byte| *byte == 0).filter(|frame| !frame.is_empty());
-            frames.for_each(|frame| hand_on(self.decode_binary(frame)));
+            frames.for_each(|frame| self.read_binary(frame, &mut hand_on));
         }
     }
 
@@ -143,7 +175,7 @@ impl Decoder {
         let held = std::mem::take(&mut self.held);
         if !held.is_empty() && !self.skips {
             match self.form {
-                Form::Binary => hand_on(self.decode_binary(&held)),
+                Form::Binary => self.read_binary(&held, &mut hand_on),
                 Form::Text => self.read_line(&held, &mut hand_on),
                 Form::Unknown => {
                     (0..self.not_text).for_each(|_| hand_on(Err(BadFrame::Encoding)));
@@ -161,7 +193,7 @@ impl Decoder {
 
     /// Leaves out bytes up to the end of a frame.
     fn skip(&mut self, bytes: &[u8]) -> usize {
-        let end = bytes.iter().position(|byte| matches!(byte, b'\n' | 0));
+        let end = bytes.iter().position(|byte| is_line_end(byte) || *byte == 0);
         self.skips = end.is_none();
         end.map_or(bytes.len(), |end| end + 1)
     }
@@ -177,6 +209,12 @@ impl Decoder {
         let room = longest.saturating_sub(self.held.len());
         let end = bytes.iter().take(room + 1).position(|byte| is_end(*byte));
         if end.is_none() && bytes.len() > room {
+            if self.held.is_empty() {
+                self.keep_bad(&bytes[..room]);
+            } else {
+                let held = std::mem::take(&mut self.held);
+                self.keep_bad(&held);
+            }
             hand_on(Err(BadFrame::TooLong));
             self.open();
             self.skips = true;
@@ -190,15 +228,18 @@ impl Decoder {
     fn receive_text(&mut self, bytes: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) -> usize {
         // Most lines are whole in the bytes, and need no copy.
         if self.held.is_empty()
-            && let Some(end) = bytes.iter().take(LONGEST_LINE + 1).position(|byte| *byte == b'\n')
+            && let Some(end) = bytes.iter().take(LONGEST_LINE + 1).position(is_line_end)
         {
-            self.end_line(&bytes[..end], hand_on);
+            // The second byte of a line end is an empty line, which is nothing.
+            if end > 0 {
+                self.end_line(&bytes[..end], bytes[end], hand_on);
+            }
             return end + 1;
         }
-        let (taken, ends) = self.hold(bytes, LONGEST_LINE, |byte| byte == b'\n', hand_on);
+        let (taken, ends) = self.hold(bytes, LONGEST_LINE, |byte| is_line_end(&byte), hand_on);
         if ends {
             let line = std::mem::take(&mut self.held);
-            self.end_line(&line, hand_on);
+            self.end_line(&line, bytes[taken - 1], hand_on);
             if self.held.is_empty() {
                 // Kept for the next line.
                 self.held = line;
@@ -209,7 +250,7 @@ impl Decoder {
     }
 
     /// Reads a line of a stream of text; one with zeros may be binary frames, of which the last has a line end in it.
-    fn end_line(&mut self, line: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
+    fn end_line(&mut self, line: &[u8], end: u8, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
         let Some(last) = line.iter().rposition(|byte| *byte == 0) else {
             return self.read_line(line, hand_on);
         };
@@ -222,8 +263,9 @@ impl Decoder {
         }
         if is_binary {
             self.form = Form::Binary;
-            self.held = [&line[last + 1..], b"\n"].concat();
+            self.held = [&line[last + 1..], &[end]].concat();
         } else {
+            self.keep_bad(line);
             hand_on(Err(BadFrame::Encoding));
         }
     }
@@ -232,7 +274,7 @@ impl Decoder {
         let (taken, ends) = self.hold(bytes, binary::LONGEST, |byte| byte == 0, hand_on);
         if ends && !self.held.is_empty() {
             let frame = std::mem::take(&mut self.held);
-            hand_on(self.decode_binary(&frame));
+            self.read_binary(&frame, hand_on);
             self.held = frame;
             self.held.clear();
         }
@@ -240,11 +282,11 @@ impl Decoder {
     }
 
     fn receive_unknown(&mut self, bytes: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) -> usize {
-        let (taken, ends) = self.hold(bytes, LONGEST_LINE, |byte| matches!(byte, b'\n' | 0), hand_on);
+        let (taken, ends) = self.hold(bytes, LONGEST_LINE, |byte| is_line_end(&byte) || byte == 0, hand_on);
         if ends {
             match bytes[taken - 1] {
                 0 => self.judge_binary(hand_on),
-                _ => self.judge_line(hand_on),
+                end => self.judge_line(end, hand_on),
             }
         }
         taken
@@ -265,12 +307,15 @@ impl Decoder {
                 hand_on(Ok(frame));
             }
             Err(_) if torn => {}
-            Err(cause) => hand_on(Err(cause)),
+            Err(cause) => {
+                self.keep_bad(&held);
+                hand_on(Err(cause));
+            }
         }
     }
 
     /// Judges the bytes that a line end ended, which may as well stand within a binary frame.
-    fn judge_line(&mut self, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
+    fn judge_line(&mut self, end: u8, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
         let mut held = std::mem::take(&mut self.held);
         let torn = std::mem::take(&mut self.torn_line);
         let line = &held[self.line_start..];
@@ -288,17 +333,21 @@ impl Decoder {
             Err(BadFrame::Encoding) => {
                 // Judged anew with all that follows, up to a zero.
                 self.not_text += u64::from(!torn);
-                held.push(b'\n');
+                self.keep_bad(&held[self.line_start..]);
+                held.push(end);
                 self.line_start = held.len();
                 self.held = held;
                 return;
             }
             Err(_) if torn => {}
-            Err(cause) => hand_on(Err(cause)),
+            Err(cause) => {
+                self.keep_bad(&held[self.line_start..]);
+                hand_on(Err(cause));
+            }
         }
         if !is_first {
             // Behind bytes that may be the start of a binary frame.
-            held.push(b'\n');
+            held.push(end);
             self.line_start = held.len();
             self.held = held;
         }
@@ -316,8 +365,25 @@ impl Decoder {
         match self.text.read(line) {
             Ok(Line::Unnamed(frame) | Line::Whole(frame)) => hand_on(Ok(frame)),
             Ok(Line::Nothing | Line::Header) => {}
-            Err(cause) => hand_on(Err(cause)),
+            Err(cause) => {
+                self.keep_bad(line);
+                hand_on(Err(cause));
+            }
         }
+    }
+
+    fn read_binary(&mut self, stuffed: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
+        let decoded = self.decode_binary(stuffed);
+        if decoded.is_err() {
+            self.keep_bad(stuffed);
+        }
+        hand_on(decoded);
+    }
+
+    fn keep_bad(&mut self, frame: &[u8]) {
+        let frame = frame.trim_ascii();
+        self.last_bad.clear();
+        self.last_bad.extend_from_slice(&frame[..frame.len().min(QUOTED)]);
     }
 
     fn decode_binary(&mut self, stuffed: &[u8]) -> Result<Frame, BadFrame> {
@@ -326,6 +392,11 @@ impl Decoder {
         }
         binary::decode(stuffed, self.text.names(), self.text.columns(), &mut self.scratch)
     }
+}
+
+/// True for a byte that ends a line: LF, or CR, behind which LF may follow.
+fn is_line_end(byte: &u8) -> bool {
+    matches!(byte, b'\n' | b'\r')
 }
 
 #[cfg(test)]
@@ -363,6 +434,37 @@ mod tests {
         let verdicts = received(&mut decoder(), &binary(0..300));
         let expected: Vec<Verdict> = (0..300_u16).map(|n| Ok(vec![f64::from(n), 10.0])).collect();
         assert_eq!(verdicts, expected);
+    }
+
+    #[test]
+    fn carriage_returns_end_lines() {
+        let mut decoder = decoder();
+        assert_eq!(received(&mut decoder, b"1,2\r3,4\r5,"), [Ok(vec![1.0, 2.0]), Ok(vec![3.0, 4.0])]);
+        assert_eq!(received(&mut decoder, b"6\r\n7,8\r"), [Ok(vec![5.0, 6.0]), Ok(vec![7.0, 8.0])]);
+        assert_eq!(received(&mut decoder, b"\n9,1\n"), [Ok(vec![9.0, 1.0])]);
+        let mut rates = Vec::new();
+        decoder.receive_message(b"1,2\r3,4\r", |frame| rates.push(frame.unwrap().reading[0]));
+        assert_eq!(rates, [1.0, 3.0]);
+    }
+
+    #[test]
+    fn the_last_bad_frame_is_quoted() {
+        let mut decoder = decoder();
+        assert_eq!(decoder.last_bad(), None);
+        received(&mut decoder, b"1,2\nhello\tworld\n3,4\n");
+        assert_eq!(decoder.last_bad().as_deref(), Some("hello\\tworld"));
+        received(&mut decoder, &vec![b'7'; 2 * LONGEST_LINE]);
+        assert_eq!(decoder.last_bad().unwrap().chars().count(), 80);
+        decoder.receive_message(&vec![b'8'; LONGEST_MESSAGE + 1], |frame| assert_eq!(frame, Err(BadFrame::TooLong)));
+        assert!(decoder.last_bad().unwrap().starts_with("888"));
+    }
+
+    #[test]
+    fn bytes_that_waited_give_names_but_no_readings() {
+        let mut decoder = decoder();
+        decoder.join();
+        decoder.receive_waiting(b"boot\nt,b,a\n1,2,3\n4,5,");
+        assert_eq!(received(&mut decoder, b"6\n7,8,9\n"), [Ok(vec![9.0, 8.0])]);
     }
 
     #[test]
@@ -461,6 +563,9 @@ mod tests {
                 prop_oneof![
                     Just(b"1.5,2\n".to_vec()),
                     Just(b"b:1;a:2\r\n".to_vec()),
+                    Just(b"3;4\r".to_vec()),
+                    Just(b">a:1\n>b:2\n".to_vec()),
+                    Just(b"Reading: 1, 2\n".to_vec()),
                     Just(b"t,a,b\n".to_vec()),
                     (0..400_u16).prop_map(|n| binary(n..n + 1)),
                     prop::collection::vec(any::<u8>(), 0..40),

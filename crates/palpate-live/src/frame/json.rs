@@ -86,8 +86,10 @@ impl<'de, R: FnMut(usize, &[u8]) -> Role> Visitor<'de> for Members<'_, '_, R> {
 fn set(frame: &mut Filling, role: Role, value: &Value) -> Result<(), BadFrame> {
     match (role, value) {
         (Role::Ignored, _) => Ok(()),
-        (_, Value(None)) => Err(BadFrame::NotANumber),
-        (role, Value(Some(value))) => frame.set(role, *value),
+        (Role::Time(_), Value::Text(text)) if frame.set_time_text(text.as_bytes()) => Ok(()),
+        (_, Value::Other) => Err(BadFrame::NotANumber),
+        (role, Value::Number(value)) => frame.set(role, *value),
+        (role, Value::Text(text)) => frame.set(role, text.trim().parse().map_err(|_| BadFrame::NotANumber)?),
     }
 }
 
@@ -117,8 +119,13 @@ impl<R: FnMut(usize, &[u8]) -> Role> Visitor<'_> for Name<'_, R> {
     }
 }
 
-/// A number, or anything else that JSON has.
-struct Value(Option<f64>);
+/// A value of JSON.
+enum Value {
+    Number(f64),
+    /// Text, which may be a number in quotes or a time.
+    Text(String),
+    Other,
+}
 
 impl<'de> Deserialize<'de> for Value {
     fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
@@ -136,36 +143,36 @@ impl<'de> Visitor<'de> for AnyValue {
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
-        Ok(Value(Some(value)))
+        Ok(Value::Number(value))
     }
 
     fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
-        Ok(Value(Some(value as f64)))
+        Ok(Value::Number(value as f64))
     }
 
     fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
-        Ok(Value(Some(value as f64)))
+        Ok(Value::Number(value as f64))
     }
 
     fn visit_bool<E>(self, _: bool) -> Result<Value, E> {
-        Ok(Value(None))
+        Ok(Value::Other)
     }
 
     fn visit_unit<E>(self) -> Result<Value, E> {
-        Ok(Value(None))
+        Ok(Value::Other)
     }
 
-    fn visit_str<E>(self, _: &str) -> Result<Value, E> {
-        Ok(Value(None))
+    fn visit_str<E>(self, text: &str) -> Result<Value, E> {
+        Ok(Value::Text(text.to_owned()))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut values: A) -> Result<Value, A::Error> {
         while values.next_element::<IgnoredAny>()?.is_some() {}
-        Ok(Value(None))
+        Ok(Value::Other)
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<Value, A::Error> {
         while members.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
-        Ok(Value(None))
+        Ok(Value::Other)
     }
 }

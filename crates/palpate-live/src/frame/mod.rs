@@ -5,11 +5,14 @@ mod channel;
 mod decoder;
 mod json;
 mod names;
+mod printed;
+mod quote;
 mod text;
 
 pub use binary::encode_into;
 pub use channel::Channel;
-pub use decoder::{ColumnsError, Decoder};
+pub use decoder::{ColumnsError, Decoder, LONGEST_MESSAGE};
+pub use quote::quote;
 
 use std::time::Duration;
 
@@ -36,6 +39,8 @@ pub enum BadFrame {
     MissingChannel,
     /// A value that is no finite number.
     NotANumber,
+    /// A value in another unit than the channel's.
+    OtherUnit,
     /// Bytes that are neither text nor a binary frame.
     Encoding,
     /// A checksum that is not that of the bytes.
@@ -46,11 +51,12 @@ pub enum BadFrame {
 
 impl BadFrame {
     /// All causes.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::TooLong,
         Self::Channels,
         Self::MissingChannel,
         Self::NotANumber,
+        Self::OtherUnit,
         Self::Encoding,
         Self::Checksum,
         Self::Malformed,
@@ -63,9 +69,29 @@ impl BadFrame {
             Self::Channels => "another number of values than channels",
             Self::MissingChannel => "a channel is missing",
             Self::NotANumber => "a value is no number",
+            Self::OtherUnit => "a value has another unit than before, or than the channel",
             Self::Encoding => "not text",
             Self::Checksum => "the checksum is wrong",
             Self::Malformed => "not a frame",
+        }
+    }
+
+    /// Change to a board with channels of these labels, or to its URL, by which its frames become readings.
+    pub fn remedy<'a>(self, labels: impl IntoIterator<Item = &'a str>) -> String {
+        let labels: Vec<&str> = labels.into_iter().collect();
+        let labels = labels.join("`, `");
+        match self {
+            Self::Channels => format!("print one value for each of `{labels}`, or name the values in columns="),
+            Self::MissingChannel => {
+                format!("name `{labels}` as the board does, in the rig or in columns= of the source")
+            }
+            Self::NotANumber => format!("print a decimal number for each of `{labels}`, with commas between them"),
+            Self::OtherUnit => "print all values of a channel in one unit".to_owned(),
+            Self::TooLong => "end every reading with a line feed, and check the baud rate".to_owned(),
+            Self::Encoding => "check the baud rate, or that the board sends text".to_owned(),
+            Self::Checksum | Self::Malformed => {
+                "check the wiring, and the frame against docs/live-sources.md".to_owned()
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Names of a frame's values, and a frame that is filled by them.
 
-use super::{BadFrame, Channel, Frame};
+use super::{BadFrame, Channel, Frame, printed};
 use std::time::Duration;
 
 /// Role of a value of a frame.
@@ -49,6 +49,11 @@ impl Names {
     /// Number of channels.
     pub fn len(&self) -> usize {
         self.channels.len()
+    }
+
+    /// A channel.
+    pub fn channel(&self, i: usize) -> &Channel {
+        &self.channels[i]
     }
 
     /// Role of a name: a channel by label, else by the name of its sensor, else time or number of the frame. ASCII letters in any case.
@@ -122,6 +127,17 @@ impl<'a> Filling<'a> {
             Role::Ignored => {}
         }
         Ok(())
+    }
+
+    /// Sets the time from a date and a time of day; false where the text is neither. One that is told to the second only is left out.
+    pub fn set_time_text(&mut self, text: &[u8]) -> bool {
+        let Ok(text) = std::str::from_utf8(text) else { return false };
+        let text = text.trim_matches('"');
+        let time_s = printed::time_s(text).filter(|time_s| (0.0..=LONGEST_S).contains(time_s));
+        if let Some(time_s) = time_s {
+            self.frame.device_time = Some(Duration::from_secs_f64(time_s));
+        }
+        time_s.is_some() || printed::is_time(text)
     }
 
     /// Sets what a binary frame tells beside its values.

@@ -2,7 +2,9 @@
 
 use super::json;
 use super::names::{Filling, Names, Role};
+use super::printed::{self, Item};
 use super::{BadFrame, Frame};
+use palpate_mechanics::units::Unit;
 
 /// Reading of a line of text.
 #[derive(Debug)]
@@ -25,13 +27,20 @@ pub struct TextReader {
     columns: Vec<Role>,
     /// Names of the last line that had some, with their roles: most lines have the same.
     known: Vec<(Vec<u8>, Role)>,
+    /// Unit of each raw channel in the lines so far, where they had one.
+    units: Vec<Option<String>>,
+    /// Label before the values of the first line that had one, or none: lines with another label are other values.
+    label: Option<String>,
+    /// Values of a reading whose lines have one channel each; `None` before the line of the first channel.
+    partial: Option<Vec<Option<f64>>>,
 }
 
 impl TextReader {
     /// A reader of frames of these channels.
     pub fn new(names: Names) -> Self {
         let columns = (0..names.len()).map(Role::Channel).collect();
-        Self { names, columns, known: Vec::new() }
+        let units = vec![None; names.len()];
+        Self { names, columns, known: Vec::new(), units, label: None, partial: None }
     }
 
     /// Names of channels.
@@ -49,8 +58,18 @@ impl TextReader {
         self.columns = columns;
     }
 
-    /// Reads a line without its end.
+    /// Forgets the lines of a reading that is not complete.
+    pub fn open(&mut self) {
+        self.partial = None;
+    }
+
+    /// Reads a line without its end: as a form for programs, else as one printed for people.
     pub fn read(&mut self, line: &[u8]) -> Result<Line, BadFrame> {
+        self.read_form(line).or_else(|cause| self.read_printed(line, cause))
+    }
+
+    /// Reads values, names with values, a header, or JSON.
+    fn read_form(&mut self, line: &[u8]) -> Result<Line, BadFrame> {
         let line = line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line).trim_ascii();
         let Some(first) = line.first() else { return Ok(Line::Nothing) };
         let marks = Marks::found_in(line);
@@ -63,6 +82,108 @@ impl TextReader {
             b'[' => json::array(line, &self.names, &self.columns).map(Line::Whole),
             _ => self.fields(line, marks),
         }
+    }
+
+    /// Reads a line that is no form for programs, for this cause, by the rules of [`printed`].
+    #[cold]
+    fn read_printed(&mut self, line: &[u8], cause: BadFrame) -> Result<Line, BadFrame> {
+        let line = printed::without_colours(line);
+        let Ok(line) = std::str::from_utf8(&line) else { return Err(cause) };
+        let message = printed::without_prefix(line.trim_start_matches('\u{FEFF}'));
+        if message.bytes().any(|byte| byte.is_ascii_control() && byte != b'\t') {
+            return Err(cause);
+        }
+        if message.len() < line.len()
+            && let Ok(read) = self.read_form(message.as_bytes())
+        {
+            return Ok(read);
+        }
+        // The minus sign of typography has more bytes than a hyphen.
+        let message = message.replace('\u{2212}', "-");
+        let marks = Marks::found_in(message.as_bytes());
+        let decimal_comma = Separator::found_in(message.as_bytes(), marks) != Separator::Comma;
+        let is_name = |name: &str| self.names.role(name) != Role::Ignored;
+        let items = printed::items(&message, decimal_comma, is_name);
+        let read = items.map_or(Err(cause), |items| self.read_items(&items, cause));
+        let read = read.map_err(|other| if other == BadFrame::OtherUnit { other } else { cause });
+        match line.trim_start().strip_prefix('>') {
+            Some(line) if read.is_err() => self.add_to_partial(line, cause),
+            _ => read,
+        }
+    }
+
+    /// Reads items that all have names, or none, or one label before the values.
+    fn read_items(&mut self, items: &[Item], cause: BadFrame) -> Result<Line, BadFrame> {
+        let is_named = items.iter().all(|item| !item.name.is_empty());
+        let label = items[0].name;
+        let is_labelled = items[1..].iter().all(|item| item.name.is_empty())
+            && items.len() == self.columns.len()
+            && (label.is_empty() || is_general_label(label))
+            && self.label.as_ref().is_none_or(|first| first == label)
+            && self.names.role(label) == Role::Ignored;
+        let roles: Vec<Role> = if is_labelled {
+            self.columns.clone()
+        } else if is_named {
+            items.iter().map(|item| self.names.role(item.name)).collect()
+        } else {
+            return Err(cause);
+        };
+        // Values with and without a unit side by side may be one value with a decimal comma.
+        let units = items.iter().filter(|item| !item.unit.is_empty()).count();
+        if is_labelled && units != 0 && units != items.len() {
+            return Err(cause);
+        }
+        let mut frame = Filling::new(&self.names);
+        let mut values = Vec::with_capacity(items.len());
+        for (item, role) in items.iter().zip(&roles) {
+            if *role != Role::Ignored {
+                values.push((*role, item));
+            }
+        }
+        for (role, item) in &values {
+            let value = printed::value(item.value).ok_or(BadFrame::NotANumber)?;
+            let factor = if item.unit.is_empty() { 1.0 } else { factor(&self.names, &self.units, *role, item.unit)? };
+            frame.set(*role, value * factor)?;
+        }
+        let frame = frame.finish()?;
+        if is_labelled && self.label.is_none() {
+            self.label = Some(label.to_owned());
+        }
+        for (role, item) in values {
+            if let Role::Channel(i) = role
+                && !item.unit.is_empty()
+            {
+                self.units[i].get_or_insert_with(|| item.unit.to_owned());
+            }
+        }
+        Ok(if is_named || !label.is_empty() { Line::Whole(frame) } else { Line::Unnamed(frame) })
+    }
+
+    /// Adds a line of the plotter Teleplot to the reading that its lines make, from that of the first channel on: `name:value` or `name:time:value`, then perhaps
+    /// `§unit` and `|flags`.
+    fn add_to_partial(&mut self, line: &str, cause: BadFrame) -> Result<Line, BadFrame> {
+        let line = line.split(['§', '|']).next().unwrap_or_default();
+        let last = line.rsplit(';').next().unwrap_or_default();
+        let (Some((name, _)), Some((_, value))) = (line.split_once(':'), last.rsplit_once(':')) else {
+            return Err(cause);
+        };
+        let Role::Channel(channel) = self.names.role(name.trim()) else { return Ok(Line::Nothing) };
+        let value: f64 = value.trim().parse().map_err(|_| BadFrame::NotANumber)?;
+        let mut torn = None;
+        if channel == 0 {
+            torn = self.partial.replace(vec![None; self.names.len()]);
+        }
+        // Lines before the first channel's belong to a reading whose start is not there.
+        let Some(partial) = &mut self.partial else { return Ok(Line::Nothing) };
+        partial[channel] = Some(value);
+        if partial.iter().any(Option::is_none) {
+            return if torn.is_some() { Err(BadFrame::MissingChannel) } else { Ok(Line::Nothing) };
+        }
+        let mut frame = Filling::new(&self.names);
+        for (channel, value) in self.partial.take().into_iter().flatten().enumerate() {
+            frame.set(Role::Channel(channel), value.unwrap_or(f64::NAN))?;
+        }
+        frame.finish().map(Line::Whole)
     }
 
     fn object(&mut self, line: &[u8]) -> Result<Frame, BadFrame> {
@@ -79,7 +200,12 @@ impl TextReader {
         let mut frame = Filling::new(&self.names);
         let mut roles = self.columns.iter();
         for field in fields.clone() {
-            let Some(value) = number(field, separator) else { return self.header(fields) };
+            let Some(value) = number(field, separator) else {
+                match roles.next() {
+                    Some(Role::Time(_)) if frame.set_time_text(field) => continue,
+                    _ => return self.header(fields),
+                }
+            };
             frame.set(*roles.next().ok_or(BadFrame::Channels)?, value)?;
         }
         if roles.next().is_some() {
@@ -94,7 +220,11 @@ impl TextReader {
             let (name, value) = named(field).ok_or(BadFrame::NotANumber)?;
             match role_of(&self.names, &mut self.known, i, name) {
                 Role::Ignored => {}
-                role => frame.set(role, number(value, separator).ok_or(BadFrame::NotANumber)?)?,
+                role => match number(value, separator) {
+                    Some(value) => frame.set(role, value)?,
+                    None if matches!(role, Role::Time(_)) && frame.set_time_text(value) => {}
+                    None => return Err(BadFrame::NotANumber),
+                },
             }
         }
         frame.finish()
@@ -142,6 +272,42 @@ fn role_of(names: &Names, known: &mut Vec<(Vec<u8>, Role)>, i: usize, name: &[u8
         known.push((name.to_vec(), role));
     }
     role
+}
+
+/// True for a label of values in general, such as `Reading` or `HX711 reading`, which says no more than that they are readings.
+fn is_general_label(label: &str) -> bool {
+    const LABELS: [&str; 13] = [
+        "adc", "channel", "channels", "data", "measurement", "output", "raw", "reading", "readings", "sample",
+        "sensor", "value", "values",
+    ];
+    let is_part = |letter: char| letter.is_ascii_alphanumeric() || " _-".contains(letter);
+    let word = label.rsplit([' ', '_', '-']).next().unwrap_or_default();
+    label.chars().all(is_part) && LABELS.iter().any(|known| known.eq_ignore_ascii_case(word))
+}
+
+/// Factor by which a value in a unit becomes one in the unit that its role has. A raw channel has the unit of its first line.
+fn factor(names: &Names, units: &[Option<String>], role: Role, unit: &str) -> Result<f64, BadFrame> {
+    match role {
+        Role::Channel(i) if names.channel(i).unit == Unit::NONE => match &units[i] {
+            Some(first) if first != unit => Err(BadFrame::OtherUnit),
+            _ => Ok(1.0),
+        },
+        Role::Channel(i) => {
+            let wanted = names.channel(i).unit;
+            let given = Unit::from_symbol(unit).filter(|given| given.dimension() == wanted.dimension());
+            given.map(|given| given.factor() / wanted.factor()).ok_or(BadFrame::OtherUnit)
+        }
+        Role::Time(unit_s) => {
+            let given_s = match unit {
+                "s" | "sec" => 1.0,
+                "ms" => 1e-3,
+                "us" | "µs" | "μs" => 1e-6,
+                _ => return Err(BadFrame::OtherUnit),
+            };
+            Ok(given_s / unit_s)
+        }
+        Role::Sequence | Role::Ignored => Ok(1.0),
+    }
 }
 
 /// Name and value of a field, where it has a name.
@@ -212,9 +378,9 @@ impl Marks {
     }
 }
 
-/// True for bytes that may be lines of text: no control characters but tabs and line ends.
+/// True for bytes that may be lines of text: no control characters but tabs, line ends and the escape of terminals.
 pub fn is_text(bytes: &[u8]) -> bool {
-    bytes.iter().all(|byte| matches!(byte, b'\t' | b'\r' | b'\n') || !byte.is_ascii_control())
+    bytes.iter().all(|byte| matches!(byte, b'\t' | b'\r' | b'\n' | 0x1B) || !byte.is_ascii_control())
 }
 
 /// Separator of the values of a line.
@@ -318,6 +484,28 @@ mod tests {
             "[1.5, -2]",
             r#"{"b": -2, "A": 1.5}"#,
             r#"{"a":1.5,"more":{"a":[7]},"b":-2,"s":"x","z":null}"#,
+            r#"{"a":"1.5","b":" -2 "}"#,
+            r#"{"time":"2026-03-02T10:11:12","a":1.5,"b":-2}"#,
+            "a: 1.5 b: -2",
+            "a: 1.5\tb: -2\t",
+            "a: 1.5 mV, b: -2 mV",
+            "a 1.5 b -2",
+            "1.5 mV, -2 mV",
+            "1.5mV;-2mV",
+            "1,5 mV; -2,0 mV",
+            "a=1.5 | b=-2 |",
+            "1.5 | -2",
+            "Reading: 1.5, -2",
+            "Reading: 1.5 mV, -2 mV",
+            "10:11:12.345 -> 1.5,-2",
+            "10:11:12 -> a: 1.5 b: -2",
+            "[INFO] 1.5,-2",
+            "I (1234) main: a: 1.5, b: -2",
+            "\u{1B}[0;32mI (1234) main: 1.5,-2\u{1B}[0m",
+            r#"[INFO] {"a":1.5,"b":-2}"#,
+            "(1.5, -2)",
+            "[1.5 -2]",
+            "1.5 \u{2212}2",
         ];
         for line in lines {
             assert_eq!(reading(line), Ok(vec![1.5, -2.0]), "{line}");
@@ -327,7 +515,7 @@ mod tests {
     #[test]
     fn every_bad_line_has_its_cause() {
         use BadFrame::{Channels, Encoding, Malformed, MissingChannel, NotANumber};
-        let lines: [(&[u8], BadFrame); 22] = [
+        let lines: [(&[u8], BadFrame); 31] = [
             (b"1", Channels),
             (b"1,2,3", Channels),
             (b"1,,2", NotANumber),
@@ -349,12 +537,94 @@ mod tests {
             (b"[1,null]", NotANumber),
             (b"[1,2", Malformed),
             (br#"{"a":1}"#, MissingChannel),
-            (br#"{"a":1,"b":"2"}"#, NotANumber),
+            (br#"{"a":1,"b":"x"}"#, NotANumber),
+            (b"1 nan", NotANumber),
+            (b"1.5 mV, ovf", NotANumber),
+            (b"[ERROR] 1,2", Malformed),
+            (b"Offsets: 1, 2", NotANumber),
+            (b"HX711 v1.2, 80 Hz", NotANumber),
+            (b"1,2 mV", NotANumber),
+            (b"0xFFFFFE,1", NotANumber),
+            (b"one reading: 1 | average: 2", MissingChannel),
+            (b"2026-03-02,5", NotANumber),
         ];
         for (line, cause) in lines {
             let read = reader().read(line);
             assert!(matches!(read, Err(is) if is == cause), "{}: {read:?}", String::from_utf8_lossy(line));
         }
+    }
+
+    fn one_channel() -> TextReader {
+        TextReader::new(Names::new(&channels(&["a"])))
+    }
+
+    #[test]
+    fn single_values_have_units_and_labels() {
+        for line in ["446.45 mV", "Reading: 446.45", "HX711 reading: 446.45 mV", "a:446.45", "[12] 446.45"] {
+            let read = one_channel().read(line.as_bytes());
+            assert!(matches!(&read, Ok(Line::Whole(frame) | Line::Unnamed(frame)) if frame.reading == [446.45]), "{line}: {read:?}");
+        }
+        for line in ["Temperature: 21.5", "b: 1", "two 2", "446,45 mV and more"] {
+            assert!(one_channel().read(line.as_bytes()).is_err(), "{line}");
+        }
+    }
+
+    #[test]
+    fn another_unit_or_label_than_before_is_refused() {
+        let mut reader = one_channel();
+        assert!(reader.read(b"446.45 mV").is_ok());
+        assert!(matches!(reader.read(b"1.02 V"), Err(BadFrame::OtherUnit)));
+        assert!(reader.read(b"447.00 mV").is_ok());
+        let mut reader = one_channel();
+        assert!(reader.read(b"Raw: 8412").is_ok());
+        assert!(reader.read(b"Value: 3.5").is_err());
+    }
+
+    #[test]
+    fn units_are_those_of_the_channel() {
+        let mut channels = channels(&["a"]);
+        channels[0].unit = Unit::from_symbol("um").unwrap();
+        let mut reader = TextReader::new(Names::new(&channels));
+        for (line, value_m) in [("5", 5e-6), ("5 um", 5e-6), ("a: 0.005 mm", 5e-6)] {
+            let Ok(Line::Unnamed(frame) | Line::Whole(frame)) = reader.read(line.as_bytes()) else { panic!("{line}") };
+            assert!((frame.reading[0] / value_m - 1.0).abs() < 1e-12, "{line}: {:?}", frame.reading);
+        }
+        assert!(matches!(reader.read(b"5 N"), Err(BadFrame::OtherUnit)));
+    }
+
+    #[test]
+    fn lines_of_teleplot_make_a_reading_from_the_first_channel_on() {
+        let mut reader = reader();
+        let mut read = |line: &str| match reader.read(line.as_bytes()) {
+            Ok(Line::Whole(frame)) => Ok(Some(frame.reading)),
+            Ok(Line::Nothing) => Ok(None),
+            Ok(other) => panic!("{line}: {other:?}"),
+            Err(cause) => Err(cause),
+        };
+        // The end of a reading whose start is not there.
+        assert_eq!(read(">b:9"), Ok(None));
+        assert_eq!(read(">a:1.5"), Ok(None));
+        assert_eq!(read(">temperature:21"), Ok(None));
+        assert_eq!(read(">b:-2"), Ok(Some(vec![1.5, -2.0])));
+        assert_eq!(read(">a:1627551892437:2§mV|g"), Ok(None));
+        assert_eq!(read(">b:1627551892437:1;1627551892438:3"), Ok(Some(vec![2.0, 3.0])));
+        assert_eq!(read(">a:1"), Ok(None));
+        assert_eq!(read(">a:2"), Err(BadFrame::MissingChannel));
+        assert_eq!(read(">b:2"), Ok(Some(vec![2.0, 2.0])));
+        assert_eq!(read(">a:1,b:2"), Ok(Some(vec![1.0, 2.0])));
+    }
+
+    #[test]
+    fn dates_with_a_fraction_of_a_second_are_times() {
+        let line = br#"{"time":"1970-01-01T00:00:02.500Z","a":1,"b":2}"#;
+        let Ok(Line::Whole(frame)) = reader().read(line) else { panic!() };
+        assert_eq!(frame.device_time, Some(std::time::Duration::from_millis(2500)));
+        let mut reader = reader();
+        assert!(matches!(reader.read(b"time,a,b"), Ok(Line::Header)));
+        let Ok(Line::Unnamed(frame)) = reader.read(b"1970-01-01 00:00:02.500,1,2") else { panic!() };
+        assert_eq!(frame.device_time, Some(std::time::Duration::from_millis(2500)));
+        let Ok(Line::Unnamed(frame)) = reader.read(b"1970-01-01 00:00:02,1,2") else { panic!() };
+        assert_eq!((frame.device_time, frame.reading), (None, vec![1.0, 2.0]));
     }
 
     #[test]

@@ -1,18 +1,19 @@
-//! The records of an MCAP file, one by one, without holding the file: chunks are passed over, and decoded where they are wanted.
+//! The records of an MCAP file, one by one, without holding the file: blocks of messages are passed over, and decoded where they are wanted.
 
 use super::head::{Head, LOCATOR, METADATA};
+use super::unpack::{self, BlockFault, MOST};
 use super::whole_record::parse;
 use super::{LocatorFault, RecordingError};
 use crate::schemas::TOPICS;
 use crate::session::Estimation;
 use mcap::records::{Record, op};
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Most bytes of a record that is read, and of a chunk without its compression: what is beyond is no recording of palpate, and is passed over.
-const MOST: u64 = 256 << 20;
+/// Most bytes of a block of messages outside chunks: as many as are decoded at once.
+const MOST_LOOSE: u64 = 1 << 20;
 
 /// An MCAP file of palpate, cut off or whole.
 #[derive(Debug)]
@@ -24,17 +25,18 @@ pub struct McapFile {
     pub head: Head,
     /// The locator that is attached, as its file has it.
     locator: Result<String, LocatorFault>,
-    /// Its chunks, in their order.
-    pub chunks: Vec<ChunkPlace>,
+    /// Blocks of messages, in their order.
+    pub blocks: Vec<Block>,
     /// True where it ends as it should.
     pub is_whole: bool,
-    /// Number of the channel of each topic.
-    topics: [Option<u16>; 3],
+    /// Topic of each channel by its place in [`TOPICS`]; `None` of one that is no topic of palpate.
+    channels: BTreeMap<u16, Option<usize>>,
 }
 
-/// Place of a chunk in the file.
+/// Block of messages in the file.
 #[derive(Clone, Copy, Debug)]
-pub struct ChunkPlace {
+pub struct Block {
+    kind: BlockKind,
     at: u64,
     length: u64,
     /// Times of its first and its last message, in ns since 1970.
@@ -43,11 +45,35 @@ pub struct ChunkPlace {
     pub readings: u64,
 }
 
+/// Kind of a block of messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum BlockKind {
+    /// A record that packs messages.
+    Chunk,
+    /// Records of messages, one after the other.
+    Loose,
+}
+
+/// Messages of a block.
+#[derive(Clone, Debug, Default)]
+pub struct Messages {
+    /// The messages on topics of palpate.
+    pub messages: Vec<RawMessage>,
+    /// Number of messages on other topics.
+    pub foreign: u64,
+    /// Number of messages on a channel that the file does not describe.
+    pub unknown: u64,
+    /// Fault for which the block cannot be read.
+    pub fault: Option<BlockFault>,
+}
+
 /// Message of a recording.
 #[derive(Clone, Debug)]
 pub struct RawMessage {
     /// Its topic, by its place in [`TOPICS`].
     pub topic: usize,
+    /// Its number.
+    pub sequence: u32,
     /// Its time, in ns since 1970.
     pub unix_ns: u64,
     /// Its JSON.
@@ -61,21 +87,23 @@ struct RecordPlace {
     length: u64,
 }
 
-/// Bytes of a chunk's record beside its texts: times, uncompressed size and checksum, and two lengths.
-const CHUNK_NUMBERS: usize = 8 + 8 + 8 + 4 + 4 + 8;
+impl RecordPlace {
+    /// Bytes of the kind and the length before the content.
+    const HEAD: u64 = 9;
+
+    fn end(&self) -> u64 {
+        self.at + self.length
+    }
+}
 
 impl McapFile {
-    /// Looks a file through: its head, and where its chunks are.
+    /// Looks a file through: its head, and where its blocks of messages are.
     ///
     /// # Errors
     /// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let shown = path.display().to_string();
-        let file = File::open(path).map_err(|error| cannot("open", &shown, error))?;
-        let found = file.metadata().map_err(|error| cannot("open", &shown, error))?;
-        if !found.is_file() {
-            return Err(cannot("open", &shown, std::io::Error::other("it is no regular file")));
-        }
+        let (file, length) = open_regular(path).map_err(|error| cannot("open", &shown, error))?;
         let head = Head {
             version: String::new(),
             source: String::new(),
@@ -85,12 +113,12 @@ impl McapFile {
         let mut own = Self {
             file: BufReader::new(file),
             path: shown,
-            length: found.len(),
+            length,
             head,
             locator: Err(LocatorFault::Missing),
-            chunks: Vec::new(),
+            blocks: Vec::new(),
             is_whole: false,
-            topics: [None; 3],
+            channels: BTreeMap::new(),
         };
         own.look_through()?;
         Ok(own)
@@ -103,15 +131,9 @@ impl McapFile {
     }
 
     fn look_through(&mut self) -> Result<(), RecordingError> {
-        let mut magic = [0; 8];
-        match self.file.read_exact(&mut magic) {
-            Err(error) if error.kind() != ErrorKind::UnexpectedEof => return Err(self.cannot(error)),
-            result if result.is_err() || magic != mcap::MAGIC => {
-                return Err(RecordingError::NotMcap { path: self.path.clone() });
-            }
-            _ => {}
-        }
+        self.check_magic()?;
         let mut metadata = None;
+        // False while the readings of the last chunk are not counted yet: by its index, or else by decoding it.
         let mut counted = true;
         while let Some(place) = self.next_place()? {
             match place.op {
@@ -123,32 +145,24 @@ impl McapFile {
                     }
                 }
                 op::ATTACHMENT if self.locator.is_err() => self.locator = self.attached(&place)?,
+                op::CHANNEL => {
+                    if let Some(record) = self.record(&place)? {
+                        self.add_channel(&record);
+                    }
+                }
+                op::MESSAGE => self.add_loose(&place)?,
                 op::CHUNK => {
                     self.count_last(counted)?;
-                    counted = false;
-                    let mut times = [0; 16];
-                    if place.length >= 16 {
-                        self.file
-                            .read_exact(&mut times)
-                            .map_err(|error| cannot("read", &self.path, error))?;
-                        let time = |bytes: &[u8]| u64::from_le_bytes(bytes.try_into().unwrap_or_default());
-                        let span_ns = (time(&times[..8]), time(&times[8..]));
-                        self.chunks.push(ChunkPlace {
-                            at: place.at,
-                            length: place.length,
-                            span_ns,
-                            readings: 0,
-                        });
-                        if self.topics[0].is_none() {
-                            self.count_last(false)?;
-                            counted = true;
-                        }
+                    counted = !self.add_chunk(&place)?;
+                    if !self.channels.values().any(|topic| *topic == Some(0)) {
+                        self.count_last(counted)?;
+                        counted = true;
                     }
                 }
                 op::MESSAGE_INDEX if !counted => {
                     if let Some(Record::MessageIndex(index)) = self.record(&place)?
-                        && Some(index.channel_id) == self.topics[0]
-                        && let Some(chunk) = self.chunks.last_mut()
+                        && self.channels.get(&index.channel_id) == Some(&Some(0))
+                        && let Some(chunk) = self.blocks.last_mut()
                     {
                         chunk.readings = index.records.len() as u64;
                         counted = true;
@@ -160,7 +174,7 @@ impl McapFile {
                 }
                 _ => {}
             }
-            self.seek(place.at + place.length)?;
+            self.seek(place.end())?;
         }
         self.count_last(counted)?;
         if self.locator == Err(LocatorFault::Missing) && !self.is_whole {
@@ -178,72 +192,114 @@ impl McapFile {
         Ok(())
     }
 
+    fn check_magic(&mut self) -> Result<(), RecordingError> {
+        let mut magic = [0; 8];
+        match self.file.read_exact(&mut magic) {
+            Err(error) if error.kind() != ErrorKind::UnexpectedEof => Err(self.cannot(error)),
+            result if result.is_err() || magic != mcap::MAGIC => {
+                Err(RecordingError::NotMcap { path: self.path.clone() })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Adds a chunk to the blocks; false where its record is too short to be one.
+    fn add_chunk(&mut self, place: &RecordPlace) -> Result<bool, RecordingError> {
+        let Some([start_ns, end_ns]) = self.numbers(place)? else { return Ok(false) };
+        let span_ns = (start_ns, end_ns);
+        let RecordPlace { at, length, .. } = *place;
+        self.blocks.push(Block { kind: BlockKind::Chunk, at, length, span_ns, readings: 0 });
+        Ok(true)
+    }
+
+    /// Adds a message that stands outside chunks to the block before it, or to a new one.
+    fn add_loose(&mut self, place: &RecordPlace) -> Result<(), RecordingError> {
+        // Channel and number, then the times, as a message begins.
+        let Some([head, head_and_time]) = self.numbers(place)? else { return Ok(()) };
+        let [channel_0, channel_1, _, _, _, _, time_0, time_1] = head.to_le_bytes();
+        let [t2, t3, t4, t5, t6, t7, _, _] = head_and_time.to_le_bytes();
+        let channel = u16::from_le_bytes([channel_0, channel_1]);
+        let time_ns = u64::from_le_bytes([time_0, time_1, t2, t3, t4, t5, t6, t7]);
+        let start = place.at - RecordPlace::HEAD;
+        let readings = u64::from(self.channels.get(&channel) == Some(&Some(0)));
+        let follows = |block: &&mut Block| {
+            block.kind == BlockKind::Loose
+                && block.at + block.length == start
+                && place.end() - block.at <= MOST_LOOSE
+        };
+        if let Some(block) = self.blocks.last_mut().filter(follows) {
+            block.length = place.end() - block.at;
+            block.span_ns = (block.span_ns.0.min(time_ns), block.span_ns.1.max(time_ns));
+            block.readings += readings;
+        } else {
+            let span_ns = (time_ns, time_ns);
+            let length = place.end() - start;
+            self.blocks.push(Block { kind: BlockKind::Loose, at: start, length, span_ns, readings });
+        }
+        Ok(())
+    }
+
+    /// The first two numbers of 8 bytes of a record; `None` where it is shorter.
+    fn numbers(&mut self, place: &RecordPlace) -> Result<Option<[u64; 2]>, RecordingError> {
+        if place.length < 16 {
+            return Ok(None);
+        }
+        let mut bytes = [[0; 8]; 2];
+        for number in &mut bytes {
+            self.file.read_exact(number).map_err(|error| cannot("read", &self.path, error))?;
+        }
+        Ok(Some(bytes.map(u64::from_le_bytes)))
+    }
+
     /// Counts the readings of the last chunk by decoding it, where no index has told them.
     fn count_last(&mut self, counted: bool) -> Result<(), RecordingError> {
-        let Some(last) = self.chunks.last().copied().filter(|_| !counted) else { return Ok(()) };
+        let Some(last) = self.blocks.last().copied().filter(|_| !counted) else { return Ok(()) };
         let here = self.position()?;
-        let readings = self.messages(&last)?.iter().filter(|message| message.topic == 0).count() as u64;
-        if let Some(last) = self.chunks.last_mut() {
+        let messages = self.messages(&last)?.messages;
+        let readings = messages.iter().filter(|message| message.topic == 0).count() as u64;
+        if let Some(last) = self.blocks.last_mut() {
             last.readings = readings;
         }
         self.seek(here)
     }
 
-    /// The messages of a chunk; those before the damage of one that is damaged.
-    pub fn messages(&mut self, chunk: &ChunkPlace) -> Result<Vec<RawMessage>, RecordingError> {
-        let mut messages = Vec::new();
-        let Some(body) = self.body(chunk.at, chunk.length)? else { return Ok(messages) };
-        let Some(Record::Chunk { header, data }) = parse(op::CHUNK, &body) else {
-            return Ok(messages);
+    /// The messages of a block; none of one that has a fault.
+    pub fn messages(&mut self, block: &Block) -> Result<Messages, RecordingError> {
+        let mut found = Messages::default();
+        let Some(body) = self.body(block.at, block.length)? else {
+            found.fault = Some(if block.length > MOST { BlockFault::TooLarge } else { BlockFault::Damaged });
+            return Ok(found);
         };
-        if header.uncompressed_size > MOST {
-            return Ok(messages);
-        }
-        // What lies behind the data is left out: MCAP's reader would take it for the rest of a record that reaches beyond the chunk.
-        let whole = CHUNK_NUMBERS + header.compression.len() + data.len();
-        drop(data);
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(true)
-            .with_skip_end_magic(true)
-            .with_validate_chunk_crcs(true)
-            .with_record_length_limit(MOST as usize);
-        let mut records = LinearReader::new_with_options(options);
-        // A file of one record, the chunk: MCAP's reader of chunks alone allocates whatever length a damaged record says.
-        let mut file = vec![op::CHUNK];
-        file.extend((whole as u64).to_le_bytes());
-        file.extend(&body[..whole]);
-        let mut rest = file.as_slice();
-        while let Some(event) = records.next_event() {
-            match event {
-                Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                    let (next, later) = rest.split_at(wanted.min(rest.len()));
-                    records.insert(next.len()).copy_from_slice(next);
-                    records.notify_read(next.len());
-                    rest = later;
-                }
-                Ok(LinearReadEvent::Record { data, opcode }) => {
-                    parse(opcode, data).into_iter().for_each(|record| self.take(record, &mut messages));
-                }
-                Err(_) => break,
-            }
-        }
-        Ok(messages)
+        let take = |record: Record| self.take(record, &mut found);
+        let read = match block.kind {
+            BlockKind::Chunk => unpack::unpack_chunk(&body, take),
+            BlockKind::Loose => unpack::read_loose(&body, take),
+        };
+        found.fault = read.err();
+        Ok(found)
     }
 
-    /// Takes a record of a chunk: a channel, or a message of one that is known.
-    fn take(&mut self, record: Record, messages: &mut Vec<RawMessage>) {
+    /// Takes a record of a block: a channel, or a message.
+    fn take(&mut self, record: Record, found: &mut Messages) {
         match record {
-            Record::Channel(channel) => {
-                if let Some(topic) = TOPICS.iter().position(|(name, ..)| *name == channel.topic) {
-                    self.topics[topic] = Some(channel.id);
-                }
-            }
-            Record::Message { header, data } => {
-                if let Some(topic) = self.topics.iter().position(|id| *id == Some(header.channel_id)) {
-                    messages.push(RawMessage { topic, unix_ns: header.log_time, data: data.into_owned() });
-                }
-            }
-            _ => {}
+            Record::Message { header, data } => match self.channels.get(&header.channel_id) {
+                Some(Some(topic)) => found.messages.push(RawMessage {
+                    topic: *topic,
+                    sequence: header.sequence,
+                    unix_ns: header.log_time,
+                    data: data.into_owned(),
+                }),
+                Some(None) => found.foreign += 1,
+                None => found.unknown += 1,
+            },
+            other => self.add_channel(&other),
+        }
+    }
+
+    fn add_channel(&mut self, record: &Record) {
+        if let Record::Channel(channel) = record {
+            let topic = TOPICS.iter().position(|(name, ..)| *name == channel.topic);
+            self.channels.insert(channel.id, topic);
         }
     }
 
@@ -266,7 +322,7 @@ impl McapFile {
 
     /// The next record that is whole; the file is at its content then.
     fn next_place(&mut self) -> Result<Option<RecordPlace>, RecordingError> {
-        let at = self.position()?.saturating_add(9);
+        let at = self.position()?.saturating_add(RecordPlace::HEAD);
         if at > self.length {
             return Ok(None);
         }
@@ -309,6 +365,17 @@ impl McapFile {
     fn cannot(&self, error: std::io::Error) -> RecordingError {
         cannot("read", &self.path, error)
     }
+}
+
+/// Opens a regular file, without waiting for whoever writes into a pipe of its name; and its length.
+fn open_regular(path: &Path) -> std::io::Result<(File, u64)> {
+    let mut options = File::options();
+    options.read(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, nix::fcntl::OFlag::O_NONBLOCK.bits());
+    let file = options.open(path)?;
+    let found = file.metadata()?;
+    if found.is_file() { Ok((file, found.len())) } else { Err(std::io::Error::other("it is no regular file")) }
 }
 
 fn cannot(verb: &'static str, path: &str, error: std::io::Error) -> RecordingError {

@@ -8,14 +8,18 @@ mod head;
 mod mcap_file;
 mod reader;
 mod recorder;
+mod recover;
 mod switch;
 mod tail;
+mod unpack;
 mod whole_record;
 
 pub use head::{Head, RecordedChannel};
-pub use reader::{Excerpt, Playback, Recorded, RecordingSummary, list, read, summary};
+pub use reader::{Excerpt, PassedOver, Playback, Recorded, RecordingSummary, list, read, summary};
 pub use recorder::{Recorder, RecordingStatus};
+pub use recover::{Recovery, recover};
 pub use switch::{RecordingSwitch, check_name};
+pub use unpack::BlockFault;
 
 /// End of the names of recordings.
 pub const EXTENSION: &str = "mcap";
@@ -60,6 +64,12 @@ pub enum RecordingError {
     Name {
         /// The name.
         name: String,
+    },
+    /// A link, a pipe, a device or a folder has the name of a recording.
+    #[error("{path} is no regular file")]
+    NotRegular {
+        /// The file.
+        path: String,
     },
     /// A recording is going on, and another cannot be begun.
     #[error("{name} is being recorded; end it first")]

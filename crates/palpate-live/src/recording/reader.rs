@@ -1,8 +1,8 @@
 //! Recordings read again: lists of them, thinned parts for charts, and all of one in its order.
 
 use super::head::RecordedChannel;
-use super::mcap_file::{ChunkPlace, McapFile, RawMessage};
-use super::{EXTENSION, Head, RecordingError};
+use super::mcap_file::{Block, McapFile, RawMessage};
+use super::{BlockFault, EXTENSION, Head, RecordingError};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -39,7 +39,7 @@ pub struct Excerpt {
     pub events: Vec<Value>,
 }
 
-/// Recordings in a folder, newest first, and at the end those of which nothing tells when they were begun; files that are none are left out. A folder that is not there has none.
+/// Recordings in a folder, newest first, those without an instant last; other files, links and pipes are left out. A folder that is not there has none.
 ///
 /// # Errors
 /// [`RecordingError::File`] for a folder that cannot be read.
@@ -51,8 +51,10 @@ pub fn list(folder: &Path) -> Result<Vec<RecordingSummary>, RecordingError> {
         }
         Ok(entries) => entries,
     };
-    let paths = entries.flatten().map(|entry| entry.path());
-    let mut found: Vec<_> = paths
+    // A link may lead out of the folder, and a pipe is waited for.
+    let files = entries.flatten().filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_file()));
+    let mut found: Vec<_> = files
+        .map(|entry| entry.path())
         .filter(|path| path.extension().is_some_and(|extension| extension == EXTENSION))
         .filter_map(|path| summary(&path).ok())
         .collect();
@@ -69,13 +71,13 @@ pub fn list(folder: &Path) -> Result<Vec<RecordingSummary>, RecordingError> {
 /// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
 pub fn summary(path: &Path) -> Result<RecordingSummary, RecordingError> {
     let file = McapFile::open(path)?;
-    let (start_s, seconds) = span_s(&file.chunks);
+    let (start_s, seconds) = span_s(&file.blocks);
     Ok(RecordingSummary {
         name: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
         bytes: std::fs::metadata(path).map_or(0, |found| found.len()),
         start_s,
         seconds,
-        readings: file.chunks.iter().map(|chunk| chunk.readings).sum(),
+        readings: file.blocks.iter().map(|block| block.readings).sum(),
         is_cut_off: !file.is_whole,
     })
 }
@@ -86,14 +88,14 @@ pub fn summary(path: &Path) -> Result<RecordingSummary, RecordingError> {
 /// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
 pub fn read(path: &Path, from_s: f64, to_s: f64, points: usize) -> Result<Excerpt, RecordingError> {
     let mut file = McapFile::open(path)?;
-    let (start_s, seconds) = span_s(&file.chunks);
+    let (start_s, seconds) = span_s(&file.blocks);
     let start_ns =
-        file.chunks.iter().map(|chunk| chunk.span_ns.0).filter(|start| *start > 0).min().unwrap_or(0);
+        file.blocks.iter().map(|block| block.span_ns.0).filter(|start| *start > 0).min().unwrap_or(0);
     let at_ns = |after_s: f64| start_ns.saturating_add((after_s.max(0.0) * 1e9) as u64);
     let (from_ns, to_ns) = (at_ns(from_s), at_ns(to_s));
-    let chunks = file.chunks.iter().filter(|chunk| chunk.span_ns.0 <= to_ns && chunk.span_ns.1 >= from_ns);
-    let chunks: Vec<ChunkPlace> = chunks.copied().collect();
-    let readings: u64 = chunks.iter().map(|chunk| chunk.readings).sum();
+    let blocks = file.blocks.iter().filter(|block| block.span_ns.0 <= to_ns && block.span_ns.1 >= from_ns);
+    let blocks: Vec<Block> = blocks.copied().collect();
+    let readings: u64 = blocks.iter().map(|block| block.readings).sum();
     let mut thinning = Thinning {
         stride: readings.div_ceil(points.max(1) as u64).max(1),
         channels: file.head.channels.clone(),
@@ -102,8 +104,8 @@ pub fn read(path: &Path, from_s: f64, to_s: f64, points: usize) -> Result<Excerp
         last: None,
         events: Vec::new(),
     };
-    for chunk in &chunks {
-        for message in file.messages(chunk)? {
+    for block in &blocks {
+        for message in file.messages(block)?.messages {
             if (from_ns..=to_ns).contains(&message.unix_ns) {
                 thinning.add(message);
             }
@@ -113,11 +115,11 @@ pub fn read(path: &Path, from_s: f64, to_s: f64, points: usize) -> Result<Excerp
     Ok(Excerpt { channels: file.head.channels.clone(), start_s, seconds, samples, events })
 }
 
-fn span_s(chunks: &[ChunkPlace]) -> (Option<f64>, f64) {
+fn span_s(blocks: &[Block]) -> (Option<f64>, f64) {
     // A chunk that has no messages, or those before the clock was known, says 0.
-    let chunks = || chunks.iter().filter(|chunk| chunk.span_ns.0 > 0);
+    let blocks = || blocks.iter().filter(|block| block.span_ns.0 > 0);
     let (start, end) =
-        (chunks().map(|chunk| chunk.span_ns.0).min(), chunks().map(|chunk| chunk.span_ns.1).max());
+        (blocks().map(|block| block.span_ns.0).min(), blocks().map(|block| block.span_ns.1).max());
     let seconds = start.zip(end).map_or(0.0, |(start, end)| end.saturating_sub(start) as f64 * 1e-9);
     (start.map(|start| start as f64 * 1e-9), seconds)
 }
@@ -238,10 +240,37 @@ pub enum Recorded {
 #[derive(Debug)]
 pub struct Playback {
     file: McapFile,
-    chunk: usize,
+    block: usize,
     messages: std::vec::IntoIter<RawMessage>,
-    /// Messages that were not understood.
-    pub bad_messages: u64,
+    passed_over: PassedOver,
+}
+
+/// Numbers of what a playback has passed over so far.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PassedOver {
+    /// Blocks of messages that cannot be read, as far as they are known the readings in them, and the fault of the first.
+    pub blocks: u64,
+    /// Readings in those blocks, where an index tells them.
+    pub readings: u64,
+    /// Fault of the first of those blocks.
+    pub fault: Option<BlockFault>,
+    /// Messages that are damaged, or on a channel that the file does not describe.
+    pub messages: u64,
+    /// Messages on topics that are not of palpate.
+    pub foreign: u64,
+}
+
+impl PassedOver {
+    /// Sentence on the data of palpate that cannot be read; `None` where all was read.
+    pub fn loss(&self) -> Option<String> {
+        let blocks = (self.blocks > 0).then(|| {
+            let fault = self.fault.as_ref().map_or_else(String::new, |fault| format!(": {fault}"));
+            format!("{} blocks with {} readings cannot be read (the first{fault})", self.blocks, self.readings)
+        });
+        let messages = (self.messages > 0).then(|| format!("{} messages are damaged", self.messages));
+        let parts: Vec<String> = blocks.into_iter().chain(messages).collect();
+        (!parts.is_empty()).then(|| parts.join("; "))
+    }
 }
 
 impl Playback {
@@ -251,7 +280,7 @@ impl Playback {
     /// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let file = McapFile::open(path)?;
-        Ok(Self { file, chunk: 0, messages: Vec::new().into_iter(), bad_messages: 0 })
+        Ok(Self { file, block: 0, messages: Vec::new().into_iter(), passed_over: PassedOver::default() })
     }
 
     /// Its head: version, source, channels.
@@ -272,22 +301,42 @@ impl Playback {
         self.file.is_whole
     }
 
+    /// Numbers of what was passed over so far.
+    pub fn passed_over(&self) -> &PassedOver {
+        &self.passed_over
+    }
+
     /// The next of what it holds; `None` at its end.
     ///
     /// # Errors
     /// [`RecordingError::File`] for a file that cannot be read.
     pub fn next_recorded(&mut self) -> Result<Option<Recorded>, RecordingError> {
+        while let Some(message) = self.next_message()? {
+            match self.understand(&message) {
+                Some(recorded) => return Ok(Some(recorded)),
+                None => self.passed_over.messages += 1,
+            }
+        }
+        Ok(None)
+    }
+
+    /// The next message as it is in the file; `None` at its end.
+    pub(super) fn next_message(&mut self) -> Result<Option<RawMessage>, RecordingError> {
         loop {
             if let Some(message) = self.messages.next() {
-                match self.understand(&message) {
-                    Some(recorded) => return Ok(Some(recorded)),
-                    None => self.bad_messages += 1,
-                }
-                continue;
+                return Ok(Some(message));
             }
-            let Some(chunk) = self.file.chunks.get(self.chunk).copied() else { return Ok(None) };
-            self.chunk += 1;
-            self.messages = self.file.messages(&chunk)?.into_iter();
+            let Some(block) = self.file.blocks.get(self.block).copied() else { return Ok(None) };
+            self.block += 1;
+            let found = self.file.messages(&block)?;
+            if let Some(fault) = found.fault {
+                self.passed_over.blocks += 1;
+                self.passed_over.readings += block.readings;
+                self.passed_over.fault.get_or_insert(fault);
+            }
+            self.passed_over.foreign += found.foreign;
+            self.passed_over.messages += found.unknown;
+            self.messages = found.messages.into_iter();
         }
     }
 

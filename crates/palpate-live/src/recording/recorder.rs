@@ -1,7 +1,7 @@
 //! The recorder: a thread that writes a session into a file.
 
 use super::RecordingError;
-use super::head::{LOCATOR, METADATA, Subject};
+use super::head::{Head, LOCATOR, METADATA, Subject};
 use super::tail::Tail;
 use crate::input::{Command, Input};
 use crate::schemas::{EstimateMessage, ReadingMessage, TOPICS};
@@ -11,7 +11,7 @@ use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use serde::Serialize;
-use std::io::Write;
+use std::io::{Seek, Write};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -189,7 +189,7 @@ impl<'a> Recording<'a> {
         reports: SyncSender<Input>,
     ) -> Result<Self, (Arc<Mutex<RecordingStatus>>, String)> {
         let encoded = Encoded::default();
-        let (writer, topics) = match head(encoded.clone(), subject) {
+        let (writer, topics) = match begin_file(encoded.clone(), subject) {
             Ok(begun) => begun,
             Err(error) => return Err((status, RecordingError::Encode(error.to_string()).to_string())),
         };
@@ -354,29 +354,42 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// Begins an MCAP file: metadata, the locator, and the channels of its topics.
-fn head(encoded: Encoded, subject: &Subject) -> Result<(Writer<NoSeek<Encoded>>, [u16; 3]), McapError> {
-    let options = WriteOptions::new()
+/// Begins an MCAP file that grows: its summary stands at the end, and nothing before it is changed.
+fn begin_file(encoded: Encoded, subject: &Subject) -> Result<(Writer<NoSeek<Encoded>>, [u16; 3]), McapError> {
+    let options = options(&subject.head.version).disable_seeking(true);
+    let mut writer = options.create(NoSeek::new(encoded))?;
+    let topics = describe(&mut writer, &subject.head, Some(&subject.locator))?;
+    Ok((writer, topics))
+}
+
+/// Options of the files of recordings.
+pub(super) fn options(version: &str) -> WriteOptions {
+    WriteOptions::new()
         .compression(Some(Compression::Lz4))
         .chunk_size(Some(CHUNK))
-        .disable_seeking(true)
-        .library(format!("palpate {}", subject.head.version));
-    let mut writer = options.create(NoSeek::new(encoded))?;
-    writer.write_metadata(&mcap::records::Metadata {
-        name: METADATA.to_owned(),
-        metadata: subject.head.metadata(),
-    })?;
-    writer.attach(&Attachment {
-        log_time: 0,
-        create_time: 0,
-        name: LOCATOR.to_owned(),
-        media_type: "application/json".to_owned(),
-        data: subject.locator.as_bytes().into(),
-    })?;
+        .library(format!("palpate {version}"))
+}
+
+/// Writes the description of a recording: metadata, the locator, and the channels of its topics, whose numbers it gives.
+pub(super) fn describe<W: Write + Seek>(
+    writer: &mut Writer<W>,
+    head: &Head,
+    locator: Option<&str>,
+) -> Result<[u16; 3], McapError> {
+    writer.write_metadata(&mcap::records::Metadata { name: METADATA.to_owned(), metadata: head.metadata() })?;
+    if let Some(locator) = locator {
+        writer.attach(&Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: LOCATOR.to_owned(),
+            media_type: "application/json".to_owned(),
+            data: locator.as_bytes().into(),
+        })?;
+    }
     let mut ids = [0; 3];
     for (id, (topic, name, schema)) in ids.iter_mut().zip(TOPICS) {
         let schema_id = writer.add_schema(name, "jsonschema", schema.as_bytes())?;
         *id = writer.add_channel(schema_id, topic, "json", &std::collections::BTreeMap::new())?;
     }
-    Ok((writer, ids))
+    Ok(ids)
 }

@@ -85,8 +85,11 @@ impl Access {
 
     fn check(&self, request: &Request) -> Result<(), Refusal> {
         let headers = request.headers();
+        check_single(headers)?;
         let host = text(headers, header::HOST).unwrap_or_default();
-        if !self.is_own(host) {
+        // A request line with a whole URL names the server, too.
+        let authority = request.uri().authority().map(|authority| authority.as_str());
+        if let Some(host) = [host].into_iter().chain(authority).find(|name| !self.is_own(name)) {
             return Err(Refusal::new(
                 StatusCode::FORBIDDEN,
                 format!("this server is not called `{host}`"),
@@ -130,6 +133,19 @@ impl Access {
         }
         let named = |own: &String| own.eq_ignore_ascii_case(name);
         name.eq_ignore_ascii_case("localhost") || self.host_names.iter().any(named)
+    }
+}
+
+/// Refuses a request with two headers of a kind that decides on it: proxies and this server may go by different ones.
+fn check_single(headers: &HeaderMap) -> Result<(), Refusal> {
+    let decisive = [header::HOST, header::ORIGIN, header::AUTHORIZATION];
+    match decisive.iter().find(|name| headers.get_all(*name).iter().count() > 1) {
+        None => Ok(()),
+        Some(name) => Err(Refusal::new(
+            StatusCode::BAD_REQUEST,
+            format!("the request has more than one header `{name}`"),
+            "send it once",
+        )),
     }
 }
 

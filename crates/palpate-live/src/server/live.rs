@@ -302,9 +302,15 @@ impl Live {
     /// Path of a recording of the folder, which need not be there.
     ///
     /// # Errors
-    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a name that no recording has.
+    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a name that no recording has, or that of a link, a pipe or a folder.
     pub fn recording_path(&self, name: &str) -> Result<PathBuf, LiveError> {
-        Ok(self.recordings()?.join(recording::check_name(name)?))
+        let path = self.recordings()?.join(recording::check_name(name)?);
+        match path.symlink_metadata() {
+            Ok(found) if !found.is_file() => {
+                Err(RecordingError::NotRegular { path: path.display().to_string() }.into())
+            }
+            _ => Ok(path),
+        }
     }
 
     fn recordings(&self) -> Result<&PathBuf, LiveError> {

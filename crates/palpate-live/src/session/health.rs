@@ -1,7 +1,7 @@
 //! Health of the channels.
 
 use crate::event::{ChannelState, Event};
-use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::sensing::{Layout, SensorKind};
 use serde::Serialize;
 
 /// Readings in a row of one and the same value after which a channel is dead, where others change.
@@ -22,12 +22,24 @@ pub struct ChannelHealth {
     pub noise_sd: f64,
 }
 
+/// True for an end of the range of a converter of 10 to 32 bits, with a sign or without: 2ⁿ − 1 or −2ⁿ. It is an end only as long as no channel reads beyond it.
+fn is_converter_end(value: f64) -> bool {
+    (9..=32).any(|bits| {
+        let range = 2_f64.powi(bits);
+        value == range - 1.0 || value == -range
+    })
+}
+
 /// Watch over the health of channels.
 #[derive(Debug)]
 pub struct HealthWatch {
     channels: Vec<ChannelHealth>,
     /// Ends of the range of each, where they are known.
     limits: Vec<Option<(f64, f64)>>,
+    /// True for a channel whose values are the numbers of a converter.
+    is_raw: Vec<bool>,
+    /// Least and greatest value of all raw channels so far.
+    raw_range: [f64; 2],
     last: Vec<f64>,
     /// The reading before the last.
     before: Vec<f64>,
@@ -50,6 +62,8 @@ impl HealthWatch {
         Self {
             channels: layout.names().iter().map(health).collect(),
             limits: layout.sensors().iter().map(|sensor| sensor.channel.range).collect(),
+            is_raw: layout.sensors().iter().map(|sensor| sensor.kind == SensorKind::Raw).collect(),
+            raw_range: [f64::INFINITY, f64::NEG_INFINITY],
             last: vec![f64::NAN; count],
             before: vec![f64::NAN; count],
             same: vec![0; count],
@@ -78,12 +92,21 @@ impl HealthWatch {
     /// Takes the next reading.
     pub fn add(&mut self, reading: &[f64], mut tell: impl FnMut(Event)) {
         self.before.clone_from(&self.last);
+        for (value, _) in reading.iter().zip(&self.is_raw).filter(|(_, is_raw)| **is_raw) {
+            self.raw_range = [self.raw_range[0].min(*value), self.raw_range[1].max(*value)];
+        }
         for (i, value) in reading.iter().copied().enumerate() {
             let channel = &mut self.channels[i];
             channel.range = [channel.range[0].min(value), channel.range[1].max(value)];
             let same = self.last[i].to_bits() == value.to_bits();
             self.same[i] = if same { self.same[i].saturating_add(1) } else { 0 };
-            let ends = self.limits[i].is_some_and(|(low, high)| value <= low || value >= high);
+            let ends = match self.limits[i] {
+                Some((low, high)) => value <= low || value >= high,
+                None => {
+                    let is_outermost = value == self.raw_range[usize::from(value > 0.0)];
+                    self.is_raw[i] && is_outermost && is_converter_end(value)
+                }
+            };
             self.at_end[i] = if ends { self.at_end[i].saturating_add(1) } else { 0 };
             self.last[i] = value;
         }
@@ -100,5 +123,37 @@ impl HealthWatch {
                 tell(Event::Channel { name: channel.name.clone(), state });
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_mechanics::sensing::Sensor;
+
+    /// States of the first of two raw channels after each reading.
+    fn last_state(readings: impl IntoIterator<Item = [f64; 2]>) -> ChannelState {
+        let sensors = (0..2).map(|i| Sensor::raw(format!("s{i}"))).collect();
+        let mut watch = HealthWatch::new(&Layout::new(sensors).unwrap());
+        readings.into_iter().for_each(|reading| watch.add(&reading, |_| {}));
+        watch.channels()[0].state
+    }
+
+    #[test]
+    fn a_channel_at_the_end_of_a_converter_is_saturated() {
+        let stuck = |value: f64| (0..200).map(move |i| [value, f64::from(i % 7)]);
+        for value in [8_388_607.0, -8_388_608.0, 32_767.0, 65_535.0, 4095.0, 1023.0, -512.0] {
+            assert_eq!(last_state(stuck(value)), ChannelState::Saturated, "{value}");
+            assert_eq!(last_state(stuck(value).take(3)), ChannelState::Well, "{value}");
+        }
+        for value in [8_388_606.0, 0.0, 127.0, 1000.0, 1023.5] {
+            assert_eq!(last_state(stuck(value)), ChannelState::Dead, "{value}");
+        }
+    }
+
+    #[test]
+    fn a_value_that_another_channel_exceeds_is_no_end() {
+        assert_eq!(last_state((0..200).map(|i| [1023.0, 1024.0 + f64::from(i % 7)])), ChannelState::Dead);
+        assert_eq!(last_state((0..20).map(|i| [1023.0, 1024.0 + f64::from(i % 7)])), ChannelState::Well);
     }
 }

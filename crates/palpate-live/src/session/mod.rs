@@ -80,6 +80,8 @@ pub struct Session<'a> {
     contact: ContactWatch,
     health: HealthWatch,
     counters: Counters,
+    /// Cause of the last frame that was no reading.
+    last_cause: Option<BadFrame>,
     /// True after a reading of status `no_contact`.
     was_untouched: bool,
 }
@@ -102,6 +104,7 @@ impl<'a> Session<'a> {
             contact: ContactWatch::new(extent),
             health: HealthWatch::new(locator.setup.layout()),
             counters: Counters::default(),
+            last_cause: None,
             was_untouched: false,
             channels,
         })
@@ -124,6 +127,16 @@ impl<'a> Session<'a> {
     /// Numbers of what arrived.
     pub fn counters(&self) -> &Counters {
         &self.counters
+    }
+
+    /// Cause and quotation of the last frame that was no reading; `None` before there was one.
+    pub fn last_bad_frame(&self) -> Option<(BadFrame, String)> {
+        self.last_cause.zip(self.decoder.last_bad())
+    }
+
+    /// Bytes since the end of the last frame.
+    pub fn unfinished(&self) -> &[u8] {
+        self.decoder.unfinished()
     }
 
     /// Health of each channel.
@@ -153,6 +166,13 @@ impl<'a> Session<'a> {
                 self.estimation.interrupt();
                 self.tell(at, Event::SourceOpened { name: name.clone() }, out);
             }
+            Arrival::Piped(name) => {
+                self.decoder.open();
+                self.estimation.interrupt();
+                self.timeline.follow_board();
+                self.tell(at, Event::SourceOpened { name: name.clone() }, out);
+            }
+            Arrival::Backlog(bytes) => self.decoder.receive_waiting(bytes),
             Arrival::Lost(why) => {
                 self.decoder.open();
                 self.tell(at, Event::SourceLost { why: why.clone() }, out);
@@ -192,13 +212,17 @@ impl<'a> Session<'a> {
                     behind -= 1;
                     self.take(at, frame, behind, out);
                 }
-                Err(cause) => *self.counters.bad_frames.entry(cause).or_default() += 1,
+                Err(cause) => {
+                    *self.counters.bad_frames.entry(cause).or_default() += 1;
+                    self.last_cause = Some(cause);
+                }
             }
         }
     }
 
     /// A reading's way: time, health, tare, filter or none, estimate, events. `behind` more readings have arrived with it.
     fn take(&mut self, at: Stamp, frame: Frame, behind: usize, out: &mut Vec<Output>) {
+        let at = self.timeline.board_stamp(at, frame.device_time);
         let (unix_ns, gap) = self.timeline.next(at, &frame, behind);
         if let Some(gap) = gap {
             if gap.kind == GapKind::Silence {

@@ -1,6 +1,6 @@
 //! Times of readings, and stretches without any.
 
-use crate::device_clock::DeviceClock;
+use crate::device_clock::{self, DeviceClock};
 use crate::frame::Frame;
 use crate::stamp::Stamp;
 use std::time::Duration;
@@ -18,8 +18,10 @@ pub struct Timeline {
     last_arrival: Option<Duration>,
     last_sequence: Option<u32>,
     device_clock: DeviceClock,
-    /// Start of the second that is counted, and readings in it.
-    second: (Duration, u32),
+    /// Clock of the board of a stream whose pace says nothing; `None` for other streams.
+    board: Option<BoardPace>,
+    /// Arrival from which a second is counted, and readings since.
+    second: Option<(Duration, u32)>,
     rate_hz: f64,
 }
 
@@ -68,10 +70,33 @@ impl Timeline {
         (by_ns.abs() > SET_NS).then_some(by_ns as f64 * 1e-9)
     }
 
+    /// Takes times from the board's clock from now on, where it tells them: the stream comes at any pace.
+    pub fn follow_board(&mut self) {
+        self.board = Some(BoardPace::default());
+    }
+
+    /// The instant of a reading with such a time by the board's clock: that of its arrival, but for a stream whose pace says nothing.
+    pub fn board_stamp(&mut self, at: Stamp, device_time: Option<Duration>) -> Stamp {
+        match (&mut self.board, device_time) {
+            (Some(board), Some(device)) => {
+                let elapsed = board.elapsed(device, at.elapsed);
+                let by_ns = elapsed.as_nanos() as i128 - at.elapsed.as_nanos() as i128;
+                let unix_ns = u64::try_from(i128::from(at.unix_ns) + by_ns).unwrap_or(0);
+                Stamp { elapsed, unix_ns }
+            }
+            _ => at,
+        }
+    }
+
     /// Time of the next reading in ns since 1970, later than that of the one before it, and the gap before it; `behind` more frames have arrived with it.
     pub fn next(&mut self, at: Stamp, frame: &Frame, behind: usize) -> (u64, Option<Gap>) {
         let gap = self.gap(at.elapsed, frame.sequence);
+        if gap.is_some_and(|gap| gap.kind == GapKind::Silence) {
+            // A rate over a silence is none.
+            self.second = None;
+        }
         let taken = match frame.device_time {
+            Some(_) if self.board.is_some() => at.elapsed,
             Some(device) => self.device_clock.host_time(device, at.elapsed),
             None => at.elapsed.saturating_sub(self.period(at.elapsed, behind).mul_f64(behind as f64)),
         };
@@ -105,8 +130,8 @@ impl Timeline {
             .map(|(last, next)| next.wrapping_sub(last))
             .filter(|step| *step < 1 << 31)
             .map(|step| step.saturating_sub(1));
-        let longest_s =
-            if self.rate_hz > 0.0 { GAP_S.max(GAP_PERIODS / self.rate_hz) } else { f64::INFINITY };
+        let rate_hz = if self.rate_hz > 0.0 { self.rate_hz } else { self.rate_so_far_hz() };
+        let longest_s = if rate_hz > 0.0 { GAP_S.max(GAP_PERIODS / rate_hz) } else { f64::INFINITY };
         let kind = if seconds > longest_s { GapKind::Silence } else { GapKind::LostFrames };
         (kind == GapKind::Silence || lost_frames.is_some_and(|lost| lost > 0)).then_some(Gap {
             seconds,
@@ -115,14 +140,43 @@ impl Timeline {
         })
     }
 
+    /// Readings a second since the second that is counted began: infinite where all of several came at once, and 0 of one.
+    fn rate_so_far_hz(&self) -> f64 {
+        let Some(((start, count), last)) = self.second.zip(self.last_arrival) else { return 0.0 };
+        if count == 0 { 0.0 } else { f64::from(count) / last.saturating_sub(start).as_secs_f64() }
+    }
+
     fn count(&mut self, now: Duration) {
-        let (start, count) = &mut self.second;
+        // The first reading begins a second, and is not in it.
+        let Some((start, count)) = &mut self.second else {
+            self.second = Some((now, 0));
+            return;
+        };
         *count += 1;
         let span = now.saturating_sub(*start);
         if span >= Duration::from_secs(1) {
             self.rate_hz = f64::from(*count) / span.as_secs_f64();
-            self.second = (now, 0);
+            self.second = Some((now, 0));
         }
+    }
+}
+
+/// Clock of the board of a stream that comes at any pace: the first reading has the time of its arrival, and further ones are reckoned from it.
+#[derive(Debug, Default)]
+struct BoardPace {
+    /// Time by the board's clock and instant of the last reading.
+    last: Option<(Duration, Duration)>,
+}
+
+impl BoardPace {
+    fn elapsed(&mut self, device: Duration, arrival: Duration) -> Duration {
+        let elapsed = match self.last {
+            None => arrival,
+            // A clock that goes back was set, as by a reset, or has wrapped around.
+            Some((last_device, last)) => last + device_clock::step(last_device, device).unwrap_or_default(),
+        };
+        self.last = Some((device, elapsed));
+        elapsed
     }
 }
 
@@ -185,6 +239,49 @@ mod tests {
             let off_ns = at_ns.abs_diff(start_ns + 10_000_000 * number);
             assert!(off_ns < 700_000, "{number}: {off_ns}");
         }
+    }
+
+    /// Gaps before readings that arrive at these times, in ms.
+    fn gaps_s(arrivals_ms: impl IntoIterator<Item = u64>) -> Vec<f64> {
+        let mut timeline = Timeline::default();
+        let gaps = arrivals_ms.into_iter().filter_map(|ms| {
+            let elapsed = Duration::from_millis(ms);
+            let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
+            let frame = Frame { reading: vec![], sequence: None, device_time: None };
+            timeline.next(at, &frame, 0).1.map(|gap| gap.seconds)
+        });
+        gaps.collect()
+    }
+
+    #[test]
+    fn silences_are_gaps_from_the_second_reading_on() {
+        // The first reading comes 7 s after the start, which is no gap.
+        assert_eq!(gaps_s([7000, 7010, 7910]), [0.9]);
+        assert_eq!(gaps_s((0..59).map(|i| 7000 + 10 * i).chain([9000, 9010, 9020])), [1.42]);
+        // A silence does not lower the rate by which the next one is found.
+        assert_eq!(gaps_s((0..300).map(|i| 10 * i).chain([12_990, 13_000, 13_600])), [10.0, 0.6]);
+        // A board of a reading each 2 s, and one that sends many at once.
+        assert!(gaps_s((0..20).map(|i| 2000 * i)).is_empty());
+        assert!(gaps_s([100, 100, 100, 500]).is_empty());
+    }
+
+    #[test]
+    fn a_piped_stream_has_the_times_of_the_board() {
+        let mut timeline = Timeline::default();
+        timeline.follow_board();
+        let at = Stamp { elapsed: Duration::from_secs(5), unix_ns: 1_800_000_000_000_000_000 };
+        let mut times_ns = Vec::new();
+        // Around the end of microseconds of 32 bits, and with a reset.
+        let wrap_us = 1_u64 << 32;
+        for device_us in [wrap_us - 2000, wrap_us - 1000, 0, 1000, 501_000, 0, 1000] {
+            let device_time = Some(Duration::from_micros(device_us));
+            let stamp = timeline.board_stamp(at, device_time);
+            let frame = Frame { reading: vec![], sequence: None, device_time };
+            let (unix_ns, gap) = timeline.next(stamp, &frame, 0);
+            times_ns.push((unix_ns - at.unix_ns) / 1_000_000);
+            assert_eq!(gap.is_some(), device_us == 501_000, "{device_us}");
+        }
+        assert_eq!(times_ns, [0, 1, 2, 3, 503, 503, 504]);
     }
 
     #[test]

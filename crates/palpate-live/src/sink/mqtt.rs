@@ -3,9 +3,11 @@
 use super::{Batch, Sink};
 use crate::frame::Channel;
 use crate::input::{Command, Input};
+use crate::login::{Login, LoginError, without_passwords};
 use crate::rules::{Action, Rule, RuleWatch, Rules};
 use crate::sample::SampleRecord;
 use crate::session::Output;
+use crate::source::{Address, broker_and_login, explain};
 use palpate_mechanics::surface::Extent;
 use rumqttc::{Client, Connection, ConnectionError, Event, LastWill, MqttOptions, Packet, QoS};
 use serde::Serialize;
@@ -20,12 +22,10 @@ use std::time::{Duration, Instant};
 /// A broker, and the topic under which a session's messages are.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MqttUrl {
-    /// The broker's host.
-    pub host: String,
-    /// Its port.
-    pub port: u16,
-    /// User and password, where the broker wants them.
-    pub login: Option<(String, String)>,
+    /// The broker.
+    pub broker: Address,
+    /// User name and password, where the broker wants them.
+    pub login: Option<Login>,
     /// The topic.
     pub topic: String,
 }
@@ -33,64 +33,56 @@ pub struct MqttUrl {
 /// Text that is no URL of a broker.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{text}` is no broker with a topic, as in `mqtt://user:password@host:1883/bench/contact`: {problem}"
+    "`{text}` is no broker with a topic, as in `mqtt://user@host:1883/bench/contact`: {problem}"
 )]
 pub struct MqttUrlError {
     /// The text.
     pub text: String,
     /// Its problem.
-    pub problem: &'static str,
+    pub problem: String,
 }
 
 impl FromStr for MqttUrl {
     type Err = MqttUrlError;
 
     fn from_str(text: &str) -> Result<Self, MqttUrlError> {
-        let error = |problem| MqttUrlError { text: text.to_owned(), problem };
-        let rest = text.strip_prefix("mqtt://").ok_or_else(|| error("it does not begin with mqtt://"))?;
+        let error = |problem: &str| MqttUrlError { text: without_passwords(text), problem: problem.to_owned() };
+        let (body, query) = text.split_once('?').unwrap_or((text, ""));
+        let rest = body.strip_prefix("mqtt://").ok_or_else(|| error("it does not begin with mqtt://"))?;
         let (server, topic) = rest.split_once('/').ok_or_else(|| error("it has no topic"))?;
         if topic.is_empty() || topic.len() > 1000 || topic.contains(['+', '#', '\0']) {
             return Err(error("a topic has 1 to 1000 bytes, and none of + and #"));
         }
-        let (login, address) = match server.rsplit_once('@') {
-            None => (None, server),
-            Some((login, address)) => {
-                let (user, password) = login.split_once(':').unwrap_or((login, ""));
-                (Some((user.to_owned(), password.to_owned())), address)
-            }
+        let file = match query.strip_prefix("password-file=") {
+            _ if query.is_empty() => None,
+            Some(file) => Some(file),
+            None => return Err(error("its only parameter is `password-file`")),
         };
-        let (host, port) = match address.rsplit_once(':') {
-            None => (address, 1883),
-            Some((host, port)) => {
-                (host, port.parse().map_err(|_| error("its port is no number of at most 65535"))?)
-            }
-        };
-        if host.is_empty() {
-            return Err(error("it names no host"));
-        }
-        Ok(Self { host: host.to_owned(), port, login, topic: topic.trim_end_matches('/').to_owned() })
+        let (broker, login) = broker_and_login(server, topic, file).map_err(|problem| error(&problem))?;
+        Ok(Self { broker, login, topic: topic.trim_end_matches('/').to_owned() })
     }
 }
 
-/// The URL without the password.
+/// The URL without user name and password.
 impl fmt::Display for MqttUrl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "mqtt://{}:{}/{}", self.host, self.port, self.topic)
+        write!(f, "mqtt://{}/{}", self.broker, self.topic)
     }
 }
 
 impl MqttUrl {
     /// Options of a client with an identity of its own.
-    pub(crate) fn options(&self, role: &str) -> MqttOptions {
+    pub(crate) fn options(&self, role: &str) -> Result<MqttOptions, LoginError> {
         static NUMBER: AtomicU64 = AtomicU64::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let identity = format!("palpate-{role}-{}-{number}", std::process::id());
-        let mut options = MqttOptions::new(identity, &self.host, self.port);
+        let mut options = MqttOptions::new(identity, &self.broker.host, self.broker.port);
         options.set_keep_alive(Duration::from_secs(5));
-        if let Some((user, password)) = &self.login {
+        if let Some(login) = &self.login {
+            let (user, password) = login.credentials()?;
             options.set_credentials(user, password);
         }
-        options
+        Ok(options)
     }
 }
 
@@ -170,7 +162,7 @@ struct Publisher {
 impl Publisher {
     fn open(url: &MqttUrl, reports: SyncSender<Input>, lost: Arc<AtomicU64>) -> std::io::Result<Self> {
         let status = format!("{}/status", url.topic);
-        let mut options = url.options("session");
+        let mut options = url.options("session").map_err(std::io::Error::other)?;
         options.set_last_will(LastWill::new(&status, "offline", QoS::AtLeastOnce, true));
         let (client, connection) = Client::new(options, MESSAGES);
         let (online, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
@@ -277,7 +269,8 @@ impl Driver {
                         break;
                     }
                     if was_there != Some(false) {
-                        self.report(&format!("cannot be reached: {error}; it is tried again"));
+                        let text = format!("{}; it is tried again", explain(&self.name, &error));
+                        let _ = self.reports.try_send(Input::Command(Command::Trouble(text)));
                     }
                     was_there = Some(false);
                     std::thread::sleep(AGAIN_AFTER);
@@ -300,10 +293,15 @@ mod tests {
     #[test]
     fn urls_say_broker_login_and_topic() {
         let url: MqttUrl = "mqtt://me:secret@bench.local:1884/left/contact".parse().unwrap();
-        assert_eq!((url.host.as_str(), url.port, url.topic.as_str()), ("bench.local", 1884, "left/contact"));
-        assert_eq!(url.login, Some(("me".to_owned(), "secret".to_owned())));
+        assert_eq!((url.broker.host.as_str(), url.broker.port), ("bench.local", 1884));
+        assert_eq!(url.topic, "left/contact");
+        let login = url.login.as_ref().unwrap().credentials().unwrap();
+        assert_eq!(login, ("me".to_owned(), "secret".to_owned()));
+        assert!(!format!("{url:?}").contains("secret"));
         assert_eq!(url.to_string(), "mqtt://bench.local:1884/left/contact");
-        assert_eq!("mqtt://h/t".parse::<MqttUrl>().unwrap().port, 1883);
+        assert_eq!("mqtt://h/t".parse::<MqttUrl>().unwrap().broker.port, 1883);
+        let error = "mqtt://me:secret@h/a/#".parse::<MqttUrl>().unwrap_err().to_string();
+        assert!(error.contains("mqtt://me:***@h/a/#") && !error.contains("secret"), "{error}");
         for wrong in ["mqtt://h", "mqtt:///t", "mqtt://h:x/t", "mqtt://h/a/#", "http://h/t", "mqtt://h/"] {
             assert!(wrong.parse::<MqttUrl>().is_err(), "{wrong}");
         }

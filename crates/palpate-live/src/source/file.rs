@@ -35,7 +35,9 @@ fn run(outlet: &Outlet, mut playback: Playback, speed: f64) -> bool {
             Err(error) => return outlet.send(Arrival::Lost(error.to_string())),
         };
         let Some(recorded) = recorded else {
-            return bytes.is_empty() || outlet.send(Arrival::Bytes(bytes));
+            let loss = playback.passed_over().loss();
+            return (bytes.is_empty() || outlet.send(Arrival::Bytes(bytes)))
+                && loss.is_none_or(|loss| outlet.send(Arrival::Lost(loss)));
         };
         let Recorded::Reading { unix_ns, values, .. } = recorded else { continue };
         if speed > 0.0 {

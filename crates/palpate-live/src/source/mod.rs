@@ -10,8 +10,10 @@ mod tcp;
 mod udp;
 mod url;
 
+pub(crate) use mqtt::explain;
 pub use crate::commander::{Commander, SendError};
 pub use file::line;
+pub(crate) use url::broker_and_login;
 pub use url::{Address, SourceUrl, SourceUrlError};
 
 use crate::input::{Arrival, Arrived, Input};
@@ -49,6 +51,9 @@ pub enum SourceError {
     /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] crate::recording::RecordingError),
+    /// The password of a broker cannot be read.
+    #[error(transparent)]
+    Login(#[from] crate::login::LoginError),
     /// There is no thread for it.
     #[error("no thread for the source: {0}")]
     Thread(#[from] std::io::Error),
@@ -90,9 +95,11 @@ impl Outlet {
     /// the buffers of the system.
     pub(crate) fn send(&self, arrival: Arrival) -> bool {
         match arrival {
-            Arrival::Opened(_) | Arrival::Joined(_) => self.open.store(true, Ordering::Relaxed),
+            Arrival::Opened(_) | Arrival::Joined(_) | Arrival::Piped(_) => {
+                self.open.store(true, Ordering::Relaxed);
+            }
             Arrival::Lost(_) | Arrival::Ended => self.open.store(false, Ordering::Relaxed),
-            Arrival::Bytes(_) | Arrival::Message(_) => {}
+            Arrival::Backlog(_) | Arrival::Bytes(_) | Arrival::Message(_) => {}
         }
         let mut input = Input::Arrived(Arrived { at: self.clock.now(), arrival });
         while !self.is_stopped() {
@@ -148,9 +155,10 @@ impl Source {
                 spawn(move || tcp::run(&outlet, &for_device, &server))?;
             }
             SourceUrl::Udp { at, .. } => spawn(move || udp::run(&outlet, &for_device, &at))?,
-            SourceUrl::Mqtt { broker, topic, .. } => {
+            SourceUrl::Mqtt { broker, login, topic, .. } => {
                 line_end = Some("").filter(|_| !topic.contains(['+', '#']));
-                spawn(move || mqtt::run(&outlet, &for_device, &broker, &topic))?;
+                let login = login.map(|login| login.credentials()).transpose()?;
+                spawn(move || mqtt::run(&outlet, &for_device, &broker, login, &topic))?;
             }
             SourceUrl::Simulated { rig, rate_hz, seed } => {
                 simulated::open(outlet, &folder.join(rig), rate_hz, seed)?;

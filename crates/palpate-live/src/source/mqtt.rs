@@ -1,9 +1,11 @@
 //! `mqtt://host/topic`: messages of an MQTT broker.
 
 use super::{Address, BackOff, CONNECT, LOOK, Outlet, forget};
+use crate::frame::LONGEST_MESSAGE;
 use crate::input::Arrival;
+use crate::login::PASSWORD_VARIABLE;
 use rumqttc::{
-    AsyncClient, ConnectionError, Event, EventLoop, MqttOptions, NetworkOptions, Packet, QoS,
+    AsyncClient, ConnectReturnCode, ConnectionError, Event, EventLoop, MqttOptions, NetworkOptions, Packet, QoS,
     SubscribeReasonCode,
 };
 use std::collections::hash_map::RandomState;
@@ -12,15 +14,24 @@ use std::pin::pin;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-/// Most bytes of a packet.
-const LARGEST: usize = 1 << 17;
+/// Most bytes of a packet: all that MQTT allows, as the client drops the connection at a larger one. Of a message that is too long for a frame the start is
+/// handed on, which counts as one.
+const LARGEST: usize = 256 << 20;
+/// User name and password.
+type Credentials = (String, String);
 /// Silence after which the broker is asked for a sign of life; after twice as much it is gone. The least that the client allows is 1 s.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
-pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, broker: &Address, topic: &str) {
+pub fn run(
+    outlet: &Outlet,
+    commands: &Receiver<Vec<u8>>,
+    broker: &Address,
+    login: Option<Credentials>,
+    topic: &str,
+) {
     match tokio::runtime::Builder::new_current_thread().enable_all().build() {
         Ok(runtime) => {
-            runtime.block_on(bring(outlet, commands, broker, topic));
+            runtime.block_on(bring(outlet, commands, broker, login, topic));
             // A name that is being looked up is not waited for.
             runtime.shutdown_background();
         }
@@ -30,8 +41,14 @@ pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, broker: &Address, topi
     }
 }
 
-async fn bring(outlet: &Outlet, commands: &Receiver<Vec<u8>>, broker: &Address, topic: &str) {
-    let (client, mut events) = connection(broker);
+async fn bring(
+    outlet: &Outlet,
+    commands: &Receiver<Vec<u8>>,
+    broker: &Address,
+    login: Option<Credentials>,
+    topic: &str,
+) {
+    let (client, mut events) = connection(broker, login);
     let command_topic = format!("{topic}/command");
     let mut back_off = BackOff::new();
     let mut said = String::new();
@@ -64,13 +81,14 @@ async fn bring(outlet: &Outlet, commands: &Receiver<Vec<u8>>, broker: &Address, 
             // A retained message is an old reading.
             Ok(Event::Incoming(Packet::Publish(message))) if !message.retain => {
                 back_off = BackOff::new();
-                if !outlet.send(Arrival::Message(message.payload.to_vec())) {
+                let length = message.payload.len().min(LONGEST_MESSAGE + 1);
+                if !outlet.send(Arrival::Message(message.payload[..length].to_vec())) {
                     return;
                 }
                 None
             }
             Ok(_) => None,
-            Err(error) => Some(format!("the broker {broker} is not there: {error}")),
+            Err(error) => Some(explain(&broker.to_string(), &error)),
         };
         if let Some(why) = why {
             // One that stays away for one reason is reported once.
@@ -83,11 +101,35 @@ async fn bring(outlet: &Outlet, commands: &Receiver<Vec<u8>>, broker: &Address, 
     }
 }
 
-fn connection(broker: &Address) -> (AsyncClient, EventLoop) {
+/// The failure of a connection to a broker, in words.
+pub fn explain(broker: &str, error: &ConnectionError) -> String {
+    match error {
+        ConnectionError::ConnectionRefused(
+            code @ (ConnectReturnCode::BadUserNamePassword | ConnectReturnCode::NotAuthorized),
+        ) => {
+            format!(
+                "the broker {broker} refuses: {code:?}; give `mqtt://user@host/topic` and the password in {PASSWORD_VARIABLE}"
+            )
+        }
+        ConnectionError::ConnectionRefused(code) => format!("the broker {broker} refuses: {code:?}"),
+        ConnectionError::Io(error) => {
+            format!("the broker {broker} cannot be reached: {error}; see that it runs there")
+        }
+        ConnectionError::NetworkTimeout | ConnectionError::FlushTimeout => {
+            format!("the broker {broker} does not answer")
+        }
+        other => format!("the connection to the broker {broker} broke: {other}"),
+    }
+}
+
+fn connection(broker: &Address, login: Option<Credentials>) -> (AsyncClient, EventLoop) {
     // Two clients of one name would take the connection from each other.
     let name = format!("palpate-{:016x}", RandomState::new().hash_one(0));
     let mut options = MqttOptions::new(name, &broker.host, broker.port);
     options.set_keep_alive(KEEP_ALIVE).set_max_packet_size(LARGEST, LARGEST);
+    if let Some((user, password)) = login {
+        options.set_credentials(user, password);
+    }
     let (client, mut events) = AsyncClient::new(options, 64);
     let mut network = NetworkOptions::new();
     network.set_tcp_nodelay(true);

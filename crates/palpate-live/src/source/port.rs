@@ -16,6 +16,11 @@ pub trait Port {
     /// Waits for what comes next, for [`LOOK`] at most.
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<Arrival>>;
 
+    /// Bytes that wait already as it is opened; none where that is not known.
+    fn backlog(&mut self) -> io::Result<Vec<u8>> {
+        Ok(Vec::new())
+    }
+
     /// Sends a command.
     fn send(&mut self, command: &[u8]) -> io::Result<()>;
 }
@@ -34,7 +39,10 @@ pub fn run<P: Port>(
             Ok(mut port) => {
                 said.clear();
                 forget(commands);
-                if !outlet.send(opened.clone()) {
+                let backlog = port.backlog().unwrap_or_default();
+                if !outlet.send(opened.clone())
+                    || (!backlog.is_empty() && !outlet.send(Arrival::Backlog(backlog)))
+                {
                     return;
                 }
                 match bring(outlet, commands, &mut port, &mut back_off) {

@@ -1,9 +1,10 @@
 //! `serial:///dev/ttyACM0?baud=115200`: a serial port.
 
-use super::port::{self, Stream};
+use super::port::{self, Port, Stream};
 use super::{LOOK, Outlet};
 use crate::input::Arrival;
-use std::io;
+use serialport::SerialPort;
+use std::io::{self, Read};
 use std::path::Path;
 use std::sync::mpsc::Receiver;
 
@@ -13,14 +14,46 @@ pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, path: &Path, baud: u32
     port::run(outlet, commands, &opened, || {
         let port = serialport::new(path.to_string_lossy(), baud).timeout(LOOK).open();
         let stream = port.map_err(|error| complaint(path, error))?;
-        Ok(Stream { stream, end: "the port is gone" })
+        Ok(SerialStream(Stream { stream, end: "the port is gone" }))
     });
+}
+
+struct SerialStream(Stream<Box<dyn SerialPort>>);
+
+impl Port for SerialStream {
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<Arrival>> {
+        self.0.receive(buffer)
+    }
+
+    fn backlog(&mut self) -> io::Result<Vec<u8>> {
+        /// As many as drivers keep; a board that sends without a pause is not read for ever.
+        const MOST: usize = 1 << 20;
+        let port = &mut self.0.stream;
+        let mut bytes = Vec::new();
+        loop {
+            let waiting = port.bytes_to_read()? as usize;
+            let start = bytes.len();
+            if waiting == 0 || start >= MOST {
+                return Ok(bytes);
+            }
+            bytes.resize(start + waiting, 0);
+            let count = port.read(&mut bytes[start..])?;
+            bytes.truncate(start + count);
+        }
+    }
+
+    fn send(&mut self, command: &[u8]) -> io::Result<()> {
+        self.0.send(command)
+    }
 }
 
 /// An error with its remedy.
 fn complaint(path: &Path, error: serialport::Error) -> io::Error {
+    // Of a Unix system this kind stands for a port that is locked.
+    let is_busy = cfg!(unix) && error.kind == serialport::ErrorKind::NoDevice;
     let error = io::Error::from(error);
     let remedy = match error.kind() {
+        _ if is_busy => "; another program has it open, perhaps a serial monitor: close that program",
         io::ErrorKind::NotFound => "; it is opened as soon as it is plugged in",
         io::ErrorKind::PermissionDenied => {
             "; add yourself to the group that owns it, often `dialout`, and log in again"

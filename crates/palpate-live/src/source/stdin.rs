@@ -15,7 +15,7 @@ pub fn open(outlet: Outlet) -> std::io::Result<()> {
 fn run(outlet: &Outlet) {
     let mut stdin = std::io::stdin().lock();
     let mut buffer = vec![0; CHUNK];
-    if !outlet.send(Arrival::Opened("stdin".to_owned())) {
+    if !outlet.send(Arrival::Piped("stdin".to_owned())) {
         return;
     }
     loop {

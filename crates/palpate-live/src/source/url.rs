@@ -1,5 +1,6 @@
 //! URLs of sources.
 
+use crate::login::{Login, without_passwords};
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -43,6 +44,8 @@ pub enum SourceUrl {
     Mqtt {
         /// The broker.
         broker: Address,
+        /// User name and password, where the broker wants them.
+        login: Option<Login>,
         /// The topic, or a filter of topics.
         topic: String,
         /// Names of the values of frames that have no names.
@@ -90,7 +93,7 @@ pub enum SourceUrlError {
     /// A scheme that no source has.
     #[error(
         "`{text}` is no source; sources are `-`, `serial:///dev/ttyACM0?baud=115200`, `tcp://host:port`, `udp://:port`, \
-         `mqtt://host/topic`, `file:recording.mcap?speed=1` and `simulated:rig.toml?rate=1000`"
+         `mqtt://user@host/topic`, `file:recording.mcap?speed=1` and `simulated:rig.toml?rate=1000`"
     )]
     Scheme {
         /// The text.
@@ -147,8 +150,8 @@ impl SourceUrl {
             if topic.is_empty() {
                 return Err(missing.to_owned());
             }
-            let broker = address(broker, Some(MQTT_PORT), Some("`mqtt://192.168.1.20/topic`"))?;
-            Self::Mqtt { broker, topic: checked_topic(topic)?, columns: query.columns()? }
+            let (broker, login) = broker_and_login(broker, topic, query.value("password-file")?)?;
+            Self::Mqtt { broker, login, topic: checked_topic(topic)?, columns: query.columns()? }
         } else if let Some(path) = body.strip_prefix("file:") {
             let allowed = "a number from 0, which is as fast as can be, to 1000000";
             let speed = query.take("speed", 1.0, |speed| (0.0..=FASTEST).contains(speed), allowed)?;
@@ -171,7 +174,8 @@ impl SourceUrl {
             Self::Stdin => "none",
             Self::File { .. } => "`speed`",
             Self::Serial { .. } => "`baud` and `columns`",
-            Self::Tcp { .. } | Self::Udp { .. } | Self::Mqtt { .. } => "`columns`",
+            Self::Tcp { .. } | Self::Udp { .. } => "`columns`",
+            Self::Mqtt { .. } => "`columns` and `password-file`",
             Self::Simulated { .. } => "`rate` and `seed`",
         }
     }
@@ -183,8 +187,8 @@ impl FromStr for SourceUrl {
     fn from_str(text: &str) -> Result<Self, SourceUrlError> {
         match Self::parse(text) {
             Ok(Some(url)) => Ok(url),
-            Ok(None) => Err(SourceUrlError::Scheme { text: text.to_owned() }),
-            Err(problem) => Err(SourceUrlError::Parameter { text: text.to_owned(), problem }),
+            Ok(None) => Err(SourceUrlError::Scheme { text: without_passwords(text) }),
+            Err(problem) => Err(SourceUrlError::Parameter { text: without_passwords(text), problem }),
         }
     }
 }
@@ -236,6 +240,29 @@ impl<'a> Query<'a> {
         let known = url.parameters();
         self.0.first().map_or(Ok(()), |pair| Err(format!("`{pair}` is no parameter; known are {known}")))
     }
+}
+
+/// Reads `user:password@host:port` before the topic of a broker; all but the host may be left out.
+pub fn broker_and_login(
+    text: &str,
+    topic: &str,
+    password_file: Option<&str>,
+) -> Result<(Address, Option<Login>), String> {
+    let example = Some("`mqtt://192.168.1.20/topic`");
+    let Some((login, broker)) = text.rsplit_once('@') else {
+        if let Some((_, port)) = text.rsplit_once(':')
+            && topic.contains('@')
+            && port.parse::<u16>().is_err()
+        {
+            return Err("in user name and password write `%2F` for `/`".to_owned());
+        }
+        if password_file.is_some() {
+            return Err("password-file needs a user name, as in `mqtt://user@host/topic`".to_owned());
+        }
+        return Ok((address(text, Some(MQTT_PORT), example)?, None));
+    };
+    let login = Login::parse(login, password_file)?;
+    Ok((address(broker, Some(MQTT_PORT), example)?, Some(login)))
 }
 
 /// Reads `host:port`; without a default the port is needed, and with an example the host.
@@ -301,7 +328,15 @@ impl fmt::Display for SourceUrl {
             }
             Self::Tcp { server, .. } => write!(f, "tcp://{server}"),
             Self::Udp { at, .. } => write!(f, "udp://{at}"),
-            Self::Mqtt { broker, topic, .. } => write!(f, "mqtt://{broker}/{topic}"),
+            Self::Mqtt { broker, login, topic, .. } => {
+                let user = login.as_ref().map_or_else(String::new, |login| format!("{login}@"));
+                write!(f, "mqtt://{user}{broker}/{topic}")?;
+                if let Some(file) = login.as_ref().and_then(Login::file) {
+                    separator = '&';
+                    write!(f, "?password-file={file}")?;
+                }
+                Ok(())
+            }
             Self::Simulated { rig, rate_hz, seed } => {
                 write!(f, "simulated:{}?rate={rate_hz}&seed={seed}", rig.display())
             }
@@ -332,6 +367,8 @@ mod tests {
             ("tcp://[::1]:5000", "tcp://[::1]:5000"),
             ("udp://:5000?columns=n,a", "udp://:5000?columns=n,a"),
             ("mqtt://broker/lab/+/values", "mqtt://broker:1883/lab/+/values"),
+            ("mqtt://me:secret@broker/a", "mqtt://me@broker:1883/a"),
+            ("mqtt://me@broker/a?password-file=p&columns=a", "mqtt://me@broker:1883/a?password-file=p&columns=a"),
             ("simulated:rig.toml", "simulated:rig.toml?rate=100&seed=0"),
         ] {
             assert_eq!(shown(text), full);
@@ -354,7 +391,9 @@ mod tests {
             ("udp://:5000?columns=a,,b", "columns `a,,b` has an empty name"),
             ("mqtt://host", "write `mqtt://host/topic`"),
             ("mqtt://host/a/#/b", "topic `a/#/b` must have"),
-            ("mqtt://me@host/a", "host `me@host` has `@`"),
+            ("mqtt://:secret@host/a", "the user name before `@` is empty"),
+            ("mqtt://me:se/cret@host/a", "write `%2F` for `/`"),
+            ("mqtt://host/a?password-file=x", "password-file needs a user name"),
             ("simulated:rig.toml?rate=-1", "rate `-1` must be a number greater than 0"),
         ] {
             assert!(problem(text).contains(words), "{text}: {}", problem(text));

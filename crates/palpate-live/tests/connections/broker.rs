@@ -239,3 +239,67 @@ fn estimates_events_status_and_rules_reach_a_broker_that_begins_anew() {
     drop(bridge.sink);
     listener.until("bench/left/status", "offline");
 }
+
+/// A broker of its own making: it answers to one client, then does `after` with the connection.
+fn fake_broker(code: u8, after: impl FnOnce(&mut TcpStream) + Send + 'static) -> u16 {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        // A packet is its kind, its length (below 128 here), and its content.
+        let packet = |stream: &mut TcpStream| {
+            let mut head = [0; 2];
+            stream.read_exact(&mut head).unwrap();
+            let mut content = vec![0; usize::from(head[1])];
+            stream.read_exact(&mut content).unwrap();
+            content
+        };
+        packet(&mut stream);
+        stream.write_all(&[0x20, 2, 0, code]).unwrap();
+        if code == 0 {
+            let content = packet(&mut stream);
+            stream.write_all(&[0x90, 3, content[0], content[1], 0]).unwrap();
+            after(&mut stream);
+        }
+    });
+    port
+}
+
+/// A message of QoS 0 as a packet.
+fn publish(topic: &str, payload: &[u8]) -> Vec<u8> {
+    let mut length = 2 + topic.len() + payload.len();
+    let mut packet = vec![0x30];
+    loop {
+        let more = if length >= 128 { 0x80 } else { 0 };
+        packet.push((length % 128) as u8 | more);
+        length /= 128;
+        if length == 0 {
+            break;
+        }
+    }
+    packet.extend((topic.len() as u16).to_be_bytes());
+    packet.extend(topic.bytes());
+    packet.extend(payload);
+    packet
+}
+
+#[test]
+fn a_broker_that_refuses_is_quoted_with_the_remedy() {
+    let port = fake_broker(5, |_| {});
+    let why = Bench::open(&format!("mqtt://127.0.0.1:{port}/a")).lost();
+    assert!(why.contains("refuses: NotAuthorized") && why.contains("PALPATE_MQTT_PASSWORD"), "{why}");
+}
+
+#[test]
+fn a_message_of_3_mb_does_not_end_the_source() {
+    let port = fake_broker(0, |stream| {
+        stream.write_all(&publish("a", &vec![b'7'; 3_000_000])).unwrap();
+        stream.write_all(&publish("a", b"1,2")).unwrap();
+        std::thread::sleep(PATIENCE);
+    });
+    let bench = Bench::open(&format!("mqtt://127.0.0.1:{port}/a"));
+    bench.opened();
+    let Arrival::Message(start) = bench.next() else { panic!("no message") };
+    assert_eq!(start.len(), palpate_live::frame::LONGEST_MESSAGE + 1);
+    assert_eq!(bench.next(), Arrival::Message(b"1,2".to_vec()));
+}

@@ -57,6 +57,21 @@ fn a_serial_port_is_read_unplugged_and_read_again() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn bytes_that_waited_for_a_serial_port_are_a_backlog() {
+    use serialport::{SerialPort, TTYPort};
+    let (mut board, host) = TTYPort::pair().unwrap();
+    board.write_all(b"1,2\n3,").unwrap();
+    let device = host.name().unwrap();
+    // The end of the pair stays open, as that of a board that is plugged in.
+    let bench = Bench::open(&format!("serial://{device}"));
+    bench.opened();
+    assert_eq!(bench.next(), Arrival::Backlog(b"1,2\n3,".to_vec()));
+    board.write_all(b"4\n").unwrap();
+    assert_eq!(bench.bytes(2), b"4\n");
+}
+
 #[test]
 fn a_server_that_goes_away_is_connected_to_again() {
     let server = TcpListener::bind("127.0.0.1:0").unwrap();

@@ -125,6 +125,13 @@ fn other_pages_and_other_names_are_refused() {
     assert_eq!(ask_from("null"), 403);
     assert_eq!(ask_from(&own), 409);
     assert_eq!(ask(&server, "GET", "/api/session", &[("Host", "example.org")], "").0, 403);
+    let host = server.address().to_string();
+    for (hosts, status) in [([&host, &host], 400), ([&host, "example.org"], 400), (["example.org", &host], 400)] {
+        let headers = hosts.map(|host| ("Host", host));
+        assert_eq!(ask(&server, "GET", "/api/session", &headers, "").0, status, "{hosts:?}");
+    }
+    assert_eq!(ask(&server, "GET", "http://example.org/api/session", &[], "").0, 403);
+    assert_eq!(ask(&server, "GET", &format!("{own}/api/session"), &[], "").0, 200);
     let refused = follow(&server, "", Some("http://example.org")).unwrap_err();
     assert!(matches!(refused, tungstenite::Error::Http(answer) if answer.status() == 403));
     follow(&server, "", Some(&own)).unwrap();
@@ -259,4 +266,29 @@ fn servers_end_at_once_with_browsers_on() {
     live.end();
     drop(server);
     assert!(start.elapsed() < Duration::from_millis(200), "{:?}", start.elapsed());
+}
+
+#[cfg(unix)]
+#[test]
+fn only_regular_files_are_recordings() {
+    let folder = tempfile::tempdir().unwrap();
+    let recordings = folder.path().join("recordings");
+    std::fs::create_dir_all(recordings.join("folder.mcap")).unwrap();
+    std::fs::write(folder.path().join("secret"), "secret").unwrap();
+    std::os::unix::fs::symlink("../secret", recordings.join("link.mcap")).unwrap();
+    nix::unistd::mkfifo(&recordings.join("pipe.mcap"), nix::sys::stat::Mode::S_IRWXU).unwrap();
+    let rig = Rig::from_toml(RIG).unwrap();
+    let recording = rig.simulate(0).unwrap();
+    let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
+    let live = Live::new(locator, "rig", None, PathBuf::new()).with_recordings(recordings);
+    let address: SocketAddr = "127.0.0.1:0".parse().unwrap();
+    let server = Server::start(address, Access::new(address, None, Vec::new()).unwrap(), Arc::new(live)).unwrap();
+    assert_eq!(get(&server, "/api/recordings"), (200, serde_json::json!([])));
+    for name in ["link", "pipe", "folder"] {
+        for path in [format!("/api/recordings/{name}.mcap"), format!("/api/recordings/{name}.mcap/file")] {
+            let (status, _, body) = ask(&server, "GET", &path, &[], "");
+            assert_eq!(status, 400, "{path}: {body}");
+            assert!(body.contains("no regular file") && !body.contains("secret"), "{path}: {body}");
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! A client of an MQTT broker that publishes frames.
 
 use crate::sink::MqttUrl;
+use crate::source::explain;
 use rumqttc::{Client, Connection, ConnectionError, Event, Packet, QoS};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
@@ -20,9 +21,9 @@ pub struct Publisher {
 
 impl Publisher {
     pub fn open(url: &MqttUrl) -> std::io::Result<Self> {
-        let (client, connection) = Client::new(url.options("board"), WAITING);
+        let (client, connection) = Client::new(url.options("board").map_err(std::io::Error::other)?, WAITING);
         let (tell, news) = channel();
-        let broker = format!("the broker {}:{}", url.host, url.port);
+        let broker = url.broker.to_string();
         std::thread::Builder::new()
             .name("mqtt".to_owned())
             .spawn(move || drive(connection, &broker, &tell))?;
@@ -48,7 +49,7 @@ fn drive(mut connection: Connection, broker: &str, tell: &Sender<String>) {
             Err(ConnectionError::RequestsDone) => return,
             Err(error) if !is_away => {
                 is_away = true;
-                format!("{broker} cannot be reached: {error}; see that it runs there, it is tried again")
+                format!("{}, it is tried again", explain(broker, &error))
             }
             Err(_) => {
                 std::thread::sleep(AGAIN_AFTER);
@@ -56,7 +57,7 @@ fn drive(mut connection: Connection, broker: &str, tell: &Sender<String>) {
             }
             Ok(Event::Incoming(Packet::ConnAck(_))) if is_away => {
                 is_away = false;
-                format!("{broker} is there")
+                format!("the broker {broker} is there")
             }
             Ok(_) => continue,
         };

@@ -1,0 +1,139 @@
+//! Watch over the feed of a session: notices when a source brings no readings, and says why.
+
+use crate::frame::quote;
+use crate::input::{Arrival, Arrived};
+use crate::session::Session;
+use std::time::Duration;
+
+/// Frames in a row, and time since the last reading, from which on frames without a reading among them are reported: a board that starts prints some lines
+/// for people first, and a serial line tears one now and then.
+const FRAMES: u64 = 5;
+const FRAMES_FOR: Duration = Duration::from_secs(1);
+/// Frames in a row that are reported whatever the time: a stream may come at any pace.
+const MANY_FRAMES: u64 = 100;
+/// Silence that is reported: longer than a board takes to start that was reset by opening its port.
+const SILENCE: Duration = Duration::from_secs(3);
+/// Least silence in periods of the readings.
+const PERIODS: f64 = 5.0;
+
+/// Watch over the feed of a session.
+#[derive(Debug, Default)]
+pub struct FeedWatch {
+    state: FeedState,
+    /// Instant of the last reading, or else of the opening.
+    since: Duration,
+    /// Counts of the session at the last look.
+    readings: u64,
+    bad_frames: u64,
+    /// Frames and bytes since the last reading, or the opening.
+    frames: u64,
+    bytes: u64,
+    /// True for messages, which a board may send at changes only.
+    has_messages: bool,
+    is_reported: bool,
+}
+
+/// State of a source.
+#[derive(Debug, Default, PartialEq, Eq)]
+enum FeedState {
+    /// Not opened yet.
+    #[default]
+    Away,
+    Open,
+    /// Ended by itself.
+    Ended,
+    /// Lost, for this reason.
+    Lost(String),
+}
+
+impl FeedWatch {
+    /// Takes an arrival that the session has taken.
+    pub fn receive(&mut self, arrived: &Arrived, session: &Session) {
+        let at = arrived.at.elapsed;
+        match &arrived.arrival {
+            Arrival::Opened(_) | Arrival::Joined(_) | Arrival::Piped(_) => {
+                *self = Self {
+                    state: FeedState::Open,
+                    since: at,
+                    readings: self.readings,
+                    bad_frames: self.bad_frames,
+                    ..Self::default()
+                };
+            }
+            Arrival::Lost(why) => self.state = FeedState::Lost(why.clone()),
+            Arrival::Bytes(bytes) => self.bytes += bytes.len() as u64,
+            Arrival::Message(bytes) => {
+                self.has_messages = true;
+                self.bytes += bytes.len() as u64;
+            }
+            Arrival::Ended if self.state == FeedState::Open => self.state = FeedState::Ended,
+            Arrival::Backlog(_) | Arrival::Ended => {}
+        }
+        let counters = session.counters();
+        let bad_frames = counters.bad_frames.values().sum();
+        self.frames += bad_frames - self.bad_frames;
+        self.bad_frames = bad_frames;
+        if counters.readings > self.readings {
+            self.readings = counters.readings;
+            (self.since, self.frames, self.bytes, self.is_reported) = (at, 0, 0, false);
+        }
+    }
+
+    /// Report that there are no readings, once in each stretch without any; `None` while there are.
+    pub fn report(&mut self, now: Duration, session: &Session) -> Option<String> {
+        let since = now.saturating_sub(self.since);
+        let is_fault = matches!(self.state, FeedState::Open | FeedState::Ended)
+            && (self.frames >= MANY_FRAMES
+                || (self.frames >= FRAMES && since >= FRAMES_FOR)
+                || (self.state == FeedState::Open && since >= longest_silence(session)));
+        if !is_fault || self.is_reported {
+            return None;
+        }
+        self.is_reported = true;
+        Some(format!("no readings: {}", self.reason(session)))
+    }
+
+    /// Fault of a session that ends now: that it had no reading at all, or none towards its end. `None` of one that had readings to its end.
+    pub fn fault(&self, session: &Session) -> Option<String> {
+        let is_cut_short = match &self.state {
+            FeedState::Lost(_) => true,
+            FeedState::Away => false,
+            FeedState::Open | FeedState::Ended => self.frames >= FRAMES || (self.is_reported && !self.has_messages),
+        };
+        match session.counters().readings {
+            0 => Some(format!("there was no reading: {}", self.reason(session))),
+            _ if is_cut_short => Some(format!("the readings ended early: {}", self.reason(session))),
+            _ => None,
+        }
+    }
+
+    /// Cause of the lack of readings, and its remedy.
+    fn reason(&self, session: &Session) -> String {
+        match &self.state {
+            FeedState::Lost(why) => return why.clone(),
+            FeedState::Away => return "the source did not open".to_owned(),
+            FeedState::Open | FeedState::Ended => {}
+        }
+        if let Some((cause, frame)) = session.last_bad_frame().filter(|_| self.frames > 0) {
+            let labels = session.channels().iter().map(|channel| channel.label.as_str());
+            let (cause, remedy) = (cause.describe(), cause.remedy(labels));
+            let frames = self.frames;
+            let are = if frames == 1 { "frame is" } else { "frames in a row are" };
+            return format!("{frames} {are} no reading: {cause}; the last is `{frame}`; {remedy}");
+        }
+        if self.bytes > 0 {
+            let (bytes, last) = (self.bytes, quote(session.unfinished()));
+            return format!("{bytes} bytes without the end of a line: `{last}`; check the baud rate");
+        }
+        if self.state == FeedState::Ended {
+            return "the source ended; check what sends to it".to_owned();
+        }
+        "the source is open and sends nothing; check that the board is on and sends to this port".to_owned()
+    }
+}
+
+fn longest_silence(session: &Session) -> Duration {
+    let rate_hz = session.rate_hz();
+    let periods = if rate_hz > 0.0 { Duration::from_secs_f64(PERIODS / rate_hz) } else { Duration::ZERO };
+    SILENCE.max(periods)
+}

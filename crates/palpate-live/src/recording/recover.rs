@@ -1,0 +1,78 @@
+//! A recording that was cut off or is damaged, rewritten with its index and summary.
+
+use super::recorder::{describe, options};
+use super::{PassedOver, Playback, RecordingError};
+use crate::whole_file;
+use mcap::McapError;
+use mcap::records::MessageHeader;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+/// Result of a recovery.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Recovery {
+    /// Readings in the new file.
+    pub readings: u64,
+    /// Messages in the new file, readings among them.
+    pub messages: u64,
+    /// True where the old file ended as it should.
+    pub was_whole: bool,
+    /// Fault for which the new file has no locator.
+    pub locator_fault: Option<String>,
+    /// Parts of the old file that are not in the new one.
+    pub passed_over: PassedOver,
+}
+
+/// Writes all messages that can be read of a recording into another file, which appears when it is whole.
+///
+/// # Errors
+/// [`RecordingError`] for a file that is no recording of palpate, or one that cannot be written.
+pub fn recover(from: &Path, to: &Path) -> Result<Recovery, RecordingError> {
+    let mut playback = Playback::open(from)?;
+    let mut recovery = None;
+    let written = whole_file::write_with(to, |file| {
+        recovery = Some(copy(&mut playback, file).map_err(io_error)?);
+        Ok(())
+    });
+    let failed = |error| RecordingError::File { verb: "write", path: to.display().to_string(), error };
+    written.map_err(failed)?;
+    recovery.ok_or_else(|| failed(std::io::ErrorKind::WriteZero.into()))
+}
+
+fn io_error(error: CopyError) -> std::io::Error {
+    match error {
+        CopyError::Write(McapError::Io(error)) => error,
+        other => std::io::Error::other(other),
+    }
+}
+
+/// Failure to copy messages.
+#[derive(Debug, thiserror::Error)]
+enum CopyError {
+    #[error(transparent)]
+    Read(#[from] RecordingError),
+    #[error(transparent)]
+    Write(#[from] McapError),
+}
+
+fn copy(playback: &mut Playback, file: &mut File) -> Result<Recovery, CopyError> {
+    let (locator, locator_fault) = match playback.locator() {
+        Ok(locator) => (Some(locator), None),
+        Err(error) => (None, Some(error.to_string())),
+    };
+    let mut writer = options(&playback.head().version).create(BufWriter::new(file))?;
+    let topics = describe(&mut writer, playback.head(), locator)?;
+    let (mut readings, mut messages) = (0, 0);
+    while let Some(message) = playback.next_message()? {
+        let time = message.unix_ns;
+        let (channel_id, sequence) = (topics[message.topic], message.sequence);
+        let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
+        writer.write_to_known_channel(&header, &message.data)?;
+        messages += 1;
+        readings += u64::from(message.topic == 0);
+    }
+    writer.finish()?;
+    let (was_whole, passed_over) = (playback.is_whole(), playback.passed_over().clone());
+    Ok(Recovery { readings, messages, was_whole, locator_fault, passed_over })
+}
