@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use palpate_live::recording::{Playback, read};
+use palpate_live::recording::{Playback, read, recover};
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
@@ -15,5 +15,6 @@ fuzz_target!(|bytes: &[u8]| {
     if let Ok(mut playback) = Playback::open(&PATH) {
         while let Ok(Some(_)) = playback.next_recorded() {}
         let _ = read(&PATH, 0.0, 1e9, 50);
+        let _ = recover(&PATH, &PATH.with_extension("recovered"));
     }
 });

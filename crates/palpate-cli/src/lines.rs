@@ -22,6 +22,8 @@ pub struct Lines {
     line: Vec<u8>,
     /// True where a CR has ended the last line: an LF behind it belongs to the same end.
     after_cr: bool,
+    /// Lines that gave values.
+    parsed: u64,
     /// Lines that gave nothing.
     lost: u64,
     records: Records,
@@ -48,7 +50,16 @@ impl Lines {
     /// The lines of a file; `-` is stdin.
     pub fn open(path: &Path, records: Records) -> Result<Self, Failure> {
         let source = Chunks::open(path)?;
-        Ok(Self { count: 0, source, chunk: (Vec::new(), 0), line: Vec::new(), after_cr: false, lost: 0, records })
+        Ok(Self {
+            count: 0,
+            source,
+            chunk: (Vec::new(), 0),
+            line: Vec::new(),
+            after_cr: false,
+            parsed: 0,
+            lost: 0,
+            records,
+        })
     }
 
     /// Name of the source.
@@ -121,9 +132,12 @@ impl Lines {
         self.lost == 0
     }
 
-    /// The failure that some lines gave no such `answer`, if they did not.
+    /// The failure that some lines gave no such `answer`, or that no line held a reading.
     pub fn finish(&self, answer: &str) -> Result<(), Failure> {
         match self.lost {
+            0 if self.parsed == 0 => {
+                Err(Failure::DataLost(format!("{} holds a header and no reading", self.name())))
+            }
             0 => Ok(()),
             lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no {answer}", self.count))),
         }
@@ -172,6 +186,7 @@ impl<P: LineParser> Parsing<P> {
         match line.map(|line| self.parser.parse_line(line)) {
             Ok(Ok(parsed)) => {
                 if parsed.is_some() {
+                    lines.parsed += 1;
                     self.note.say(self.parser.progress().dialect());
                 }
                 return Ok(Some(parsed));

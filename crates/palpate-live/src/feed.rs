@@ -98,7 +98,9 @@ impl FeedWatch {
         let is_cut_short = match &self.state {
             FeedState::Lost(_) => true,
             FeedState::Away => false,
-            FeedState::Open | FeedState::Ended => self.frames >= FRAMES || (self.is_reported && !self.has_messages),
+            FeedState::Open | FeedState::Ended => {
+                self.frames >= FRAMES || (self.is_reported && !self.has_messages)
+            }
         };
         match session.counters().readings {
             0 => Some(format!("there was no reading: {}", self.reason(session))),

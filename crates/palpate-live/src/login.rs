@@ -44,7 +44,8 @@ impl Login {
             Some((user, password)) => (user, Some(password)),
             None => (text, None),
         };
-        const PERCENT: &str = "in user name and password `%` must begin two hexadecimal digits, as in `%40` for `@`";
+        const PERCENT: &str =
+            "in user name and password `%` must begin two hexadecimal digits, as in `%40` for `@`";
         let user = decoded(user).ok_or(PERCENT)?;
         if user.is_empty() {
             return Err("the user name before `@` is empty");
@@ -124,7 +125,9 @@ pub fn without_passwords(message: &str) -> String {
     while let Some(start) = rest.find("://") {
         let (before, after) = rest.split_at(start + 3);
         shown.push_str(before);
-        let end = after.find(|letter: char| letter.is_whitespace() || "`'\"".contains(letter)).unwrap_or(after.len());
+        let end = after
+            .find(|letter: char| letter.is_whitespace() || "`'\"".contains(letter))
+            .unwrap_or(after.len());
         let url = &after[..end];
         match (url.find(':'), url.rfind('@')) {
             (Some(colon), Some(at)) if colon < at => {

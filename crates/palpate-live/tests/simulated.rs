@@ -4,6 +4,7 @@ use palpate_core::Status;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::event::Event;
+use palpate_live::feed::FeedWatch;
 use palpate_live::input::{Arrival, Arrived};
 use palpate_live::sample::Sample;
 use palpate_live::session::{CreepConfig, Estimation, Output, Session, SessionConfig};
@@ -314,4 +315,62 @@ fn a_session_that_cannot_be_had_is_refused_with_the_reason() {
     let centroid = centroid.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
     let kind = refused(&centroid, Estimation::Track { frequency_hz: None, creep: None });
     assert!(kind.contains("influence locator"), "{kind}");
+}
+
+/// A session and the watch over its feed, by virtual time.
+struct FeedBench<'a> {
+    session: Session<'a>,
+    feed: FeedWatch,
+}
+
+impl FeedBench<'_> {
+    /// The report, if any, after an arrival at some time.
+    fn report_after(&mut self, ms: u64, arrival: Arrival) -> Option<String> {
+        let elapsed = Duration::from_millis(ms);
+        let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
+        let arrived = Arrived { at, arrival };
+        self.session.receive(&arrived, &mut Vec::new());
+        self.feed.receive(&arrived, &self.session);
+        self.feed.report(elapsed, &self.session)
+    }
+
+    fn report_at(&mut self, ms: u64) -> Option<String> {
+        self.feed.report(Duration::from_millis(ms), &self.session)
+    }
+}
+
+#[test]
+fn a_feed_without_readings_is_reported_once_and_with_its_cause() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let locator = locator(&rig);
+    let session = Session::new(&locator, &SessionConfig::default()).unwrap();
+    let mut bench = FeedBench { session, feed: FeedWatch::default() };
+    let bytes = |text: &str| Arrival::Bytes(text.as_bytes().to_vec());
+    assert_eq!(bench.report_after(0, Arrival::Opened("board".to_owned())), None);
+    assert_eq!(bench.report_at(2900), None);
+    let report = bench.report_at(3000).unwrap();
+    assert!(report.contains("sends nothing"), "{report}");
+    assert_eq!(bench.report_at(9000), None, "it is reported once");
+    // A board that starts prints some lines first.
+    assert_eq!(bench.report_after(10_000, Arrival::Joined("board".to_owned())), None);
+    assert_eq!(bench.report_after(10_500, bytes("boot\nboot\nboot\nboot\nboot\nboot\n")), None);
+    assert_eq!(bench.report_after(10_900, bytes("0,0,0,0,0,0,0,0\n")), None);
+    assert!(bench.feed.fault(&bench.session).is_none());
+    // A channel vanishes.
+    assert_eq!(bench.report_after(11_000, bytes(&"0,0,0,0,0,0,0\n".repeat(50))), None);
+    let report = bench.report_after(11_900, bytes("0,0,0,0,0,0,0\n")).unwrap();
+    assert!(report.contains("51 frames in a row are no reading: another number of values"), "{report}");
+    assert!(report.contains("`0,0,0,0,0,0,0`"), "{report}");
+    assert_eq!(bench.report_after(12_900, bytes("0,0,0,0,0,0,0\n")), None, "it is reported once");
+    assert!(bench.feed.fault(&bench.session).unwrap().contains("the readings ended early: 52 frames"));
+    // It comes back, and the baud rate changes.
+    assert_eq!(bench.report_after(13_000, bytes("0,0,0,0,0,0,0,0\n")), None);
+    assert_eq!(bench.report_after(13_100, bytes(&"\u{7F}~".repeat(60))), None);
+    let report = bench.report_at(16_000).unwrap();
+    assert!(
+        report.contains("120 bytes without the end of a line") && report.contains("baud rate"),
+        "{report}"
+    );
+    assert_eq!(bench.report_after(17_000, Arrival::Lost("unplugged".to_owned())), None);
+    assert_eq!(bench.feed.fault(&bench.session).unwrap(), "the readings ended early: unplugged");
 }

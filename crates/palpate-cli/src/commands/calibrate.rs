@@ -362,7 +362,8 @@ fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
 /// Fits the rig's estimator to the presses on disk, and says how good it is and what more presses would gain.
 fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure> {
     if !arguments.presses.exists() {
-        let words = "the calibration ended before any press, so there is nothing to fit; run it again and press";
+        let words =
+            "the calibration ended before any press, so there is nothing to fit; run it again and press";
         return Err(Failure::GoalMissed(words.to_owned()));
     }
     let recording = input::read_recording(&rig.setup, &arguments.presses)?;

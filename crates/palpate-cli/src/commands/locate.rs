@@ -57,9 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !arguments.json {
         output::print(&mut out, heading(extent).as_bytes())?;
     }
-    let mut count = 0_u64;
     while let Some(mut reading) = readings.next()? {
-        count += 1;
         let estimate = match locate(&locator, taring.as_mut(), &mut reading) {
             Ok(estimate) => estimate,
             Err(error) => {
@@ -89,11 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(taring) = &taring {
         taring.finish(readings.lines.name())?;
     }
-    readings.lines.finish("estimate")?;
-    match count {
-        0 => Err(Failure::DataLost(format!("{} holds a header and no reading", readings.lines.name()))),
-        _ => Ok(()),
-    }
+    readings.lines.finish("estimate")
 }
 
 /// The estimate of a reading; `None` of one that is taken for an untouched one.

@@ -161,12 +161,7 @@ fn by_another(
 }
 
 /// Fails where parts of the recording could not be read, or where it holds no such `record`; says what it holds of other programs.
-fn check_losses(
-    arguments: &Arguments,
-    playback: &Playback,
-    count: u64,
-    record: &str,
-) -> Result<(), Failure> {
+fn check_losses(arguments: &Arguments, playback: &Playback, count: u64, record: &str) -> Result<(), Failure> {
     let passed_over = playback.passed_over();
     if passed_over.foreign > 0 {
         remark!("{} messages on topics of other programs are left out", format_count(passed_over.foreign));

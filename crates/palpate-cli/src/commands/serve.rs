@@ -2,6 +2,7 @@
 
 use super::calibrate::{about_journal, pressed_before, pressed_for, stage};
 use super::outlets::Outlets;
+use super::record::Words;
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RigOrLocator};
 use crate::progress::{self, Observer};
@@ -99,7 +100,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let access =
         Access::new(arguments.listen, token.clone(), arguments.host_name.clone()).map_err(refused)?;
-    let sinks = arguments.outlets.open()?;
+    let mut sinks = arguments.outlets.open()?;
+    sinks.push(Box::new(|_, _, _| Ok(Box::new(Words))));
     let live = match calibration(arguments)? {
         Some(plan) => {
             let commanding = commands(arguments, plan.rig.setup.surface().extent())?;

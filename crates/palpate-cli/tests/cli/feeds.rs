@@ -51,7 +51,10 @@ const READING: &str = "100.5,200.5,300.0,399.7\n";
 fn a_session_without_a_reading_fails_with_the_cause_and_the_last_line() {
     let cases: [(&[u8], &[&str]); 6] = [
         (b"", &["there was no reading: the source ended"]),
-        (b"hello\n", &["1 frame is no reading: a value is no number; the last is `hello`; print a decimal number"]),
+        (
+            b"hello\n",
+            &["1 frame is no reading: a value is no number; the last is `hello`; print a decimal number"],
+        ),
         (b"1,2,3\n", &["another number of values", "the last is `1,2,3`", "columns="]),
         (b"S1:1,S2:2,S3:3,X:4\n", &["a channel is missing", "the last is `S1:1,S2:2,S3:3,X:4`"]),
         (b"\x80\xFE\x07\xFF", &["not text", "the last is `\\x80\\xFE\\x07\\xFF`", "check the baud rate"]),
@@ -62,7 +65,9 @@ fn a_session_without_a_reading_fails_with_the_cause_and_the_last_line() {
         assert!(expected.iter().all(|words| said.contains(words)), "{expected:?}: {said}");
         assert!(said.trim().lines().count() <= 3, "{said}");
     }
-    assert!(record_from("missing.mcap", "serial:///dev/palpate-none").contains("cannot open /dev/palpate-none"));
+    assert!(
+        record_from("missing.mcap", "serial:///dev/palpate-none").contains("cannot open /dev/palpate-none")
+    );
     let server = TcpListener::bind("127.0.0.1:0").unwrap();
     let silent = record_from("silent.mcap", &format!("tcp://{}", server.local_addr().unwrap()));
     assert!(silent.contains("sends nothing; check that the board is on"), "{silent}");
@@ -97,7 +102,10 @@ fn lines_that_end_at_carriage_returns_are_read() {
     let file = fs::read(field("cr.csv")).unwrap();
     let located = said(&run_with(&["locate", "locator.json", "-"], &file));
     assert_eq!(located.lines().count(), 70, "{located}");
-    assert_eq!(located, said(&run(BENCH.path(), &["locate", "locator.json", field("cr.csv").to_str().unwrap()])));
+    assert_eq!(
+        located,
+        said(&run(BENCH.path(), &["locate", "locator.json", field("cr.csv").to_str().unwrap()]))
+    );
     let mixed = String::from_utf8(file).unwrap().replace('\r', "\r\n");
     assert_eq!(said(&run_with(&["locate", "locator.json", "-"], mixed.as_bytes())), located);
     let none = complained(&run_with(&["locate", "locator.json", "-"], b"S1,S2,S3,S4\n"), 3);
@@ -106,7 +114,8 @@ fn lines_that_end_at_carriage_returns_are_read() {
 
 #[test]
 fn piped_readings_have_the_times_of_the_board() {
-    let lines: String = (0..500).map(|i| format!("ms:{},S1:100,S2:200,S3:300,S4:40{}\n", 20 * i, i % 3)).collect();
+    let lines: String =
+        (0..500).map(|i| format!("ms:{},S1:100,S2:200,S3:300,S4:40{}\n", 20 * i, i % 3)).collect();
     let output = record("piped.mcap", lines.as_bytes());
     said_ok(&output);
     let summary = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -135,7 +144,10 @@ fn blocks_that_cannot_be_read_are_counted_with_the_fault() {
     let mut unknown = bytes.clone();
     unknown[at..at + 4].copy_from_slice(b"brot");
     let said = complained(&replay(&unknown), 3);
-    assert!(said.contains("it holds no estimate") && said.contains("compression `brot` is unknown"), "{said}");
+    assert!(
+        said.contains("it holds no estimate") && said.contains("compression `brot` is unknown"),
+        "{said}"
+    );
     assert!(said.contains("with 59 readings cannot be read"), "{said}");
     // The checksum stands before the length and the name of the compression.
     let mut checksum = bytes.clone();
@@ -145,6 +157,14 @@ fn blocks_that_cannot_be_read_are_counted_with_the_fault() {
     let mut damaged = bytes;
     damaged[at + 40..at + 60].fill(0xFF);
     complained(&replay(&damaged), 3);
+    // Of messages outside chunks the checksum is that of the file, in the record before the summary; 0 stands for none.
+    let mut loose = fs::read(field("nochunk.mcap")).unwrap();
+    let end = loose.windows(9).rposition(|window| window == [0x0F, 4, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+    loose[end + 9..end + 13].copy_from_slice(&0xE13C_A399_u32.to_le_bytes());
+    said_ok(&replay(&loose));
+    loose[end + 9] ^= 1;
+    let said = complained(&replay(&loose), 3);
+    assert!(said.contains("its bytes do not match its checksum"), "{said}");
     let said = complained(&replay(b"S1,S2,S3,S4\n1,2,3,4\n"), 2);
     assert!(said.contains("is no MCAP file"), "{said}");
 }
@@ -164,7 +184,10 @@ fn a_recording_that_was_killed_is_recovered() {
     let (after, words) = replayed("recovered.mcap");
     assert_eq!(before, after);
     let count = after.lines().count() - 1;
-    assert!(count > 1000 && words.starts_with(&format!("{},{:03} estimates", count / 1000, count % 1000)), "{words}");
+    assert!(
+        count > 1000 && words.starts_with(&format!("{},{:03} estimates", count / 1000, count % 1000)),
+        "{words}"
+    );
     assert!(recovered.contains(&format!("{},{:03} readings", count / 1000, count % 1000)), "{recovered}");
     // A summary at the end: a footer that says where it begins.
     let bytes = fs::read(BENCH.path().join("recovered.mcap")).unwrap();
@@ -176,7 +199,9 @@ fn a_recording_that_was_killed_is_recovered() {
 
 #[test]
 fn passwords_are_in_no_message() {
-    for url in ["mqtt://me:hunter2@h/a/#/b", "mqtt://me:hun/ter2@h/a", "ftp://me:hunter2@h", "mqtt://me:hunter2@"] {
+    for url in
+        ["mqtt://me:hunter2@h/a/#/b", "mqtt://me:hun/ter2@h/a", "ftp://me:hunter2@h", "mqtt://me:hunter2@"]
+    {
         for option in ["--from", "--mqtt"] {
             let from = if option == "--from" { &[][..] } else { &["--from", "-"] };
             let arguments = [&["record", "locator.json", "--out", "never.mcap", option, url], from].concat();

@@ -216,12 +216,11 @@ impl Calibration {
     /// A note where the last of many frames was no reading either, for this cause.
     fn unread(&self, cause: BadFrame) -> Option<Note> {
         let is_time = self.readings == 0 && self.bad.values().sum::<u64>() == UNREAD;
-        is_time
-            .then(|| {
-                let words = cause.explain_no_reading(UNREAD, self.labels.iter().map(String::as_str));
-                let last = self.decoder.last_bad().unwrap_or_default();
-                Note::Unread(format!("{words}; the last is `{last}`"))
-            })
+        is_time.then(|| {
+            let words = cause.explain_no_reading(UNREAD, self.labels.iter().map(String::as_str));
+            let last = self.decoder.last_bad().unwrap_or_default();
+            Note::Unread(format!("{words}; the last is `{last}`"))
+        })
     }
 
     fn add(&mut self, at: Duration, reading: &[f64], notes: &mut Vec<Note>) -> Result<(), CalibrationError> {

@@ -228,7 +228,7 @@ impl Decoder {
     fn receive_text(&mut self, bytes: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) -> usize {
         // Most lines are whole in the bytes, and need no copy.
         if self.held.is_empty()
-            && let Some(end) = bytes.iter().take(LONGEST_LINE + 1).position(is_line_end)
+            && let Some(end) = find_line_end(&bytes[..bytes.len().min(LONGEST_LINE + 1)])
         {
             // The second byte of a line end is an empty line, which is nothing.
             if end > 0 {
@@ -394,6 +394,16 @@ impl Decoder {
     }
 }
 
+/// Place of the first end of a line. Bytes are looked at sixteen at a time, which compilers do in one instruction.
+fn find_line_end(bytes: &[u8]) -> Option<usize> {
+    let (chunks, rest) = bytes.as_chunks::<16>();
+    let has_end = |chunk: &[u8; 16]| chunk.iter().fold(false, |found, byte| found | is_line_end(byte));
+    match chunks.iter().position(has_end) {
+        Some(i) => chunks[i].iter().position(is_line_end).map(|at| 16 * i + at),
+        None => rest.iter().position(is_line_end).map(|at| bytes.len() - rest.len() + at),
+    }
+}
+
 /// True for a byte that ends a line: LF, or CR, behind which LF may follow.
 fn is_line_end(byte: &u8) -> bool {
     matches!(byte, b'\n' | b'\r')
@@ -455,7 +465,9 @@ mod tests {
         assert_eq!(decoder.last_bad().as_deref(), Some("hello\\tworld"));
         received(&mut decoder, &vec![b'7'; 2 * LONGEST_LINE]);
         assert_eq!(decoder.last_bad().unwrap().chars().count(), 80);
-        decoder.receive_message(&vec![b'8'; LONGEST_MESSAGE + 1], |frame| assert_eq!(frame, Err(BadFrame::TooLong)));
+        decoder.receive_message(&vec![b'8'; LONGEST_MESSAGE + 1], |frame| {
+            assert_eq!(frame, Err(BadFrame::TooLong))
+        });
         assert!(decoder.last_bad().unwrap().starts_with("888"));
     }
 

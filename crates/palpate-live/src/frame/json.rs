@@ -2,7 +2,6 @@
 
 use super::names::{Filling, Names, Role};
 use super::{BadFrame, Frame};
-use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
@@ -49,12 +48,15 @@ impl<'de> Visitor<'de> for Values<'_, '_> {
     fn visit_seq<A: SeqAccess<'de>>(self, mut values: A) -> Result<Self::Value, A::Error> {
         let mut verdict = Ok(());
         let mut roles = self.columns.iter();
-        while let Some(value) = values.next_element::<Value>()? {
-            let role = roles.next().ok_or(BadFrame::Channels);
-            verdict = verdict.and(role.and_then(|role| set(self.frame, *role, &value)));
+        loop {
+            let role = roles.next();
+            let value = Value { frame: self.frame, role: role.copied().unwrap_or(Role::Ignored) };
+            let Some(outcome) = values.next_element_seed(value)? else {
+                let complete = if role.is_none() { Ok(()) } else { Err(BadFrame::Channels) };
+                return Ok(verdict.and(complete));
+            };
+            verdict = verdict.and(if role.is_some() { outcome } else { Err(BadFrame::Channels) });
         }
-        let complete = if roles.next().is_none() { Ok(()) } else { Err(BadFrame::Channels) };
-        Ok(verdict.and(complete))
     }
 }
 
@@ -76,20 +78,9 @@ impl<'de, R: FnMut(usize, &[u8]) -> Role> Visitor<'de> for Members<'_, '_, R> {
         for i in 0.. {
             let name = Name { i, role: &mut self.role };
             let Some(role) = members.next_key_seed(name)? else { break };
-            let value: Value = members.next_value()?;
-            verdict = verdict.and(set(self.frame, role, &value));
+            verdict = verdict.and(members.next_value_seed(Value { frame: self.frame, role })?);
         }
         Ok(verdict)
-    }
-}
-
-fn set(frame: &mut Filling, role: Role, value: &Value) -> Result<(), BadFrame> {
-    match (role, value) {
-        (Role::Ignored, _) => Ok(()),
-        (Role::Time(_), Value::Text(text)) if frame.set_time_text(text.as_bytes()) => Ok(()),
-        (_, Value::Other) => Err(BadFrame::NotANumber),
-        (role, Value::Number(value)) => frame.set(role, *value),
-        (role, Value::Text(text)) => frame.set(role, text.trim().parse().map_err(|_| BadFrame::NotANumber)?),
     }
 }
 
@@ -119,60 +110,70 @@ impl<R: FnMut(usize, &[u8]) -> Role> Visitor<'_> for Name<'_, R> {
     }
 }
 
-/// A value of JSON.
-enum Value {
-    Number(f64),
-    /// Text, which may be a number in quotes or a time.
-    Text(String),
-    Other,
+/// Reader of a value, which it sets by its role: a number, in quotes or not, or a time in quotes. Anything else is no number.
+struct Value<'a, 'f> {
+    frame: &'a mut Filling<'f>,
+    role: Role,
 }
 
-impl<'de> Deserialize<'de> for Value {
-    fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
-        json.deserialize_any(AnyValue)
+impl Value<'_, '_> {
+    fn no_number(&self) -> Result<(), BadFrame> {
+        if self.role == Role::Ignored { Ok(()) } else { Err(BadFrame::NotANumber) }
     }
 }
 
-struct AnyValue;
+impl<'de> DeserializeSeed<'de> for Value<'_, '_> {
+    type Value = Result<(), BadFrame>;
 
-impl<'de> Visitor<'de> for AnyValue {
-    type Value = Value;
+    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<Self::Value, D::Error> {
+        json.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Value<'_, '_> {
+    type Value = Result<(), BadFrame>;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str("a value")
     }
 
-    fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
-        Ok(Value::Number(value))
+    fn visit_f64<E>(self, value: f64) -> Result<Self::Value, E> {
+        Ok(self.frame.set(self.role, value))
     }
 
-    fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
-        Ok(Value::Number(value as f64))
+    fn visit_u64<E>(self, value: u64) -> Result<Self::Value, E> {
+        Ok(self.frame.set(self.role, value as f64))
     }
 
-    fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
-        Ok(Value::Number(value as f64))
+    fn visit_i64<E>(self, value: i64) -> Result<Self::Value, E> {
+        Ok(self.frame.set(self.role, value as f64))
     }
 
-    fn visit_bool<E>(self, _: bool) -> Result<Value, E> {
-        Ok(Value::Other)
+    fn visit_bool<E>(self, _: bool) -> Result<Self::Value, E> {
+        Ok(self.no_number())
     }
 
-    fn visit_unit<E>(self) -> Result<Value, E> {
-        Ok(Value::Other)
+    fn visit_unit<E>(self) -> Result<Self::Value, E> {
+        Ok(self.no_number())
     }
 
-    fn visit_str<E>(self, text: &str) -> Result<Value, E> {
-        Ok(Value::Text(text.to_owned()))
+    fn visit_str<E>(self, text: &str) -> Result<Self::Value, E> {
+        if matches!(self.role, Role::Time(_)) && self.frame.set_time_text(text.as_bytes()) {
+            return Ok(Ok(()));
+        }
+        match text.trim().parse() {
+            Ok(value) => Ok(self.frame.set(self.role, value)),
+            Err(_) => Ok(self.no_number()),
+        }
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut values: A) -> Result<Value, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut values: A) -> Result<Self::Value, A::Error> {
         while values.next_element::<IgnoredAny>()?.is_some() {}
-        Ok(Value::Other)
+        Ok(self.no_number())
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<Value, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<Self::Value, A::Error> {
         while members.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
-        Ok(Value::Other)
+        Ok(self.no_number())
     }
 }

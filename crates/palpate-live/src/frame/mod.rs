@@ -81,11 +81,15 @@ impl BadFrame {
         let labels: Vec<&str> = labels.into_iter().collect();
         let labels = labels.join("`, `");
         match self {
-            Self::Channels => format!("print one value for each of `{labels}`, or name the values in columns="),
+            Self::Channels => {
+                format!("print one value for each of `{labels}`, or name the values in columns=")
+            }
             Self::MissingChannel => {
                 format!("name `{labels}` as the board does, in the rig or in columns= of the source")
             }
-            Self::NotANumber => format!("print a decimal number for each of `{labels}`, with commas between them"),
+            Self::NotANumber => {
+                format!("print a decimal number for each of `{labels}`, with commas between them")
+            }
             Self::OtherUnit => "print all values of a channel in one unit".to_owned(),
             Self::TooLong => "end every reading with a line feed, and check the baud rate".to_owned(),
             Self::Encoding => "check the baud rate, or that the board sends text".to_owned(),

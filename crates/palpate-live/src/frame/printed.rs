@@ -137,8 +137,8 @@ fn strip_brackets(line: &str) -> Option<&str> {
 
 /// Words that stand where a number should be, and are no units.
 const NO_NUMBERS: [&str; 16] = [
-    "nan", "inf", "infinity", "ovf", "ovl", "ovr", "over", "overflow", "overload", "err", "error", "fault", "null",
-    "none", "na", "ol",
+    "nan", "inf", "infinity", "ovf", "ovl", "ovr", "over", "overflow", "overload", "err", "error", "fault",
+    "null", "none", "na", "ol",
 ];
 
 /// True for a word that may be the symbol of a unit: `mV`, `°C`, `%`, `m/s2`.
@@ -154,7 +154,11 @@ fn is_unit(word: &str) -> bool {
 const SEPARATORS: [char; 4] = [',', ';', '|', '\t'];
 
 /// The items of a line, with decimal commas or without; `None` where some of its text has no plain meaning. `is_name` is true of known names.
-pub fn items<'a>(line: &'a str, decimal_comma: bool, is_name: impl Fn(&str) -> bool) -> Option<Vec<Item<'a>>> {
+pub fn items<'a>(
+    line: &'a str,
+    decimal_comma: bool,
+    is_name: impl Fn(&str) -> bool,
+) -> Option<Vec<Item<'a>>> {
     let mut items: Vec<Item> = Vec::new();
     let mut rest = line;
     while let Some((start, end)) = next_number(rest, decimal_comma) {
@@ -346,7 +350,9 @@ mod tests {
         ] {
             assert_eq!(without_prefix(line), "1,2", "{line}");
         }
-        for line in ["[ERROR] 1,2", "E (1234) main: 1,2", "ERROR: 1,2", "10:11,2", "[1][W][x.cpp] 1,2", "12 34"] {
+        for line in
+            ["[ERROR] 1,2", "E (1234) main: 1,2", "ERROR: 1,2", "10:11,2", "[1][W][x.cpp] 1,2", "12 34"]
+        {
             assert_eq!(without_prefix(line), line);
         }
     }
@@ -378,7 +384,9 @@ mod tests {
         for (line, expected) in lines {
             assert_eq!(parts(line), Some(expected), "{line}");
         }
-        for line in ["1,,2", "hello 5 world is 6", "1 nan", "x", "1 2 3-4", "153 220 and more of it", "ovf, 2", "a b"] {
+        for line in
+            ["1,,2", "hello 5 world is 6", "1 nan", "x", "1 2 3-4", "153 220 and more of it", "ovf, 2", "a b"]
+        {
             assert_eq!(parts(line), None, "{line}");
         }
     }
@@ -398,7 +406,9 @@ mod tests {
         assert_eq!(time_s("1970-01-01T00:00:01.250Z"), Some(1.25));
         assert_eq!(time_s("2000-03-01 00:00:00.000"), Some(951_868_800.0));
         assert_eq!(time_s("10:11:12.500"), Some(36_672.5));
-        for text in ["2026-03-02T10:11:12", "10:11:12", "12.500", "x", "2026-03-02T10:11:12.500x", "2026-03-02", ""] {
+        for text in
+            ["2026-03-02T10:11:12", "10:11:12", "12.500", "x", "2026-03-02T10:11:12.500x", "2026-03-02", ""]
+        {
             assert_eq!(time_s(text), None, "{text}");
         }
     }

@@ -142,7 +142,8 @@ impl TextReader {
         }
         for (role, item) in &values {
             let value = printed::value(item.value).ok_or(BadFrame::NotANumber)?;
-            let factor = if item.unit.is_empty() { 1.0 } else { factor(&self.names, &self.units, *role, item.unit)? };
+            let factor =
+                if item.unit.is_empty() { 1.0 } else { factor(&self.names, &self.units, *role, item.unit)? };
             frame.set(*role, value * factor)?;
         }
         let frame = frame.finish()?;
@@ -277,8 +278,19 @@ fn role_of(names: &Names, known: &mut Vec<(Vec<u8>, Role)>, i: usize, name: &[u8
 /// True for a label of values in general, such as `Reading` or `HX711 reading`, which says no more than that they are readings.
 fn is_general_label(label: &str) -> bool {
     const LABELS: [&str; 13] = [
-        "adc", "channel", "channels", "data", "measurement", "output", "raw", "reading", "readings", "sample",
-        "sensor", "value", "values",
+        "adc",
+        "channel",
+        "channels",
+        "data",
+        "measurement",
+        "output",
+        "raw",
+        "reading",
+        "readings",
+        "sample",
+        "sensor",
+        "value",
+        "values",
     ];
     let is_part = |letter: char| letter.is_ascii_alphanumeric() || " _-".contains(letter);
     let word = label.rsplit([' ', '_', '-']).next().unwrap_or_default();
@@ -562,7 +574,10 @@ mod tests {
     fn single_values_have_units_and_labels() {
         for line in ["446.45 mV", "Reading: 446.45", "HX711 reading: 446.45 mV", "a:446.45", "[12] 446.45"] {
             let read = one_channel().read(line.as_bytes());
-            assert!(matches!(&read, Ok(Line::Whole(frame) | Line::Unnamed(frame)) if frame.reading == [446.45]), "{line}: {read:?}");
+            assert!(
+                matches!(&read, Ok(Line::Whole(frame) | Line::Unnamed(frame)) if frame.reading == [446.45]),
+                "{line}: {read:?}"
+            );
         }
         for line in ["Temperature: 21.5", "b: 1", "two 2", "446,45 mV and more"] {
             assert!(one_channel().read(line.as_bytes()).is_err(), "{line}");
@@ -586,7 +601,9 @@ mod tests {
         channels[0].unit = Unit::from_symbol("um").unwrap();
         let mut reader = TextReader::new(Names::new(&channels));
         for (line, value_m) in [("5", 5e-6), ("5 um", 5e-6), ("a: 0.005 mm", 5e-6)] {
-            let Ok(Line::Unnamed(frame) | Line::Whole(frame)) = reader.read(line.as_bytes()) else { panic!("{line}") };
+            let Ok(Line::Unnamed(frame) | Line::Whole(frame)) = reader.read(line.as_bytes()) else {
+                panic!("{line}")
+            };
             assert!((frame.reading[0] / value_m - 1.0).abs() < 1e-12, "{line}: {:?}", frame.reading);
         }
         assert!(matches!(reader.read(b"5 N"), Err(BadFrame::OtherUnit)));

@@ -6,6 +6,7 @@ use super::whole_record::parse;
 use super::{LocatorFault, RecordingError};
 use crate::schemas::TOPICS;
 use crate::session::Estimation;
+use crc::{CRC_32_ISO_HDLC, Crc};
 use mcap::records::{Record, op};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -29,6 +30,8 @@ pub struct McapFile {
     pub blocks: Vec<Block>,
     /// True where it ends as it should.
     pub is_whole: bool,
+    /// Place of the record that ends the data, and the checksum of all bytes before it, where it has one.
+    data_checksum: Option<(u64, u32)>,
     /// Topic of each channel by its place in [`TOPICS`]; `None` of one that is no topic of palpate.
     channels: BTreeMap<u16, Option<usize>>,
 }
@@ -118,6 +121,7 @@ impl McapFile {
             locator: Err(LocatorFault::Missing),
             blocks: Vec::new(),
             is_whole: false,
+            data_checksum: None,
             channels: BTreeMap::new(),
         };
         own.look_through()?;
@@ -170,6 +174,13 @@ impl McapFile {
                 }
                 op::DATA_END | op::FOOTER => {
                     self.is_whole = true;
+                    if place.op == op::DATA_END && place.length == 4 {
+                        let checksum = self.body(place.at, 4)?.and_then(|bytes| bytes.first_chunk().copied());
+                        // 0 stands for none.
+                        let checksum = checksum.map(u32::from_le_bytes).filter(|checksum| *checksum != 0);
+                        self.data_checksum =
+                            checksum.map(|checksum| (place.at - RecordPlace::HEAD, checksum));
+                    }
                     break;
                 }
                 _ => {}
@@ -190,6 +201,22 @@ impl McapFile {
         self.head = Head::from_metadata(&metadata)
             .ok_or_else(|| lacks("its metadata do not say its channels and how readings were located"))?;
         Ok(())
+    }
+
+    /// Checks messages that stand outside chunks, which have checksums of their own, by the checksum of all data; true where there is nothing to check.
+    pub fn check_loose(&mut self) -> Result<bool, RecordingError> {
+        let is_loose = self.blocks.iter().any(|block| block.kind == BlockKind::Loose);
+        let Some((end, checksum)) = self.data_checksum.filter(|_| is_loose) else { return Ok(true) };
+        const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+        let mut digest = CRC.digest();
+        let mut at = 0;
+        while at < end {
+            let length = MOST_LOOSE.min(end - at);
+            let Some(bytes) = self.body(at, length)? else { return Ok(false) };
+            digest.update(&bytes);
+            at += length;
+        }
+        Ok(digest.finalize() == checksum)
     }
 
     fn check_magic(&mut self) -> Result<(), RecordingError> {
@@ -375,7 +402,11 @@ fn open_regular(path: &Path) -> std::io::Result<(File, u64)> {
     std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, nix::fcntl::OFlag::O_NONBLOCK.bits());
     let file = options.open(path)?;
     let found = file.metadata()?;
-    if found.is_file() { Ok((file, found.len())) } else { Err(std::io::Error::other("it is no regular file")) }
+    if found.is_file() {
+        Ok((file, found.len()))
+    } else {
+        Err(std::io::Error::other("it is no regular file"))
+    }
 }
 
 fn cannot(verb: &'static str, path: &str, error: std::io::Error) -> RecordingError {

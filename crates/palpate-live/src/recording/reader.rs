@@ -258,6 +258,8 @@ pub struct PassedOver {
     pub messages: u64,
     /// Messages on topics that are not of palpate.
     pub foreign: u64,
+    /// True where messages outside chunks, which are read all the same, do not match the checksum of the file.
+    pub is_altered: bool,
 }
 
 impl PassedOver {
@@ -265,10 +267,15 @@ impl PassedOver {
     pub fn loss(&self) -> Option<String> {
         let blocks = (self.blocks > 0).then(|| {
             let fault = self.fault.as_ref().map_or_else(String::new, |fault| format!(": {fault}"));
-            format!("{} blocks with {} readings cannot be read (the first{fault})", self.blocks, self.readings)
+            format!(
+                "{} blocks with {} readings cannot be read (the first{fault})",
+                self.blocks, self.readings
+            )
         });
         let messages = (self.messages > 0).then(|| format!("{} messages are damaged", self.messages));
-        let parts: Vec<String> = blocks.into_iter().chain(messages).collect();
+        let altered = "its bytes do not match its checksum, so that some messages may be wrong";
+        let altered = self.is_altered.then(|| altered.to_owned());
+        let parts: Vec<String> = blocks.into_iter().chain(messages).chain(altered).collect();
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 }
@@ -279,8 +286,9 @@ impl Playback {
     /// # Errors
     /// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        let file = McapFile::open(path)?;
-        Ok(Self { file, block: 0, messages: Vec::new().into_iter(), passed_over: PassedOver::default() })
+        let mut file = McapFile::open(path)?;
+        let passed_over = PassedOver { is_altered: !file.check_loose()?, ..PassedOver::default() };
+        Ok(Self { file, block: 0, messages: Vec::new().into_iter(), passed_over })
     }
 
     /// Its head: version, source, channels.

@@ -376,7 +376,8 @@ pub(super) fn describe<W: Write + Seek>(
     head: &Head,
     locator: Option<&str>,
 ) -> Result<[u16; 3], McapError> {
-    writer.write_metadata(&mcap::records::Metadata { name: METADATA.to_owned(), metadata: head.metadata() })?;
+    writer
+        .write_metadata(&mcap::records::Metadata { name: METADATA.to_owned(), metadata: head.metadata() })?;
     if let Some(locator) = locator {
         writer.attach(&Attachment {
             log_time: 0,

@@ -81,7 +81,9 @@ pub fn unpack_chunk(body: &[u8], mut hand_on: impl FnMut(Record)) -> Result<(), 
 
 fn fault_of(error: &McapError) -> BlockFault {
     match error {
-        McapError::UnsupportedCompression(name) => BlockFault::Compression(name.escape_debug().take(20).collect()),
+        McapError::UnsupportedCompression(name) => {
+            BlockFault::Compression(name.escape_debug().take(20).collect())
+        }
         McapError::BadChunkCrc { .. } => BlockFault::Checksum,
         _ => BlockFault::Damaged,
     }

@@ -32,9 +32,7 @@ pub struct MqttUrl {
 
 /// Text that is no URL of a broker.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "`{text}` is no broker with a topic, as in `mqtt://user@host:1883/bench/contact`: {problem}"
-)]
+#[error("`{text}` is no broker with a topic, as in `mqtt://user@host:1883/bench/contact`: {problem}")]
 pub struct MqttUrlError {
     /// The text.
     pub text: String,
@@ -46,10 +44,12 @@ impl FromStr for MqttUrl {
     type Err = MqttUrlError;
 
     fn from_str(text: &str) -> Result<Self, MqttUrlError> {
-        let error = |problem: &str| MqttUrlError { text: without_passwords(text), problem: problem.to_owned() };
+        let error =
+            |problem: &str| MqttUrlError { text: without_passwords(text), problem: problem.to_owned() };
         let (body, query) = text.split_once('?').unwrap_or((text, ""));
         let rest = body.strip_prefix("mqtt://").ok_or_else(|| error("it does not begin with mqtt://"))?;
         let (server, topic) = rest.split_once('/').ok_or_else(|| error("it has no topic"))?;
+        let topic = topic.trim_end_matches('/');
         if topic.is_empty() || topic.len() > 1000 || topic.contains(['+', '#', '\0']) {
             return Err(error("a topic has 1 to 1000 bytes, and none of + and #"));
         }
@@ -59,7 +59,7 @@ impl FromStr for MqttUrl {
             None => return Err(error("its only parameter is `password-file`")),
         };
         let (broker, login) = broker_and_login(server, topic, file).map_err(|problem| error(&problem))?;
-        Ok(Self { broker, login, topic: topic.trim_end_matches('/').to_owned() })
+        Ok(Self { broker, login, topic: topic.to_owned() })
     }
 }
 

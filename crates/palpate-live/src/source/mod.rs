@@ -10,9 +10,9 @@ mod tcp;
 mod udp;
 mod url;
 
-pub(crate) use mqtt::explain;
 pub use crate::commander::{Commander, SendError};
 pub use file::line;
+pub(crate) use mqtt::explain;
 pub(crate) use url::broker_and_login;
 pub use url::{Address, SourceUrl, SourceUrlError};
 

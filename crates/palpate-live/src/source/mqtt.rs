@@ -5,8 +5,8 @@ use crate::frame::LONGEST_MESSAGE;
 use crate::input::Arrival;
 use crate::login::PASSWORD_VARIABLE;
 use rumqttc::{
-    AsyncClient, ConnectReturnCode, ConnectionError, Event, EventLoop, MqttOptions, NetworkOptions, Packet, QoS,
-    SubscribeReasonCode,
+    AsyncClient, ConnectReturnCode, ConnectionError, Event, EventLoop, MqttOptions, NetworkOptions, Packet,
+    QoS, SubscribeReasonCode,
 };
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;

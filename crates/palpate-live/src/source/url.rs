@@ -368,7 +368,10 @@ mod tests {
             ("udp://:5000?columns=n,a", "udp://:5000?columns=n,a"),
             ("mqtt://broker/lab/+/values", "mqtt://broker:1883/lab/+/values"),
             ("mqtt://me:secret@broker/a", "mqtt://me@broker:1883/a"),
-            ("mqtt://me@broker/a?password-file=p&columns=a", "mqtt://me@broker:1883/a?password-file=p&columns=a"),
+            (
+                "mqtt://me@broker/a?password-file=p&columns=a",
+                "mqtt://me@broker:1883/a?password-file=p&columns=a",
+            ),
             ("simulated:rig.toml", "simulated:rig.toml?rate=100&seed=0"),
         ] {
             assert_eq!(shown(text), full);

@@ -59,12 +59,16 @@ fn a_serial_port_is_read_unplugged_and_read_again() {
 
 #[cfg(unix)]
 #[test]
-fn bytes_that_waited_for_a_serial_port_are_a_backlog() {
+fn a_serial_port_that_is_held_is_named_and_bytes_that_waited_are_a_backlog() {
     use serialport::{SerialPort, TTYPort};
     let (mut board, host) = TTYPort::pair().unwrap();
-    board.write_all(b"1,2\n3,").unwrap();
     let device = host.name().unwrap();
-    // The end of the pair stays open, as that of a board that is plugged in.
+    let bench = Bench::open(&format!("serial://{device}"));
+    let why = bench.lost();
+    assert!(why.contains("another program has it open"), "{why}");
+    drop(host);
+    drop(bench);
+    board.write_all(b"1,2\n3,").unwrap();
     let bench = Bench::open(&format!("serial://{device}"));
     bench.opened();
     assert_eq!(bench.next(), Arrival::Backlog(b"1,2\n3,".to_vec()));

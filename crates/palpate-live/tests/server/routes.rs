@@ -126,7 +126,9 @@ fn other_pages_and_other_names_are_refused() {
     assert_eq!(ask_from(&own), 409);
     assert_eq!(ask(&server, "GET", "/api/session", &[("Host", "example.org")], "").0, 403);
     let host = server.address().to_string();
-    for (hosts, status) in [([&host, &host], 400), ([&host, "example.org"], 400), (["example.org", &host], 400)] {
+    for (hosts, status) in
+        [([&host, &host], 400), ([&host, "example.org"], 400), (["example.org", &host], 400)]
+    {
         let headers = hosts.map(|host| ("Host", host));
         assert_eq!(ask(&server, "GET", "/api/session", &headers, "").0, status, "{hosts:?}");
     }
@@ -282,7 +284,8 @@ fn only_regular_files_are_recordings() {
     let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
     let live = Live::new(locator, "rig", None, PathBuf::new()).with_recordings(recordings);
     let address: SocketAddr = "127.0.0.1:0".parse().unwrap();
-    let server = Server::start(address, Access::new(address, None, Vec::new()).unwrap(), Arc::new(live)).unwrap();
+    let server =
+        Server::start(address, Access::new(address, None, Vec::new()).unwrap(), Arc::new(live)).unwrap();
     assert_eq!(get(&server, "/api/recordings"), (200, serde_json::json!([])));
     for name in ["link", "pipe", "folder"] {
         for path in [format!("/api/recordings/{name}.mcap"), format!("/api/recordings/{name}.mcap/file")] {
