@@ -1,7 +1,7 @@
 //! Watch over the feed of a session: notices when a source brings no readings, and says why.
 
 use crate::frame::quote;
-use crate::input::{Arrival, Arrived};
+use crate::input::Arrival;
 use crate::session::Session;
 use std::time::Duration;
 
@@ -22,11 +22,9 @@ pub struct FeedWatch {
     state: FeedState,
     /// Instant of the last reading, or else of the opening.
     since: Duration,
-    /// Counts of the session at the last look.
+    /// Readings of the session at the last look.
     readings: u64,
-    bad_frames: u64,
-    /// Frames and bytes since the last reading, or the opening.
-    frames: u64,
+    /// Bytes since the last reading, or the opening.
     bytes: u64,
     /// True for messages, which a board may send at changes only.
     has_messages: bool,
@@ -47,18 +45,12 @@ enum FeedState {
 }
 
 impl FeedWatch {
-    /// Takes an arrival that the session has taken.
-    pub fn receive(&mut self, arrived: &Arrived, session: &Session) {
-        let at = arrived.at.elapsed;
-        match &arrived.arrival {
+    /// Takes an arrival that the session has taken by `now`: time that the session needs is no silence.
+    pub fn receive(&mut self, arrival: &Arrival, now: Duration, session: &Session) {
+        match arrival {
             Arrival::Opened(_) | Arrival::Joined(_) | Arrival::Piped(_) => {
-                *self = Self {
-                    state: FeedState::Open,
-                    since: at,
-                    readings: self.readings,
-                    bad_frames: self.bad_frames,
-                    ..Self::default()
-                };
+                *self =
+                    Self { state: FeedState::Open, since: now, readings: self.readings, ..Self::default() };
             }
             Arrival::Lost(why) => self.state = FeedState::Lost(why.clone()),
             Arrival::Bytes(bytes) => self.bytes += bytes.len() as u64,
@@ -69,22 +61,20 @@ impl FeedWatch {
             Arrival::Ended if self.state == FeedState::Open => self.state = FeedState::Ended,
             Arrival::Backlog(_) | Arrival::Ended => {}
         }
-        let counters = session.counters();
-        let bad_frames = counters.bad_frames.values().sum();
-        self.frames += bad_frames - self.bad_frames;
-        self.bad_frames = bad_frames;
-        if counters.readings > self.readings {
-            self.readings = counters.readings;
-            (self.since, self.frames, self.bytes, self.is_reported) = (at, 0, 0, false);
+        let readings = session.counters().readings;
+        if readings > self.readings {
+            self.readings = readings;
+            (self.since, self.bytes, self.is_reported) = (now, 0, false);
         }
     }
 
     /// Report that there are no readings, once in each stretch without any; `None` while there are.
     pub fn report(&mut self, now: Duration, session: &Session) -> Option<String> {
         let since = now.saturating_sub(self.since);
+        let frames = session.bad_in_a_row();
         let is_fault = matches!(self.state, FeedState::Open | FeedState::Ended)
-            && (self.frames >= MANY_FRAMES
-                || (self.frames >= FRAMES && since >= FRAMES_FOR)
+            && (frames >= MANY_FRAMES
+                || (frames >= FRAMES && since >= FRAMES_FOR)
                 || (self.state == FeedState::Open && since >= longest_silence(session)));
         if !is_fault || self.is_reported {
             return None;
@@ -99,7 +89,8 @@ impl FeedWatch {
             FeedState::Lost(_) => true,
             FeedState::Away => false,
             FeedState::Open | FeedState::Ended => {
-                self.frames >= FRAMES || (self.is_reported && !self.has_messages)
+                session.bad_in_a_row() >= FRAMES
+                    || (self.state == FeedState::Open && self.is_reported && !self.has_messages)
             }
         };
         match session.counters().readings {
@@ -116,10 +107,10 @@ impl FeedWatch {
             FeedState::Away => return "the source did not open".to_owned(),
             FeedState::Open | FeedState::Ended => {}
         }
-        if let Some((cause, frame)) = session.last_bad_frame().filter(|_| self.frames > 0) {
+        if let Some((cause, frame)) = session.last_bad_frame().filter(|_| session.bad_in_a_row() > 0) {
             let labels = session.channels().iter().map(|channel| channel.label.as_str());
             let (cause, remedy) = (cause.describe(), cause.remedy(labels));
-            let frames = self.frames;
+            let frames = session.bad_in_a_row();
             let are = if frames == 1 { "frame is" } else { "frames in a row are" };
             return format!("{frames} {are} no reading: {cause}; the last is `{frame}`; {remedy}");
         }

@@ -65,7 +65,7 @@ pub fn run(
                     Arrival::Backlog(_) | Arrival::Bytes(_) | Arrival::Message(_) => {}
                 }
                 session.receive(&arrived, &mut outputs);
-                feed.receive(&arrived, session);
+                feed.receive(&arrived.arrival, clock.now().elapsed, session);
             }
             Ok(Input::Command(command)) => session.command(clock.now(), command, &mut outputs),
             Err(RecvTimeoutError::Timeout) => {}

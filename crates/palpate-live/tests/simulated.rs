@@ -330,7 +330,7 @@ impl FeedBench<'_> {
         let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
         let arrived = Arrived { at, arrival };
         self.session.receive(&arrived, &mut Vec::new());
-        self.feed.receive(&arrived, &self.session);
+        self.feed.receive(&arrived.arrival, elapsed, &self.session);
         self.feed.report(elapsed, &self.session)
     }
 
@@ -366,11 +366,12 @@ fn a_feed_without_readings_is_reported_once_and_with_its_cause() {
     // It comes back, and the baud rate changes.
     assert_eq!(bench.report_after(13_000, bytes("0,0,0,0,0,0,0,0\n")), None);
     assert_eq!(bench.report_after(13_100, bytes(&"\u{7F}~".repeat(60))), None);
-    let report = bench.report_at(16_000).unwrap();
+    assert_eq!(bench.report_at(16_000), None, "readings came every 2 s");
+    let report = bench.report_at(24_000).unwrap();
     assert!(
         report.contains("120 bytes without the end of a line") && report.contains("baud rate"),
         "{report}"
     );
-    assert_eq!(bench.report_after(17_000, Arrival::Lost("unplugged".to_owned())), None);
+    assert_eq!(bench.report_after(25_000, Arrival::Lost("unplugged".to_owned())), None);
     assert_eq!(bench.feed.fault(&bench.session).unwrap(), "the readings ended early: unplugged");
 }

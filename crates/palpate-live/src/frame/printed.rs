@@ -32,25 +32,26 @@ pub fn without_colours(line: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(plain)
 }
 
-/// The line without what a log puts before its messages, and without brackets around the whole.
+/// What follows the first prefix of a log in a line, or stands within brackets around the whole; `None` where there is neither.
 ///
 /// Prefixes are a date or a time of day (`10:11:12.345 -> `), groups in brackets (`[INFO]`), the level, clock and tag of ESP-IDF (`I (1234) tag: `), a level
 /// (`INFO: `), the name of a function (`loop(): `), and `>`. A line that reports a warning or an error keeps its prefix: it is no reading.
-pub fn without_prefix(line: &str) -> &str {
-    let mut rest = line.trim();
-    loop {
-        let next = strip_time(rest)
-            .or_else(|| strip_group(rest))
-            .or_else(|| strip_esp_idf(rest))
-            .or_else(|| strip_level(rest))
-            .or_else(|| strip_function(rest))
-            .or_else(|| rest.strip_prefix('>'))
-            .or_else(|| strip_brackets(rest));
-        match next.map(str::trim) {
-            Some(next) if !next.is_empty() => rest = next,
-            _ => return rest,
-        }
-    }
+pub fn message(line: &str) -> Option<&str> {
+    strip_time(line)
+        .or_else(|| strip_group(line))
+        .or_else(|| strip_esp_idf(line))
+        .or_else(|| strip_level(line))
+        .or_else(|| strip_function(line))
+        .or_else(|| line.strip_prefix('>'))
+        .or_else(|| strip_brackets(line))
+        .map(str::trim)
+        .filter(|message| !message.is_empty())
+}
+
+/// The line with a `T` for the blank between the date and the time of day that it begins with, so that they are one field.
+pub fn with_joined_time(line: &str) -> Option<String> {
+    let is_apart = time_length(line)? > 10 && line.as_bytes()[10] == b' ';
+    is_apart.then(|| format!("{}T{}", &line[..10], &line[11..]))
 }
 
 /// Levels of logs whose messages may be readings.
@@ -161,7 +162,7 @@ pub fn items<'a>(
 ) -> Option<Vec<Item<'a>>> {
     let mut items: Vec<Item> = Vec::new();
     let mut rest = line;
-    while let Some((start, end)) = next_number(rest, decimal_comma) {
+    while let Some((start, end)) = next_number(rest, decimal_comma, items.is_empty()) {
         let (unit, name) = unit_and_name(&rest[..start], items.is_empty(), &is_name)?;
         if let Some(last) = items.last_mut() {
             last.unit = unit;
@@ -220,13 +221,14 @@ fn has_empty_field(text: &str) -> bool {
     })
 }
 
-/// Start and end of the next number that is a value: not part of a word, and not a name before `:` or `=`.
-fn next_number(text: &str, decimal_comma: bool) -> Option<(usize, usize)> {
+/// Start and end of the next number that is a value: not part of a word, and not a name before `:` or `=`. At the start of the text there may be one where the
+/// line begins there.
+fn next_number(text: &str, decimal_comma: bool, is_line: bool) -> Option<(usize, usize)> {
     let bytes = text.as_bytes();
     let mut at = 0;
     while at < bytes.len() {
         let before = at.checked_sub(1).map(|before| bytes[before]);
-        let begins = before.is_none_or(|byte| byte.is_ascii_whitespace() || b",;|:=".contains(&byte));
+        let begins = before.map_or(is_line, |byte| byte.is_ascii_whitespace() || b",;|:=".contains(&byte));
         if begins && let Some(length) = number_length(&bytes[at..], decimal_comma) {
             let after = text[at + length..].trim_start();
             if !after.starts_with([':', '=']) {
@@ -330,6 +332,10 @@ fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
 mod tests {
     use super::*;
 
+    fn all_stripped(line: &str) -> &str {
+        message(line).map_or(line, all_stripped)
+    }
+
     #[test]
     fn prefixes_of_logs_are_stripped() {
         for line in [
@@ -348,13 +354,12 @@ mod tests {
             "(1,2)",
             "[INFO] <1,2>",
         ] {
-            assert_eq!(without_prefix(line), "1,2", "{line}");
+            assert_eq!(all_stripped(line), "1,2", "{line}");
         }
-        for line in
-            ["[ERROR] 1,2", "E (1234) main: 1,2", "ERROR: 1,2", "10:11,2", "[1][W][x.cpp] 1,2", "12 34"]
-        {
-            assert_eq!(without_prefix(line), line);
+        for line in ["[ERROR] 1,2", "E (1234) main: 1,2", "ERROR: 1,2", "10:11,2", "12 34"] {
+            assert_eq!(all_stripped(line), line);
         }
+        assert_eq!(all_stripped("[1][W][x.cpp] 1,2"), "[W][x.cpp] 1,2");
     }
 
     #[test]

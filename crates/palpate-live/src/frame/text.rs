@@ -89,14 +89,20 @@ impl TextReader {
     fn read_printed(&mut self, line: &[u8], cause: BadFrame) -> Result<Line, BadFrame> {
         let line = printed::without_colours(line);
         let Ok(line) = std::str::from_utf8(&line) else { return Err(cause) };
-        let message = printed::without_prefix(line.trim_start_matches('\u{FEFF}'));
-        if message.bytes().any(|byte| byte.is_ascii_control() && byte != b'\t') {
+        if line.bytes().any(|byte| byte.is_ascii_control() && byte != b'\t') {
             return Err(cause);
         }
-        if message.len() < line.len()
-            && let Ok(read) = self.read_form(message.as_bytes())
-        {
+        let line = line.trim_start_matches('\u{FEFF}').trim();
+        let joined = printed::with_joined_time(line);
+        if let Some(Ok(read)) = joined.map(|line| self.read_form(line.as_bytes())) {
             return Ok(read);
+        }
+        let mut message = line;
+        while let Some(inner) = printed::message(message) {
+            message = inner;
+            if let Ok(read) = self.read_form(message.as_bytes()) {
+                return Ok(read);
+            }
         }
         // The minus sign of typography has more bytes than a hyphen.
         let message = message.replace('\u{2212}', "-");
@@ -106,7 +112,7 @@ impl TextReader {
         let items = printed::items(&message, decimal_comma, is_name);
         let read = items.map_or(Err(cause), |items| self.read_items(&items, cause));
         let read = read.map_err(|other| if other == BadFrame::OtherUnit { other } else { cause });
-        match line.trim_start().strip_prefix('>') {
+        match line.strip_prefix('>') {
             Some(line) if read.is_err() => self.add_to_partial(line, cause),
             _ => read,
         }
@@ -195,7 +201,7 @@ impl TextReader {
     fn fields(&mut self, line: &[u8], marks: Marks) -> Result<Line, BadFrame> {
         let separator = Separator::found_in(line, marks);
         let fields = Fields { rest: Some(line), separator };
-        if marks.has(Marks::NAMED) && fields.clone().next().is_some_and(|field| named(field).is_some()) {
+        if marks.has(Marks::NAMED) && fields.clone().next().is_some_and(begins_with_name) {
             return self.named(fields, separator).map(Line::Whole);
         }
         let mut frame = Filling::new(&self.names);
@@ -320,6 +326,12 @@ fn factor(names: &Names, units: &[Option<String>], role: Role, unit: &str) -> Re
         }
         Role::Sequence | Role::Ignored => Ok(1.0),
     }
+}
+
+/// True for a field with a name; the colons of a time of day follow none.
+fn begins_with_name(field: &[u8]) -> bool {
+    let is_time = || std::str::from_utf8(field).is_ok_and(printed::is_time);
+    named(field).is_some() && !(field[0].is_ascii_digit() && is_time())
 }
 
 /// Name and value of a field, where it has a name.
@@ -557,7 +569,7 @@ mod tests {
             (b"HX711 v1.2, 80 Hz", NotANumber),
             (b"1,2 mV", NotANumber),
             (b"0xFFFFFE,1", NotANumber),
-            (b"one reading: 1 | average: 2", MissingChannel),
+            (b"one reading: 1 | average: 2", NotANumber),
             (b"2026-03-02,5", NotANumber),
         ];
         for (line, cause) in lines {

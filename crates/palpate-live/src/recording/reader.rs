@@ -248,7 +248,7 @@ pub struct Playback {
 /// Numbers of what a playback has passed over so far.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PassedOver {
-    /// Blocks of messages that cannot be read, as far as they are known the readings in them, and the fault of the first.
+    /// Blocks of messages that cannot be read.
     pub blocks: u64,
     /// Readings in those blocks, where an index tells them.
     pub readings: u64,
@@ -267,10 +267,10 @@ impl PassedOver {
     pub fn loss(&self) -> Option<String> {
         let blocks = (self.blocks > 0).then(|| {
             let fault = self.fault.as_ref().map_or_else(String::new, |fault| format!(": {fault}"));
-            format!(
-                "{} blocks with {} readings cannot be read (the first{fault})",
-                self.blocks, self.readings
-            )
+            // Readings of a block whose channels are not known are not counted.
+            let readings =
+                if self.readings > 0 { format!(" with {} readings", self.readings) } else { String::new() };
+            format!("{} blocks{readings} cannot be read, the first{fault}", self.blocks)
         });
         let messages = (self.messages > 0).then(|| format!("{} messages are damaged", self.messages));
         let altered = "its bytes do not match its checksum, so that some messages may be wrong";

@@ -129,12 +129,10 @@ impl HealthWatch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_mechanics::sensing::Sensor;
 
     /// States of the first of two raw channels after each reading.
     fn last_state(readings: impl IntoIterator<Item = [f64; 2]>) -> ChannelState {
-        let sensors = (0..2).map(|i| Sensor::raw(format!("s{i}"))).collect();
-        let mut watch = HealthWatch::new(&Layout::new(sensors).unwrap());
+        let mut watch = HealthWatch::new(&Layout::even(SensorKind::Raw, 2, 0.1));
         readings.into_iter().for_each(|reading| watch.add(&reading, |_| {}));
         watch.channels()[0].state
     }

@@ -80,8 +80,9 @@ pub struct Session<'a> {
     contact: ContactWatch,
     health: HealthWatch,
     counters: Counters,
-    /// Cause of the last frame that was no reading.
+    /// Cause of the last frame that was no reading, and number of such frames since the last reading or the opening.
     last_cause: Option<BadFrame>,
+    bad_in_a_row: u64,
     /// True after a reading of status `no_contact`.
     was_untouched: bool,
 }
@@ -105,6 +106,7 @@ impl<'a> Session<'a> {
             health: HealthWatch::new(locator.setup.layout()),
             counters: Counters::default(),
             last_cause: None,
+            bad_in_a_row: 0,
             was_untouched: false,
             channels,
         })
@@ -134,6 +136,11 @@ impl<'a> Session<'a> {
         self.last_cause.zip(self.decoder.last_bad())
     }
 
+    /// Number of frames since the last reading, or the opening of the source, that were none.
+    pub fn bad_in_a_row(&self) -> u64 {
+        self.bad_in_a_row
+    }
+
     /// Bytes since the end of the last frame.
     pub fn unfinished(&self) -> &[u8] {
         self.decoder.unfinished()
@@ -158,16 +165,19 @@ impl<'a> Session<'a> {
         match &arrived.arrival {
             Arrival::Opened(name) => {
                 self.decoder.open();
+                self.bad_in_a_row = 0;
                 self.estimation.interrupt();
                 self.tell(at, Event::SourceOpened { name: name.clone() }, out);
             }
             Arrival::Joined(name) => {
                 self.decoder.join();
+                self.bad_in_a_row = 0;
                 self.estimation.interrupt();
                 self.tell(at, Event::SourceOpened { name: name.clone() }, out);
             }
             Arrival::Piped(name) => {
                 self.decoder.open();
+                self.bad_in_a_row = 0;
                 self.estimation.interrupt();
                 self.timeline.follow_board();
                 self.tell(at, Event::SourceOpened { name: name.clone() }, out);
@@ -210,11 +220,13 @@ impl<'a> Session<'a> {
             match frame {
                 Ok(frame) => {
                     behind -= 1;
+                    self.bad_in_a_row = 0;
                     self.take(at, frame, behind, out);
                 }
                 Err(cause) => {
                     *self.counters.bad_frames.entry(cause).or_default() += 1;
                     self.last_cause = Some(cause);
+                    self.bad_in_a_row += 1;
                 }
             }
         }

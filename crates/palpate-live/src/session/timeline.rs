@@ -273,15 +273,15 @@ mod tests {
         let mut times_ns = Vec::new();
         // Around the end of microseconds of 32 bits, and with a reset.
         let wrap_us = 1_u64 << 32;
-        for device_us in [wrap_us - 2000, wrap_us - 1000, 0, 1000, 501_000, 0, 1000] {
+        for device_us in [wrap_us - 2000, wrap_us - 1000, 0, 1000, 701_000, 0, 1000] {
             let device_time = Some(Duration::from_micros(device_us));
             let stamp = timeline.board_stamp(at, device_time);
             let frame = Frame { reading: vec![], sequence: None, device_time };
             let (unix_ns, gap) = timeline.next(stamp, &frame, 0);
             times_ns.push((unix_ns - at.unix_ns) / 1_000_000);
-            assert_eq!(gap.is_some(), device_us == 501_000, "{device_us}");
+            assert_eq!(gap.is_some(), device_us == 701_000, "{device_us}");
         }
-        assert_eq!(times_ns, [0, 1, 2, 3, 503, 503, 504]);
+        assert_eq!(times_ns, [0, 1, 2, 3, 703, 703, 704]);
     }
 
     #[test]

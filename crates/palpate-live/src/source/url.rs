@@ -411,6 +411,13 @@ mod tests {
         (host, 1..=u16::MAX).prop_map(|(host, port)| Address { host, port })
     }
 
+    fn login() -> impl Strategy<Value = Option<Login>> {
+        prop::option::of("[a-z%@:/]{1,8}").prop_map(|user| {
+            let encoded: String = user?.bytes().map(|byte| format!("%{byte:02x}")).collect();
+            Login::parse(&encoded, None).ok()
+        })
+    }
+
     fn url() -> impl Strategy<Value = SourceUrl> {
         let columns = || prop::collection::vec("[^,&?\\pC]{1,8}", 0..4);
         let path = || "[^?&\\pC]{1,20}".prop_map(PathBuf::from);
@@ -424,10 +431,8 @@ mod tests {
             }),
             (address(), columns()).prop_map(|(server, columns)| SourceUrl::Tcp { server, columns }),
             (address(), columns()).prop_map(|(at, columns)| SourceUrl::Udp { at, columns }),
-            (address(), topic, columns()).prop_map(|(broker, topic, columns)| SourceUrl::Mqtt {
-                broker,
-                topic,
-                columns
+            (address(), login(), topic, columns()).prop_map(|(broker, login, topic, columns)| {
+                SourceUrl::Mqtt { broker, login, topic, columns }
             }),
             (path(), 1e-3..1e5, any::<u64>()).prop_map(|(rig, rate_hz, seed)| SourceUrl::Simulated {
                 rig,

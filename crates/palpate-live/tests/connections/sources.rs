@@ -61,13 +61,20 @@ fn a_serial_port_is_read_unplugged_and_read_again() {
 #[test]
 fn a_serial_port_that_is_held_is_named_and_bytes_that_waited_are_a_backlog() {
     use serialport::{SerialPort, TTYPort};
-    let (mut board, host) = TTYPort::pair().unwrap();
+    let (_board, host) = TTYPort::pair().unwrap();
     let device = host.name().unwrap();
+    drop(host);
+    let held = serialport::new(&device, 115_200).open().unwrap();
     let bench = Bench::open(&format!("serial://{device}"));
     let why = bench.lost();
     assert!(why.contains("another program has it open"), "{why}");
+    drop(held);
+    bench.end();
+    let (mut board, host) = TTYPort::pair().unwrap();
+    let device = host.name().unwrap();
+    // The port stays open for the board, as one that is plugged in, and is held by nobody.
+    let _open = std::fs::File::open(&device).unwrap();
     drop(host);
-    drop(bench);
     board.write_all(b"1,2\n3,").unwrap();
     let bench = Bench::open(&format!("serial://{device}"));
     bench.opened();
