@@ -76,6 +76,8 @@ fn a_serial_port_that_is_held_is_named_and_bytes_that_waited_are_a_backlog() {
     let _open = std::fs::File::open(&device).unwrap();
     drop(host);
     board.write_all(b"1,2\n3,").unwrap();
+    // The kernel hands bytes from one end to the other in the background.
+    std::thread::sleep(Duration::from_millis(100));
     let bench = Bench::open(&format!("serial://{device}"));
     bench.opened();
     assert_eq!(bench.next(), Arrival::Backlog(b"1,2\n3,".to_vec()));
