@@ -70,7 +70,10 @@ fn a_recording_whose_locator_is_damaged_or_cut_off_is_read_by_another() {
     ] {
         let told = complained(&run(folder.path(), &["replay", name]), 2);
         assert!(told.contains(name) && told.contains(what) && told.contains("--locator FILE"), "{told}");
-        let again = said(&run(folder.path(), &["replay", name, "--locator", "locator.json"]));
+        let output = run(folder.path(), &["replay", name, "--locator", "locator.json"]);
+        // A file that ends before its locator has no reading.
+        assert_eq!(output.status.code(), Some(if name == "cut.mcap" { 3 } else { 0 }), "{output:?}");
+        let again = String::from_utf8(output.stdout).unwrap();
         assert_eq!(again.trim_end(), expected.trim_end(), "{name}");
     }
     let again = ["record", "locator.json", "--from", "file:damaged.mcap?speed=0", "--out", "again.mcap"];
