@@ -9,6 +9,7 @@ pub mod device_clock;
 pub mod event;
 pub mod frame;
 pub mod input;
+pub mod monitor;
 pub mod pipeline;
 pub mod recording;
 pub mod rules;

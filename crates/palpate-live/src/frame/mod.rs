@@ -10,6 +10,7 @@ mod text;
 pub use binary::encode_into;
 pub use channel::Channel;
 pub use decoder::{ColumnsError, Decoder};
+pub(crate) use names::is_reserved;
 
 use std::time::Duration;
 
