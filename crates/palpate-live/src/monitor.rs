@@ -334,7 +334,11 @@ fn names_in_line(line: &[u8]) -> Option<Vec<String>> {
     let text = std::str::from_utf8(line).ok()?.trim();
     let names: Vec<String> = if text.starts_with('{') {
         let object: serde_json::Map<String, serde_json::Value> = serde_json::from_str(text).ok()?;
-        object.into_iter().filter(|(_, value)| value.is_number()).map(|(name, _)| name).collect()
+        let mut names: Vec<String> =
+            object.into_iter().filter(|(_, value)| value.is_number()).map(|(name, _)| name).collect();
+        // As the board sends them; the object has them by the alphabet.
+        names.sort_by_key(|name| text.find(&format!("\"{name}\"")));
+        names
     } else {
         let ends = text.char_indices().filter(|(_, mark)| matches!(mark, ':' | '='));
         ends.filter_map(|(end, _)| {
@@ -433,6 +437,7 @@ mod tests {
             ("left=12,right=-3.5\n", ["left", "right"], true),
             ("{\"a\":12,\"b\":-3.5,\"time_ms\":5,\"id\":\"x\"}\n", ["a", "b"], true),
             ("t:5,a:12,b:-3.5\n", ["a", "b"], true),
+            ("{\"z\":12,\"a\":-3.5}\n", ["z", "a"], true),
         ] {
             let (found, values, is_named) = names_and_values(&[line]);
             assert_eq!(

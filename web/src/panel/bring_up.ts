@@ -14,6 +14,7 @@ const NEWTONS = { g: 9.80665e-3, kg: 9.80665, N: 1 };
 
 export class BringUpPanel {
   private looks = false;
+  private looking: Promise<void> = Promise.resolve();
   private channels = "";
   private ports = "";
   private traces: number[][] = [];
@@ -38,7 +39,7 @@ export class BringUpPanel {
     this.looks = true;
     need("bring-up").hidden = false;
     document.body.classList.add("bringing-up");
-    void this.look();
+    this.looking = this.look();
   }
 
   /** Ends it, once there is a rig. */
@@ -55,7 +56,7 @@ export class BringUpPanel {
       // Somebody else made the rig; a server that is away is said by the page.
       if (error instanceof ApiError && error.status === 409) return this.made();
     }
-    if (this.looks) setTimeout(() => void this.look(), LOOK_MS);
+    if (this.looks) setTimeout(() => (this.looking = this.looks ? this.look() : this.looking), LOOK_MS);
   }
 
   private async choose(): Promise<void> {
@@ -118,13 +119,13 @@ export class BringUpPanel {
           trace.setAttribute("preserveAspectRatio", "none");
           trace.setAttribute("aria-hidden", "true");
           trace.append(document.createElementNS("http://www.w3.org/2000/svg", "polyline"));
-          return element("tr", "", name, element("td", ""), element("td", ""), element("td", ""), element("td", "trace", trace));
+          return element("tr", "", name, element("td", "amount"), element("td", "trace", trace), element("td", "amount"), element("td", "amount"));
         }),
       );
     }
     seen.channels.forEach((channel, i) => {
       const row = body.children[i]!;
-      const [name, now, low, high, trace] = [...row.children] as HTMLElement[];
+      const [name, now, trace, low, high] = [...row.children] as HTMLElement[];
       setText(name!, channel.name);
       setText(now!, words(channel.now));
       setText(low!, words(channel.range?.[0] ?? null));
@@ -214,11 +215,15 @@ export class BringUpPanel {
     const button = need<HTMLButtonElement>("rig-make");
     button.disabled = true;
     this.asked += 1;
+    // There is no board to look at once it has a rig.
+    this.looks = false;
+    await this.looking;
     try {
       await api.makeRig(this.form(true));
       this.end();
       this.made();
     } catch (error) {
+      this.follow();
       this.complain("rig-problem", error);
       if (error instanceof ApiError && error.status === 409) this.changed();
     } finally {
@@ -234,7 +239,7 @@ export class BringUpPanel {
 }
 
 function words(value: number | null): string {
-  return value === null ? "—" : value.toLocaleString("en-GB", { maximumSignificantDigits: 10 }).replace("-", "−");
+  return value === null ? "—" : value.toLocaleString("en-GB", { maximumSignificantDigits: 7 }).replace("-", "−");
 }
 
 /** Points of a curve over the box of 100 by 24. */

@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 /// Seconds of samples that are kept.
 const KEPT_S: f64 = 600.0;
-/// Time between two samples that are kept, in seconds.
-const EVERY_S: f64 = 0.1;
+/// Samples of a second that are kept.
+const PER_S: f64 = 10.0;
 /// Most samples: as many as fit into the time.
-const MOST_SAMPLES: usize = (KEPT_S / EVERY_S) as usize;
+const MOST_SAMPLES: usize = (KEPT_S * PER_S) as usize;
 /// Most events; moves are not among them.
 const MOST_EVENTS: usize = 1000;
 /// Most bytes of the samples as text, which many channels reach first.
@@ -24,9 +24,9 @@ pub struct Past {
 }
 
 impl Past {
-    /// True where the next sample to be kept is due.
+    /// True for the first sample of a tenth of a second.
     pub fn is_due(&self, time_s: f64) -> bool {
-        self.samples.back().is_none_or(|(last_s, _)| time_s >= last_s + EVERY_S)
+        self.samples.back().is_none_or(|(last_s, _)| (time_s * PER_S).floor() > (last_s * PER_S).floor())
     }
 
     /// Keeps a sample; the oldest ones give way.

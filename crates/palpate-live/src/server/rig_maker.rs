@@ -263,21 +263,15 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
         // Writing to a string does not fail.
         let _ = writeln!(text, "{line}");
     };
-    line(
-        "kind = \"measured\"                # no model: the influence functions come from the presses"
-            .to_owned(),
-    );
+    line("kind = \"measured\"  # no model: the influence functions come from the presses".to_owned());
     line(format!("length = {}", mm(form.length_mm)));
     if let Some(width_mm) = form.width_mm {
         line(format!("width = {}", mm(width_mm)));
     }
-    line(
-        "\n[sensors]\nmeasure = \"raw\"                  # whatever the channels read: counts, volts"
-            .to_owned(),
-    );
+    line("\n[sensors]\nmeasure = \"raw\"  # whatever the channels read: counts, volts".to_owned());
     line(format!("\n[recording]\nchannels = [{}]", names.join(", ")));
     if form.force_is_known {
-        line(format!("\n[contact]\nforce = {force}                  # of every contact"));
+        line(format!("\n[contact]\nforce = {force}  # of every contact"));
     }
     line("\n[training]".to_owned());
     match (form.width_mm, form.places.as_slice()) {
@@ -288,7 +282,7 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
             return Err(RigFormError::Places { given: places.len(), directions });
         }
     }
-    line(format!("repeats = {}\nforce = {force}                  # of every press", form.repeats));
+    line(format!("repeats = {}\nforce = {force}  # of every press", form.repeats));
     line("\n[estimator]\nkind = \"influence\"".to_owned());
     Ok(text)
 }
