@@ -25,7 +25,7 @@ import { LineView } from "./view/line";
 import { onTheme } from "./view/palette";
 import { drawPlane } from "./view/plane";
 import { describe, isPlane } from "./view/surface";
-import { bytes, PLAIN_MARK, seconds } from "./words";
+import { badFrameWords, bytes, PLAIN_MARK, seconds } from "./words";
 
 /** Milliseconds between two snapshots; all views of a frame show one snapshot. */
 const SNAPSHOT_MS = 33;
@@ -218,7 +218,11 @@ export class Page {
       const waits = (this.live.state?.counters.readings ?? 0) === 0;
       return waits ? "The source is not there yet; it is opened as soon as it is." : "The source is away and looked for again: what is shown is not live.";
     }
-    return "The source sends no readings: what is shown is not live.";
+    // A word for the cause that is most frequent, which does not change with every frame.
+    const bad = Object.entries(this.live.state?.counters.bad_frames ?? {}).sort(([, one], [, other]) => other - one);
+    const cause = bad[0]?.[0];
+    if (cause === undefined) return "The source sends no readings: what is shown is not live.";
+    return `The source sends frames that are no readings (${badFrameWords(cause)}): what is shown is not live.`;
   }
 
   /** A calibration that guides has no estimates: what shows them is left out, and the next place is drawn. */

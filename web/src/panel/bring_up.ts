@@ -112,7 +112,7 @@ export class BringUpPanel {
     if (body.childElementCount !== seen.channels.length) {
       body.replaceChildren(
         ...seen.channels.map(() => {
-          const name = element("th", "name");
+          const name = element("th", "name", element("span", ""));
           name.scope = "row";
           const trace = document.createElementNS("http://www.w3.org/2000/svg", "svg");
           trace.setAttribute("viewBox", `0 0 ${TRACED} 24`);
@@ -126,7 +126,8 @@ export class BringUpPanel {
     seen.channels.forEach((channel, i) => {
       const row = body.children[i]!;
       const [name, now, trace, low, high] = [...row.children] as HTMLElement[];
-      setText(name!, channel.name);
+      setText(name!.firstElementChild as HTMLElement, channel.name);
+      name!.title = channel.name;
       setText(now!, words(channel.now));
       setText(low!, words(channel.range?.[0] ?? null));
       setText(high!, words(channel.range?.[1] ?? null));

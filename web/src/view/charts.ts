@@ -248,7 +248,7 @@ class Chart {
       width: Math.max(1, this.host.clientWidth),
       height: Math.max(1, this.host.clientHeight),
       legend: { show: false },
-      padding: [6, 8, 0, 0],
+      padding: [6, (plot) => Math.ceil(widthOf(plot, ["00:00:00"]) / 2) + 2, 0, 0],
       cursor: { y: false, points: { size: 5 }, drag: { x: true, y: true, uni: 20, setScale: false } },
       scales: { x: { time: true }, y: { range: (_, low, high) => this.range ?? roomy(low, high) } },
       axes: [
@@ -298,12 +298,17 @@ const AXIS_ROOM = 18;
 /** Width of an axis that holds its numbers. */
 function widthOfNumbers(plot: uPlot, numbers: string[] | null): number {
   if (numbers === null || numbers.length === 0) return AXIS_LEAST;
-  plot.ctx.save();
+  return Math.max(AXIS_LEAST, Math.ceil(widthOf(plot, numbers)) + AXIS_ROOM);
+}
+
+/** Width in CSS pixels of the widest of some texts in the font of the axes. */
+function widthOf(plot: uPlot, texts: string[]): number {
   const ratio = window.devicePixelRatio || 1;
+  plot.ctx.save();
   plot.ctx.font = palette().font.replace(/^[\d.]+/, (px) => String(Number(px) * ratio));
-  const width = widest(plot.ctx, numbers) / ratio;
+  const width = widest(plot.ctx, texts) / ratio;
   plot.ctx.restore();
-  return Math.max(AXIS_LEAST, Math.ceil(width) + AXIS_ROOM);
+  return width;
 }
 
 /** Charts with their titles one below the other, and the legend of the last. */
