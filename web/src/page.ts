@@ -357,6 +357,7 @@ export class Page {
     this.show(this.views, this.shown, frozen);
     if (this.pace.due("facts", now, FACTS_MS)) {
       const live = frozen ? this.snapshot(this.session) : this.shown;
+      need("surface").setAttribute("aria-label", describe(this.shown));
       this.views.health.writeFacts(live);
       this.views.events.write(live);
     }
@@ -377,7 +378,6 @@ export class Page {
   private show(views: Views, shown: Snapshot, frozen: boolean): void {
     this.drawSurface(views, shown);
     writeNumbers(shown);
-    need("surface").setAttribute("aria-label", describe(shown));
     this.writeSurfaceNote(views, shown);
     views.budget.draw(shown);
     views.health.writeChannels(shown);

@@ -273,7 +273,9 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
             let simulated = Observer::of_stages().watch(|watch| rig.simulate_watched(arguments.seed, watch));
             simulated.map_err(|error| {
                 let about = |error| Complaint::about(path, error);
-                Failure::of_work(error, |error| about(error).help("--data names a recording to fit; --calibrate makes one in the browser"))
+                Failure::of_work(error, |error| {
+                    about(error).help("--data names a recording to fit; --calibrate makes one in the browser")
+                })
             })?
         }
     };

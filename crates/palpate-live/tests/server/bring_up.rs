@@ -46,7 +46,7 @@ fn seen(server: &Server, until: impl Fn(&Value) -> bool) -> Value {
     }
 }
 
-fn form(changes: Value) -> String {
+fn form(changes: &Value) -> String {
     let mut form = json!({
         "file": "strip.toml", "channels": ["left", "", "right"], "length_mm": 300, "width_mm": null, "places": [6], "repeats": 2,
         "force_n": 2, "force_is_known": false, "overwrite": false, "write": true,
@@ -83,18 +83,18 @@ fn a_board_without_a_rig_is_seen_and_gets_one() {
         (json!({ "length_mm": 0 }), "length"),
         (json!({ "channels": ["left"] }), "the board sends 3 values"),
     ] {
-        let (status, refusal) = post(&server, "/api/rig", &form(change));
+        let (status, refusal) = post(&server, "/api/rig", &form(&change));
         assert!(status == 400 && refusal["error"].as_str().unwrap().contains(words), "{refusal}");
     }
-    let (status, made) = post(&server, "/api/rig", &form(json!({ "write": false })));
+    let (status, made) = post(&server, "/api/rig", &form(&json!({ "write": false })));
     assert_eq!((status, &made["written"], &made["exists"]), (200, &json!(false), &json!([])));
     assert!(!folder.path().join("strip.toml").exists());
 
     std::fs::write(folder.path().join("strip.toml"), "mine").unwrap();
-    let (status, refusal) = post(&server, "/api/rig", &form(json!({})));
+    let (status, refusal) = post(&server, "/api/rig", &form(&json!({})));
     assert!(status == 409 && refusal["error"].as_str().unwrap().contains("is there already"), "{refusal}");
     assert_eq!(std::fs::read_to_string(folder.path().join("strip.toml")).unwrap(), "mine");
-    let (status, made) = post(&server, "/api/rig", &form(json!({ "overwrite": true })));
+    let (status, made) = post(&server, "/api/rig", &form(&json!({ "overwrite": true })));
     assert_eq!((status, &made["written"]), (200, &json!(true)), "{made}");
     assert_eq!(
         std::fs::read_to_string(folder.path().join("strip.toml")).unwrap(),
@@ -105,7 +105,7 @@ fn a_board_without_a_rig_is_seen_and_gets_one() {
     assert_eq!((&session["brings_up"], &session["calibrates"]), (&json!(false), &json!(true)));
     assert_eq!(session["channels"].as_array().unwrap().len(), 2);
     assert_eq!(get(&server, "/api/bring-up").0, 409);
-    assert_eq!(post(&server, "/api/rig", &form(json!({ "overwrite": true }))).0, 409);
+    assert_eq!(post(&server, "/api/rig", &form(&json!({ "overwrite": true }))).0, 409);
     // The calibration reads the two channels, though the board sends three values.
     let (status, begun) = post(&server, "/api/calibration", r#"{"step":"begin"}"#);
     assert_eq!((status, &begun["left"]), (200, &json!(12)), "{begun}");
