@@ -222,7 +222,7 @@ export class Page {
     const bad = Object.entries(this.live.state?.counters.bad_frames ?? {}).sort(([, one], [, other]) => other - one);
     const cause = bad[0]?.[0];
     if (cause === undefined) return "The source sends no readings: what is shown is not live.";
-    return `The source sends frames that are no readings (${badFrameWords(cause)}): what is shown is not live.`;
+    return `The source sends frames that are not readings (${badFrameWords(cause)}): what is shown is not live.`;
   }
 
   /** A calibration that guides has no estimates: what shows them is left out, and the next place is drawn. */

@@ -11,7 +11,7 @@ use std::time::Duration;
 const LINES: usize = 100;
 /// Most characters of a line that is kept.
 const LONGEST: usize = 160;
-/// Most bytes without the end of a line; more are no text, or another rate of bits.
+/// Most bytes without the end of a line; more are not text, or the baud rate is wrong.
 const MOST_PARTIAL: usize = 4096;
 /// Most channels that are looked for.
 const MOST_CHANNELS: usize = 64;
@@ -29,7 +29,7 @@ const BINARY_FRAMES: usize = 3;
 pub struct RawLine {
     /// Seconds since 1970-01-01 00:00 UTC.
     pub time_s: f64,
-    /// Its text; bytes that are no text are escaped, and long lines are cut.
+    /// Its text; bytes that are not text are escaped, and long lines are cut.
     pub text: String,
     /// True where it is a reading of the channels that were found.
     pub reads: bool,
@@ -46,7 +46,7 @@ pub struct ChannelValues {
     pub range: Option<[f64; 2]>,
 }
 
-/// What a monitor has seen, as a record of JSON.
+/// State of a monitor as a record of JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct MonitorRecord {
     /// Name of the source, while it is there.
@@ -59,7 +59,7 @@ pub struct MonitorRecord {
     pub readings: u64,
     /// Readings a second.
     pub rate_hz: f64,
-    /// Frames that are no readings, by cause.
+    /// Frames that are not readings, by cause.
     pub bad_frames: BTreeMap<BadFrame, u64>,
     /// The channels, once they were found.
     pub channels: Vec<ChannelValues>,
@@ -245,7 +245,7 @@ impl Monitor {
         }
     }
 
-    /// What it has seen by now.
+    /// The state now.
     pub fn record(&self, now: Duration) -> MonitorRecord {
         let recent = self.arrivals.iter().filter(|(at, _)| now.saturating_sub(*at) <= RATE_OVER);
         let (first, count) =
@@ -285,7 +285,7 @@ impl Monitor {
                 "lines arrive, and no values are found in them: send one line a reading, such as `12,34,56`"
                     .to_owned()
             }
-            _ => "the bytes are no text: try another baud rate".to_owned(),
+            _ => "the bytes are not text: try another baud rate".to_owned(),
         })
     }
 
@@ -372,7 +372,7 @@ fn checked(names: Vec<String>) -> Option<Vec<String>> {
     usable.then_some(names)
 }
 
-/// Bytes as text of at most `most` characters: what is no text, and characters of control, are escaped.
+/// Bytes as text of at most `most` characters: bytes that are not text, and control characters, are escaped.
 pub fn escaped(bytes: &[u8], most: usize) -> String {
     let mut text = String::new();
     let mut count = 0;

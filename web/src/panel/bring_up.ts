@@ -78,7 +78,7 @@ export class BringUpPanel {
     problem.hidden = seen.problem === null;
     setText(problem, seen.problem ?? "");
     const bad = Object.entries(seen.bad_frames).map(([cause, count]) => `${count.toLocaleString("en-GB")} ${badFrameWords(cause)}`);
-    setText(need("bring-up-bad"), bad.length === 0 ? "" : `Lines that are no readings: ${bad.join("; ")}`);
+    setText(need("bring-up-bad"), bad.length === 0 ? "" : `Lines that are not readings: ${bad.join("; ")}`);
     this.writeValues(seen);
     this.writeLines(seen);
     const channels = JSON.stringify([seen.channels.map((channel) => channel.name), seen.named]);

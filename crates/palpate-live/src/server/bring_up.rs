@@ -1,4 +1,4 @@
-//! A board without a rig, as a page sees it, until a rig is made for it.
+//! A board without a rig: its source, watched until a page makes a rig for it.
 
 use super::lock::locked;
 use crate::input::Input;
@@ -104,7 +104,7 @@ impl BringUp {
         locked(&self.state).from.clone()
     }
 
-    /// What was seen of the board; ports are looked for, which may take a while.
+    /// State of the board. Listing the ports may take a while.
     pub fn record(&self) -> BringUpRecord {
         let ports = ports();
         let state = locked(&self.state);

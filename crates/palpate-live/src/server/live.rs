@@ -200,7 +200,7 @@ impl Live {
         Self { commands, ..self }
     }
 
-    /// The same with rules that raise alarms.
+    /// Adds rules that raise alarms.
     #[must_use]
     pub fn with_alarms(self, rules: Rules) -> Self {
         *locked(&self.alarm_text) = rules.to_toml();
@@ -386,7 +386,7 @@ impl Live {
         board.ok_or(BringUpError::HasRig)
     }
 
-    /// What was seen of a board without a rig.
+    /// State of a board without a rig.
     ///
     /// # Errors
     /// [`LiveError::BringUp`] where there is a rig.

@@ -43,8 +43,8 @@ pub struct RigForm {
 /// A form that gives no rig.
 #[derive(Debug, thiserror::Error)]
 pub enum RigFormError {
-    /// A name that is no plain file name.
-    #[error("`{name}` is no name of a rig: letters, digits, `-`, `_`, and `.toml` at the end")]
+    /// A name that is not a plain file name.
+    #[error("`{name}` cannot name a rig: use letters, digits, `-`, `_`, and `.toml` at the end")]
     Name {
         /// The name.
         name: String,
@@ -74,7 +74,7 @@ pub enum RigFormError {
         directions: usize,
     },
     /// Values without names cannot be left out of this source.
-    #[error("the source {from} cannot leave values out that have no names")]
+    #[error("the source {from} cannot leave unnamed values out")]
     LeftOut {
         /// The source.
         from: String,

@@ -110,7 +110,7 @@ impl SessionInfo {
         Self { calibrates: calibrator.is_some(), ..self }
     }
 
-    /// The same, where there is a board without a rig.
+    /// Says whether there is a board without a rig.
     pub fn with_bring_up(self, brings_up: bool) -> Self {
         Self { brings_up, ..self }
     }

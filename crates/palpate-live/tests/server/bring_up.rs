@@ -79,7 +79,7 @@ fn a_board_without_a_rig_is_seen_and_gets_one() {
     assert_eq!(get(&server, "/api/calibration").0, 404);
 
     for (change, words) in [
-        (json!({ "file": "../strip.toml" }), "no name of a rig"),
+        (json!({ "file": "../strip.toml" }), "cannot name a rig"),
         (json!({ "length_mm": 0 }), "length"),
         (json!({ "channels": ["left"] }), "the board sends 3 values"),
     ] {
