@@ -75,7 +75,7 @@ describe.skipIf(!hasChromium())("calibration", () => {
     await page.locator("#calibration-redo").click();
     await says(page, "calibration-progress", /^2 of 12/);
     await obey(page, bench, (asked, taken) => taken === 3 && asked.startsWith("Press at"));
-    await page.locator("summary").click();
+    await page.locator("#calibration summary").first().click();
     await says(page, "calibration-places", /2 of 2[\d.]+ %taken/);
     await picture(page, "calibration-light");
     await obey(page, bench, (asked) => asked === "No more presses are asked for");

@@ -1,8 +1,9 @@
 // The dashboard in a browser, on the real server with its simulated board: as a person uses it, by clicks and by keys.
 
+import { readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
-import type { SampleRecord } from "../src/protocol";
+import type { SampleRecord, StreamMessage } from "../src/protocol";
 import { isPlaced, number, statusWords } from "../src/words";
 import { hasChromium, launch, open, picture, says } from "./chromium";
 import { record } from "./recorder";
@@ -34,6 +35,70 @@ function contactPixels(page: Page): Promise<number> {
   });
 }
 
+/** What views show in frames in which something is located: the words at the dot, the large number, the dot of the budget in mm. */
+function estimatesOfFrames(page: Page, count: number): Promise<{ drawn: string; written: string; budget: number; sd: boolean }[]> {
+  return page.evaluate(async (count) => {
+    const drawing = CanvasRenderingContext2D.prototype;
+    const [fillText, arc] = [drawing.fillText, drawing.arc];
+    let [label, dot_px] = ["", NaN];
+    drawing.fillText = function (this: CanvasRenderingContext2D, text: string, ...at: [number, number]) {
+      const match = /^([\d.]+) mm/.exec(text);
+      if (this.canvas.id === "surface" && match !== null) label = match[1]!;
+      fillText.call(this, text, ...at);
+    };
+    drawing.arc = function (this: CanvasRenderingContext2D, ...at: Parameters<typeof arc>) {
+      if (this.canvas.closest("#budget") !== null) dot_px = at[0];
+      arc.apply(this, at);
+    };
+    const seen: { drawn: string; written: string; budget: number; sd: boolean }[] = [];
+    const canvas = document.querySelector<HTMLCanvasElement>("#budget canvas")!;
+    const text = (id: string) => document.getElementById(id)?.textContent ?? "";
+    let previous = "";
+    while (seen.length < count) {
+      await new Promise((resolve) => requestAnimationFrame(resolve));
+      // The page's own frame, and all it draws, has come before or comes within this task.
+      await new Promise((resolve) => setTimeout(resolve));
+      if (text("status") !== "Located" || label === "" || label === previous) continue;
+      previous = label;
+      const context = canvas.getContext("2d")!;
+      const left = 8 + 6 + Math.ceil(Math.max(...["0.01", "0.1", "1"].map((number) => context.measureText(number).width)));
+      const budget = ((dot_px - left) / (canvas.clientWidth - 12 - left)) * 400;
+      const sd = text("budget-words").includes("this estimate has");
+      seen.push({ drawn: label, written: text("position"), budget, sd });
+    }
+    [drawing.fillText, drawing.arc] = [fillText, arc];
+    return seen;
+  }, count);
+}
+
+/** Has the page note what is written on the charts, and what of it lies beyond their edges. */
+async function watchTexts(page: Page): Promise<void> {
+  await page.evaluate(() => {
+    const watched = window as unknown as { cutTexts: string[]; drawnTexts: Map<string, string[]> };
+    [watched.cutTexts, watched.drawnTexts] = [[], new Map()];
+    const drawing = CanvasRenderingContext2D.prototype;
+    const [fillText, clearRect] = [drawing.fillText, drawing.clearRect];
+    const chart = (canvas: HTMLCanvasElement) => canvas.closest(".chart")?.id ?? "";
+    drawing.clearRect = function (this: CanvasRenderingContext2D, ...at: Parameters<typeof clearRect>) {
+      watched.drawnTexts.set(chart(this.canvas), []);
+      clearRect.apply(this, at);
+    };
+    drawing.fillText = function (this: CanvasRenderingContext2D, text: string, x: number, y: number) {
+      const width = this.measureText(text).width;
+      const left = this.getTransform().e + x - { right: width, center: width / 2 }[this.textAlign as "right"]!;
+      watched.drawnTexts.get(chart(this.canvas))?.push(text);
+      if (left < 0 || left + width > this.canvas.width) watched.cutTexts.push(text);
+      fillText.call(this, text, x, y);
+    };
+  });
+}
+
+/** The path of a file that a button has the page download. */
+async function downloaded(page: Page, button: string): Promise<string> {
+  const [download] = await Promise.all([page.waitForEvent("download"), page.locator(button).click()]);
+  return download.path();
+}
+
 describe.skipIf(!hasChromium())("dashboard", () => {
   let browser: Browser;
   beforeAll(async () => {
@@ -52,7 +117,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
     afterAll(() => server?.stop());
 
     test("shows a live dot with its interval, in numbers, on the surface and aloud", async () => {
-      await says(page, "connection", /^Connected$/);
+      await says(page, "connection", /^Simulated$/);
       await says(page, "status", /^Located$/);
       expect(Number(await says(page, "position", /^\d/))).toBeGreaterThanOrEqual(0);
       expect(await says(page, "position-95", /^95 %: .+ to .+ mm$/)).toContain("mm");
@@ -63,6 +128,122 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       expect(await page.locator("#health tr").count()).toBe(8);
       expect(await page.locator("#health td[data-state=well]").count()).toBe(8);
       await picture(page, "light");
+    });
+
+    test("says large that the board is simulated, until a person has seen it", async () => {
+      expect(await page.locator("#simulated h2").textContent()).toBe("This board is simulated");
+      expect(await page.locator("#simulated h2").evaluate((title) => Number.parseFloat(getComputedStyle(title).fontSize))).toBeGreaterThan(24);
+      await page.locator("#simulated-close").click();
+      await page.reload();
+      await says(page, "connection", /^Simulated$/);
+      expect(await page.locator("#simulated").isVisible()).toBe(false);
+    });
+
+    test("every view shows one estimate at every moment", async () => {
+      const seen = await estimatesOfFrames(page, 40);
+      expect(seen.length).toBe(40);
+      for (const { drawn, written, budget, sd } of seen) {
+        expect(drawn).toBe(written);
+        // The dot of the budget stands at the contact, whose standard deviation is in the words.
+        expect(Math.abs(budget - Number(written))).toBeLessThan(1);
+        expect(sd).toBe(true);
+      }
+      // The estimates moved meanwhile, so that views of different moments would have differed.
+      expect(new Set(seen.map(({ drawn }) => drawn)).size).toBeGreaterThan(5);
+    });
+
+    test("keeps the charts and the events over a reload, and exports them", async () => {
+      await page.locator("#window").selectOption("600");
+      await page.waitForTimeout(3_000);
+      const loaded_s = Date.now() / 1000;
+      await page.reload();
+      await says(page, "status", /^(Located|No contact)$/);
+      await page.locator("#window").selectOption("600");
+      await page.waitForTimeout(500);
+      const lines = readFileSync(await downloaded(page, "#export-csv"), "utf8").trim().split("\n");
+      expect(lines[0]).toMatch(/^time_s,x_mm,.*,deflection_8 \(mm\)$/);
+      const times = lines.slice(1).map((line) => Number(line.split(",")[0]));
+      expect(times[0]).toBeLessThan(loaded_s - 3);
+      expect(times.at(-1)).toBeGreaterThan(loaded_s);
+      for (let i = 1; i < times.length; i++) expect(times[i]).toBeGreaterThanOrEqual(times[i - 1]!);
+      await says(page, "events", /Source opened: a simulated board/);
+      expect(readFileSync(await downloaded(page, "#export-png")).subarray(1, 4).toString()).toBe("PNG");
+      expect(await page.locator("#chart-position").getAttribute("aria-label")).toMatch(/^Position over .*\. Position: [\d.]+ mm to [\d.]+ mm, .* now\.$/);
+      await page.locator("#window").selectOption("10");
+    });
+
+    test("the values of a chart are zoomed by buttons, and fit again", async () => {
+      const range = () => page.evaluate(() => (window as unknown as { drawnTexts: Map<string, string[]> }).drawnTexts.get("chart-channels") ?? []);
+      await watchTexts(page);
+      await page.waitForTimeout(300);
+      const whole = await range();
+      for (let i = 0; i < 4; i++) await page.locator("#chart-channels-zoom button[value=in]").click();
+      await page.waitForFunction((whole) => JSON.stringify((window as unknown as { drawnTexts: Map<string, string[]> }).drawnTexts.get("chart-channels")) !== whole, JSON.stringify(whole));
+      const numbers = (await range()).filter((text) => !text.includes(":")).map((text) => Number(text.replace("−", "-")));
+      expect(Math.max(...numbers) - Math.min(...numbers)).toBeLessThan(0.5);
+      expect(await page.locator("#chart-channels").getAttribute("class")).toContain("zoomed");
+      await page.locator("#chart-channels-zoom button[value=all]").click();
+      expect(await page.locator("#chart-channels").getAttribute("class")).not.toContain("zoomed");
+    });
+
+    test("raises an alarm by a rule that was set on the page, and finds it in the log", async () => {
+      await page.locator("#alarms").click();
+      await page.locator("#alarm-name").fill("anywhere");
+      await page.locator("#alarm-x-low").fill("0");
+      await page.locator("#alarm-x-high").fill("-5");
+      await page.locator("#alarm-text").fill("a hand is there");
+      await page.getByRole("button", { name: "Add the rule" }).click();
+      await says(page, "alarm-problem", /^line 3: `x` is from 0 mm to -5 mm/);
+      // The browser notes every refusal.
+      expect(faults.splice(0)).toEqual(["Failed to load resource: the server responded with a status of 400 (Bad Request)"]);
+      const file = page.locator("#alarm-file");
+      await file.fill((await file.inputValue()).replace("-5 mm", "400 mm"));
+      await page.locator("#alarm-set").click();
+      await says(page, "alarm-done", /^1 alarm is set/);
+      await picture(page, "alarms");
+      await page.locator("#alarms-close").click();
+      await says(page, "alarm-words", /^Alarm at .*: a hand is there, by rule “anywhere”/);
+      await picture(page, "alarm");
+      await page.locator("#alarm-dismiss").click();
+      await page.locator("#events-search").fill("HAND there");
+      await page.waitForFunction(() => [...document.querySelectorAll("#events li")].length > 0 && [...document.querySelectorAll("#events li")].every((item) => item.textContent?.includes("Alarm: a hand is there (anywhere)")));
+      await page.locator("#events-search").fill("");
+      await page.locator("#alarms").click();
+      await page.waitForFunction(() => (document.getElementById("alarm-file") as HTMLTextAreaElement).value.includes("a hand is there"));
+      await file.fill("");
+      await page.locator("#alarm-set").click();
+      await says(page, "alarm-done", /^No alarms are set/);
+      await page.locator("#alarms-close").click();
+      // The focus goes back to the button, which the space bar would press.
+      await page.locator("#surface-title").click();
+    });
+
+    test("numbers of axes are whole, however large or small", async () => {
+      for (const [factor, expected] of [[2_800_000, /^−\d,\d{3},\d{3}$/], [1e-6, /e−6$/]] as const) {
+        const { page, faults } = await open(browser, "about:blank");
+        await page.route("**/api/history", (route) => route.fulfill({ json: { samples: [], events: [] } }));
+        await page.addInitScript((factor) => {
+          const parse = JSON.parse;
+          JSON.parse = (text: string) => {
+            const message = parse(text) as Partial<StreamMessage> | null;
+            for (const sample of message?.samples ?? []) sample.reading = sample.reading.map((value) => value * factor);
+            return message;
+          };
+        }, factor);
+        await page.goto(server.url);
+        await watchTexts(page);
+        await says(page, "status", /^Located$/);
+        await page.waitForTimeout(1_000);
+        const { cut, texts } = await page.evaluate(() => {
+          const watched = window as unknown as { cutTexts: string[]; drawnTexts: Map<string, string[]> };
+          return { cut: watched.cutTexts, texts: watched.drawnTexts.get("chart-channels") ?? [] };
+        });
+        expect(cut).toEqual([]);
+        expect(texts.filter((text) => expected.test(text)).length, texts.join(" ")).toBeGreaterThan(1);
+        await picture(page, `axes-${factor}`);
+        expect(faults.filter((fault) => !fault.startsWith("fetched"))).toEqual([]);
+        await page.context().close();
+      }
     });
 
     test("says that nothing touches, and shows no dot then", async () => {
@@ -156,7 +337,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       expect(await page.locator("#banner").textContent()).toContain("not live");
       await picture(page, "lost");
       server = await Server.start([], port);
-      await says(page, "connection", /^Connected$/);
+      await says(page, "connection", /^Simulated$/);
       await page.locator("#banner").waitFor({ state: "hidden" });
       await says(page, "status", /^Located$/);
     });
@@ -203,7 +384,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
 
     test("explains itself, and is live after the simulated board was chosen, by keys alone", async () => {
       const { page, faults } = await open(browser, server.url);
-      await says(page, "connection", /^Connected$/);
+      await says(page, "connection", /^No source$/);
       await page.locator("#welcome").waitFor();
       await picture(page, "welcome");
       for (let i = 0; i < 10; i++) {

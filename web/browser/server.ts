@@ -19,9 +19,9 @@ export class Server {
   ) {}
 
   /** Starts a server and waits for its first answer. */
-  static async start(args: string[], port?: number): Promise<Server> {
+  static async start(args: string[], port?: number, folder = ROOT): Promise<Server> {
     const listen = `127.0.0.1:${port ?? (await freePort())}`;
-    const child = start(BINARY, ["serve", ...args, "--listen", listen], { cwd: ROOT, stdio: ["ignore", "pipe", "pipe"] });
+    const child = start(BINARY, ["serve", ...args, "--listen", listen], { cwd: folder, stdio: ["ignore", "pipe", "pipe"] });
     const said: string[] = [];
     child.stdout!.on("data", (bytes: Buffer) => said.push(bytes.toString()));
     child.stderr!.on("data", (bytes: Buffer) => said.push(bytes.toString()));

@@ -1,6 +1,17 @@
 // Requests to `palpate serve`, at the address that the page came from.
 
-import type { CalibrationRecord, CalibrationStep, RecordingContent, RecordingInfo, SessionInfo } from "./protocol";
+import type {
+  AlarmFile,
+  BringUpRecord,
+  CalibrationRecord,
+  CalibrationStep,
+  MadeRigRecord,
+  PastRecord,
+  RecordingContent,
+  RecordingInfo,
+  RigForm,
+  SessionInfo,
+} from "./protocol";
 
 /** An answer of the server that is no success: its words, and what can be done. */
 export class ApiError extends Error {
@@ -38,6 +49,12 @@ async function post(path: string, body: object): Promise<Response> {
 }
 
 export const api = {
+  past: () => get<PastRecord>("history"),
+  bringUp: () => get<BringUpRecord>("bring-up"),
+  choosePort: async (port: string | null, baud: number) => (await (await post("bring-up", { port, baud })).json()) as BringUpRecord,
+  makeRig: async (form: RigForm) => (await (await post("rig", form)).json()) as MadeRigRecord,
+  alarms: () => get<AlarmFile>("alarms"),
+  setAlarms: async (text: string) => (await (await post("alarms", { text })).json()) as AlarmFile,
   session: () => get<SessionInfo>("session"),
   recordings: () => get<RecordingInfo[]>("recordings"),
   recording: (name: string, points: number) =>

@@ -40,3 +40,14 @@ export function remember(key: string, value: string): void {
     // A browser that keeps nothing asks again the next time.
   }
 }
+
+/** Hands a file to the browser's downloads. */
+export function save(name: string, content: Blob): void {
+  const url = URL.createObjectURL(content);
+  const link = element("a", "");
+  link.href = url;
+  link.download = name;
+  link.click();
+  // The browser reads it after this turn.
+  setTimeout(() => URL.revokeObjectURL(url), 10_000);
+}

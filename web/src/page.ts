@@ -1,15 +1,19 @@
 // The page: what the session sends and a person does, and what is shown of it.
 
 import { api, ApiError } from "./api";
-import { need, setText } from "./dom";
+import { need, remember, remembered, save, setText } from "./dom";
 import { startKeys } from "./keys";
 import { Live } from "./model/live";
 import { Pace } from "./model/pace";
-import type { Player } from "./model/player";
+import { takeSnapshot, type Snapshot } from "./model/snapshot";
+import { csv } from "./model/summary";
+import { Alarms } from "./panel/alarms";
+import { BringUpPanel } from "./panel/bring_up";
 import { CalibrationPanel } from "./panel/calibration";
 import { announce, Events } from "./panel/events";
 import { Health } from "./panel/health";
 import { writeNumbers } from "./panel/numbers";
+import { isSimulated, pill, SILENT_S } from "./panel/pill";
 import { listRecordings } from "./panel/recordings";
 import { Replay } from "./panel/replay";
 import type { SessionInfo, StreamMessage } from "./protocol";
@@ -20,18 +24,15 @@ import { Charts } from "./view/charts";
 import { LineView } from "./view/line";
 import { onTheme } from "./view/palette";
 import { drawPlane } from "./view/plane";
-import { describe, isPlane, type Shown } from "./view/surface";
-import { bytes, PLAIN_MARK, seconds } from "./words";
+import { describe, isPlane } from "./view/surface";
+import { badFrameWords, bytes, PLAIN_MARK, seconds } from "./words";
 
-/** Milliseconds between two drawings: numbers are to be read, and charts cost most. */
-const SURFACE_MS = 16;
-const CHARTS_MS = 66;
-const NUMBERS_MS = 100;
-const HEALTH_MS = 250;
+/** Milliseconds between two snapshots; all views of a frame show one snapshot. */
+const SNAPSHOT_MS = 33;
+/** Milliseconds between two writings of facts that no estimate belongs to: age, rate, counts. */
+const FACTS_MS = 250;
 /** Motion for people who ask for less of it. */
 const REDUCED_MS = 200;
-/** Without a reading for so long the page says so. */
-const SILENT_S = 2;
 
 /** Views of a session; made anew for another one. */
 interface Views {
@@ -52,9 +53,11 @@ export class Page {
     () => this.calibrationChanged(),
     (error) => this.failed(error),
   );
+  private bringUp = new BringUpPanel(() => void this.ask());
+  private alarms = new Alarms();
   private connection: Connection = "connecting";
   private paused = false;
-  private shown: Shown | null = null;
+  private shown: Snapshot | null = null;
   private heard_ms = performance.now();
   private pace = new Pace();
   private dirty = true;
@@ -68,6 +71,12 @@ export class Page {
     need("simulate").addEventListener("click", () => this.simulate());
     need("help").addEventListener("click", () => need<HTMLDialogElement>("help-dialog").showModal());
     need("window").addEventListener("change", () => this.pace.all());
+    need("export-csv").addEventListener("click", () => this.exportCsv());
+    need("export-png").addEventListener("click", () => this.exportPng());
+    need("simulated-close").addEventListener("click", () => {
+      remember("simulated", "seen");
+      need("simulated").hidden = true;
+    });
     need("mark-form").addEventListener("submit", () => this.mark());
     need("mark-cancel").addEventListener("click", () => need<HTMLDialogElement>("mark-dialog").close());
     startKeys({
@@ -99,9 +108,6 @@ export class Page {
 
   connected(connection: Connection): void {
     this.connection = connection;
-    const chip = need("connection");
-    chip.dataset.state = connection;
-    setText(chip, { connecting: "Connecting…", open: "Connected", lost: "Connection lost" }[connection]);
     if (connection === "open") {
       this.heard_ms = performance.now();
       void this.ask();
@@ -110,7 +116,10 @@ export class Page {
   }
 
   take(message: StreamMessage): void {
+    const waited = this.live.state?.source == null;
     const told = this.live.take(message);
+    this.alarms.take(told);
+    if (waited !== (message.state.source === null)) this.writeBanner();
     if (message.samples.length > 0) {
       this.heard_ms = performance.now();
       document.body.classList.remove("unread");
@@ -132,6 +141,14 @@ export class Page {
         this.shown = null;
         this.views = { line: new LineView(), charts: new Charts(session), budget: new Budget(session), health: new Health(session), events: new Events() };
         need("surface").classList.toggle("plane", isPlane(session));
+        const live = this.live;
+        void api.past().then(
+          (past) => {
+            live.takePast(past);
+            if (past.samples.length > 0) document.body.classList.remove("unread");
+          },
+          (error: unknown) => this.failed(error),
+        );
         await this.list();
       }
       this.writeSession(session);
@@ -144,8 +161,14 @@ export class Page {
     const locator = session.locator;
     setText(need("locator"), locator === null ? "no locator" : `${locator.name} · ${locator.kind}`);
     need("locator").title = locator?.description.join("\n") ?? "";
+    if (session.brings_up) this.bringUp.follow();
+    else this.bringUp.end();
     if (session.calibrates) this.calibration.follow();
-    need("welcome").hidden = session.source !== null || (session.calibrates && session.locator === null);
+    need("simulated").hidden = !isSimulated(session) || remembered("simulated") !== null;
+    need("welcome").hidden = session.source !== null || session.locator === null;
+    const alarms = need<HTMLButtonElement>("alarms");
+    alarms.disabled = session.locator === null;
+    alarms.title = session.locator === null ? "Alarms need a locator" : "Rules that raise alarms";
     setText(need("welcome-title"), this.live.sample === null ? "No source of readings yet" : "The source has ended");
     need("simulate").hidden = need("welcome-simulated").hidden = !session.has_simulated;
     const tare = need<HTMLButtonElement>("tare");
@@ -175,6 +198,10 @@ export class Page {
   }
 
   private writeBanner(): void {
+    const { state, words: source } = pill(this.connection, this.session, this.live.state, this.silent_s());
+    const chip = need("connection");
+    chip.dataset.state = state;
+    setText(chip, source);
     const banner = need("banner");
     const words = this.bannerWords();
     document.body.classList.toggle("stale", words !== "" && this.replay.player === null);
@@ -187,8 +214,15 @@ export class Page {
     if (this.connection === "lost") return "The connection to palpate serve is lost: what is shown is not live. Trying again.";
     const expected = this.connection === "open" && this.session !== null && this.session.source !== null;
     if (!expected || this.silent_s() < SILENT_S) return "";
-    if (this.live.state?.source == null) return "The source is away and looked for again: what is shown is not live.";
-    return "The source sends no readings: what is shown is not live.";
+    if (this.live.state?.source == null) {
+      const waits = (this.live.state?.counters.readings ?? 0) === 0;
+      return waits ? "The source is not there yet; it is opened as soon as it is." : "The source is away and looked for again: what is shown is not live.";
+    }
+    // A word for the cause that is most frequent, which does not change with every frame.
+    const bad = Object.entries(this.live.state?.counters.bad_frames ?? {}).sort(([, one], [, other]) => other - one);
+    const cause = bad[0]?.[0];
+    if (cause === undefined) return "The source sends no readings: what is shown is not live.";
+    return `The source sends frames that are not readings (${badFrameWords(cause)}): what is shown is not live.`;
   }
 
   /** A calibration that guides has no estimates: what shows them is left out, and the next place is drawn. */
@@ -256,6 +290,26 @@ export class Page {
     }, "").finally(() => (button.disabled = false));
   }
 
+  private exportCsv(): void {
+    if (this.session === null || this.shown === null) return;
+    save(`${this.exportName()}.csv`, new Blob([csv(this.session, this.shown.history, this.shown.span)], { type: "text/csv" }));
+  }
+
+  private exportPng(): void {
+    this.views?.charts.png().toBlob((png) => {
+      if (png === null) return this.notice("This browser makes no picture of the charts.");
+      save(`${this.exportName()}.png`, png);
+    });
+  }
+
+  /** Name of an exported file: date and time of the last reading, by the browser's clock. */
+  private exportName(): string {
+    const date = new Date((this.shown?.span.to_s ?? 0) * 1000);
+    const two = (part: number) => String(part).padStart(2, "0");
+    const day = `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())}`;
+    return `palpate-${day}-${two(date.getHours())}${two(date.getMinutes())}${two(date.getSeconds())}`;
+  }
+
   private async list(): Promise<void> {
     if (this.session === null) return;
     await listRecordings(this.session, (name) => void this.act(() => this.openReplay(name), ""));
@@ -295,47 +349,50 @@ export class Page {
       this.replay.write();
     }
     this.pace.frame(1000 * elapsed_s);
-    const due = (part: string, every_ms: number) =>
-      this.pace.due(part, now, this.reduced.matches ? Math.max(every_ms, REDUCED_MS) : every_ms);
-    if (due("health", HEALTH_MS)) {
-      this.views.health.write(this.live);
-      this.views.events.write(this.live);
-      if (this.shown !== null) this.views.budget.draw(this.shown.sample);
-    }
-    const frozen = this.paused && player === null;
-    if (!due("surface", SURFACE_MS) && !this.dirty) return;
-    if (this.shown === null || !frozen) this.shown = this.instant(this.session, player);
-    else if (!this.dirty) return;
-    this.drawSurface(this.views, this.shown);
-    if (due("numbers", NUMBERS_MS) || this.dirty) {
-      writeNumbers(this.session, this.shown.sample);
-      need("surface").setAttribute("aria-label", describe(this.shown));
-      this.writeSurfaceNote(this.views, this.shown);
-    }
+    const every_ms = this.reduced.matches ? REDUCED_MS : SNAPSHOT_MS;
+    if (!this.pace.due("snapshot", now, every_ms) && !this.dirty) return;
     this.dirty = false;
-    if (!frozen && due("charts", CHARTS_MS)) this.drawCharts(this.views, player);
+    const frozen = this.paused && player === null;
+    if (this.shown === null || !frozen) this.shown = this.snapshot(this.session);
+    this.show(this.views, this.shown, frozen);
+    if (this.pace.due("facts", now, FACTS_MS)) {
+      const live = frozen ? this.snapshot(this.session) : this.shown;
+      need("surface").setAttribute("aria-label", describe(this.shown));
+      this.views.health.writeFacts(live);
+      this.views.events.write(live);
+    }
   }
 
-  private instant(session: SessionInfo, player: Player | null): Shown {
-    const { baseline, sample, trail } =
-      player === null ? this.live : { baseline: player.baseline, sample: player.sample(), trail: player.trail() };
-    return {
+  private snapshot(session: SessionInfo): Snapshot {
+    return takeSnapshot({
       session,
-      sample,
-      trail: this.reduced.matches ? [] : trail.aged(),
+      live: this.live,
+      player: this.replay.player,
       calibration: this.calibration.guides ? this.calibration.state : null,
-      deflections: sample === null || sample.status === "no_contact" ? null : baseline.deflections(sample.reading),
-    };
+      window_s: Number(need<HTMLSelectElement>("window").value),
+      showsTrail: !this.reduced.matches,
+    });
   }
 
-  private drawSurface(views: Views, shown: Shown): void {
+  /** Draws every view from one snapshot. */
+  private show(views: Views, shown: Snapshot, frozen: boolean): void {
+    this.drawSurface(views, shown);
+    writeNumbers(shown);
+    this.writeSurfaceNote(views, shown);
+    views.budget.draw(shown);
+    views.health.writeChannels(shown);
+    // A person may have chosen a part of a chart that stands still.
+    if (!frozen) views.charts.draw(shown);
+  }
+
+  private drawSurface(views: Views, shown: Snapshot): void {
     const frame = begin(need<HTMLCanvasElement>("surface"));
     if (frame === null) return;
     if (isPlane(shown.session)) drawPlane(frame, shown);
     else views.line.draw(frame, shown);
   }
 
-  private writeSurfaceNote(views: Views, shown: Shown): void {
+  private writeSurfaceNote(views: Views, shown: Snapshot): void {
     const plane = isPlane(shown.session);
     const surface = shown.session.surface;
     const across = plane ? ` × ${surface?.width_mm} mm` : "";
@@ -348,18 +405,6 @@ export class Page {
     const times = views.line.exaggeration;
     if (!plane && times !== null) parts.push(`deflection as measured, ${formatTimes(times)} × exaggerated, a spline between the sensors`);
     setText(need("surface-legend"), parts.join(" · "));
-  }
-
-  private drawCharts(views: Views, player: Player | null): void {
-    if (player !== null) {
-      const to_s = player.start_s + Math.max(player.seconds, 0.1);
-      views.charts.draw(player.history, { from_s: player.start_s, to_s, head_s: player.start_s + player.head_s }, player.baseline.mean);
-      return;
-    }
-    const to_s = this.live.history.lastTime();
-    if (Number.isNaN(to_s)) return;
-    const from_s = to_s - Number(need<HTMLSelectElement>("window").value);
-    views.charts.draw(this.live.history, { from_s, to_s, head_s: null }, this.live.baseline.mean);
   }
 }
 

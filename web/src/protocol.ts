@@ -54,6 +54,8 @@ export type EventRecord = { time_s: number } & (
   | { event: "outside_model" }
   | { event: "channel"; name: string; state: ChannelState }
   | { event: "tared" }
+  | { event: "trouble"; text: string }
+  | { event: "alarm"; name: string; text: string }
   | { event: "mark"; text: string }
 );
 
@@ -63,6 +65,12 @@ export interface StreamMessage {
   samples: SampleRecord[];
   events: EventRecord[];
   missed: number;
+}
+
+/** Past of a session: ten samples a second of the last ten minutes, and the last events. */
+export interface PastRecord {
+  samples: SampleRecord[];
+  events: EventRecord[];
 }
 
 export interface ChannelInfo {
@@ -100,6 +108,8 @@ export interface SessionInfo {
   recording: RecordingState | null;
   has_simulated: boolean;
   calibrates: boolean;
+  /** True where the server has a board without a rig. */
+  brings_up: boolean;
 }
 
 /** Where recordings go; a name while one is being made. */
@@ -203,4 +213,51 @@ export interface CalibrationOutcome {
   gain_percent: number | null;
   stop_percent: number | null;
   remarks: string[];
+}
+
+/** A board without a rig. */
+export interface BringUpRecord {
+  from: string;
+  /** Of serial ports. */
+  port: string | null;
+  baud: number | null;
+  ports: { name: string; device: string | null }[];
+  source: string | null;
+  problem: string | null;
+  bytes: number;
+  readings: number;
+  rate_hz: number;
+  bad_frames: Record<string, number>;
+  channels: { name: string; now: number | null; range: [number, number] | null }[];
+  /** True where the board names its values. */
+  named: boolean;
+  lines: { time_s: number; text: string; reads: boolean }[];
+}
+
+/** Answers of a person from which the server makes a rig. */
+export interface RigForm {
+  file: string;
+  channels: string[];
+  length_mm: number;
+  width_mm: number | null;
+  places: number[];
+  repeats: number;
+  force_n: number;
+  force_is_known: boolean;
+  overwrite: boolean;
+  write: boolean;
+}
+
+export interface MadeRigRecord {
+  file: string;
+  text: string;
+  /** Command that calibrates it later. */
+  command: string;
+  written: boolean;
+  /** Files that would be replaced. */
+  exists: string[];
+}
+
+export interface AlarmFile {
+  text: string;
 }

@@ -97,6 +97,10 @@ export function eventWords(event: EventRecord): string {
       return `Channel ${event.name}: ${channelWords(event.state)}`;
     case "tared":
       return "Tared: the baseline was taken anew";
+    case "trouble":
+      return `Trouble: ${event.text}`;
+    case "alarm":
+      return `Alarm: ${event.text} (${event.name})`;
     case "mark":
       return event.text === PLAIN_MARK ? "Mark" : `Mark: ${event.text}`;
   }
@@ -112,6 +116,35 @@ export function number(value: number, sd?: number): string {
 export function fixed(value: number, places: number): string {
   const digits = value.toFixed(places);
   return Number(digits) === 0 ? digits.replace("-", "") : digits.replace("-", "−");
+}
+
+/** Values of an axis whose ticks are `step` apart, all with as many digits as tell them apart. */
+export function axisNumbers(values: readonly number[], step: number): string[] {
+  const largest = Math.max(...values.map(Math.abs), 0);
+  // Small values all along the axis are written by a power of ten.
+  if (largest > 0 && largest < SMALL) {
+    const power = Math.floor(Math.log10(largest) + 1e-9);
+    const digits = decimalsOf(step / 10 ** power);
+    return values.map((value) => (value === 0 ? "0" : `${fixed(value / 10 ** power, digits)}e${fixed(power, 0)}`));
+  }
+  return values.map((value) => grouped(fixed(Math.abs(value) < step / 2 ? 0 : value, decimalsOf(step))));
+}
+
+/** Decimals that multiples of a step have, 12 at most. */
+function decimalsOf(step: number): number {
+  let places = 0;
+  const isWhole = (scaled: number) => Math.abs(scaled - Math.round(scaled)) <= 1e-6 * scaled;
+  while (places < 12 && !isWhole(step * 10 ** places)) places += 1;
+  return places;
+}
+
+/** Largest value of an axis that is written by a power of ten. */
+const SMALL = 1e-3;
+
+/** Digits before the point in groups of three, from five digits on. */
+function grouped(text: string): string {
+  const [, sign, whole, rest] = /^(−?)(\d+)(.*)$/.exec(text) ?? ["", "", text, ""];
+  return whole!.length < 5 ? text : `${sign}${whole!.replace(/\B(?=(\d{3})+$)/g, ",")}${rest}`;
 }
 
 /** A standard deviation or another size, to two digits. */

@@ -55,12 +55,44 @@ describe("scales", () => {
 });
 
 describe("history", () => {
-  test("the oldest rows give way, and rows are found by time", () => {
-    const history = new History(2, 4);
-    for (let i = 0; i < 10; i++) history.push(sample(i, 100 + i));
-    expect([history.length, history.oldest, history.at(TIME, 0), history.lastTime()]).toEqual([4, 6, 106, 109]);
+  test("rows are found by time", () => {
+    const history = new History(2, 20);
+    for (let i = 6; i < 10; i++) history.push(sample(i, 100 + i));
+    expect([history.length, history.at(TIME, 0), history.lastTime()]).toEqual([4, 106, 109]);
     expect(history.at(FIRST_CHANNEL + 1, 3)).toBe(-9);
     expect([0, 106, 106.5, 109, 200].map((time) => history.firstFrom(time))).toEqual([0, 0, 1, 3, 4]);
+  });
+
+  test("older rows are thinned, keep their peaks, and go after ten minutes", () => {
+    const history = new History(1, 100);
+    // 40 readings a second for 700 s, with a peak of one reading at 500 s.
+    for (let i = 0; i < 28_000; i++) history.push(sample(i, i / 40, "located", [i === 20_003 ? 99 : Math.sin(i)]));
+    const times = Array.from({ length: history.length }, (_, row) => history.at(TIME, row));
+    const values = times.map((_, row) => history.at(FIRST_CHANNEL, row));
+    expect(history.length).toBeLessThan(12_200);
+    expect(times[0]).toBeGreaterThan(99);
+    expect(times[0]).toBeLessThan(101);
+    expect(Math.max(...values)).toBe(99);
+    expect(times.every((time, row) => row === 0 || time >= times[row - 1]!)).toBe(true);
+    // The newest hundred are as they came.
+    expect(values.slice(-100)).toEqual(Array.from({ length: 100 }, (_, i) => Math.sin(27_900 + i)));
+  });
+
+  test("a gap stays a gap when its rows are thinned", () => {
+    const history = new History(1, 2);
+    [0, 0.01, 0.02].forEach((time) => history.push(sample(0, time)));
+    history.pushGap(0.03);
+    [0.04, 0.05, 0.06, 0.07].forEach((time) => history.push(sample(0, time)));
+    const rows = Array.from({ length: history.length }, (_, row) => history.at(FIRST_CHANNEL, row));
+    expect(rows.some(Number.isNaN)).toBe(true);
+  });
+
+  test("samples from before the first row are added once, and none twice", () => {
+    const history = new History(1, 10);
+    history.push(sample(5, 50));
+    history.pushBefore([10, 20, 50, 60].map((time) => sample(time / 10, time)), [15]);
+    history.pushBefore([sample(1, 10)], []);
+    expect(Array.from({ length: history.length }, (_, row) => history.at(TIME, row))).toEqual([10, 15, 20, 50]);
   });
 
   test("a position stands only where something was located, no contact has no force, and of what nothing explains none is known", () => {
@@ -78,13 +110,13 @@ describe("envelope", () => {
     history.push(sample(0, 0, "located", [7]));
     history.pushGap(1);
     history.push(sample(2, 2, "located", [9]));
-    expect(envelope(history, [FIRST_CHANNEL], 0, 100)).toEqual([[0, 1, 2], [7, null, 9]]);
+    expect(envelope(history, [FIRST_CHANNEL], 0, 2, 100)).toEqual([[0, 1, 2], [7, null, 9]]);
   });
 
   test("of many rows no peak is lost, the number of points is bounded, and times never fall", () => {
     const history = new History(1, 5000);
     for (let i = 0; i < 7000; i++) history.push(sample(i, i * 1e-3, "located", [i === 4321 ? 99 : i === 5000 ? -99 : Math.sin(i)]));
-    const [times, values] = envelope(history, [FIRST_CHANNEL], 0, 400) as [number[], number[]];
+    const [times, values] = envelope(history, [FIRST_CHANNEL], 2, 7, 400) as [number[], number[]];
     expect(times.length).toBeLessThanOrEqual(404);
     expect(times.length).toBeGreaterThan(150);
     expect([Math.max(...values), Math.min(...values)]).toEqual([99, -99]);
@@ -94,11 +126,19 @@ describe("envelope", () => {
   test("points stay where they are while the window moves", () => {
     const history = new History(1, 1000);
     for (let i = 0; i < 1000; i++) history.push(sample(i, i, "located", [Math.sin(i * i)]));
-    const before = envelope(history, [FIRST_CHANNEL], 0, 100);
+    const before = envelope(history, [FIRST_CHANNEL], 0, 999, 100);
     for (let i = 1000; i < 1003; i++) history.push(sample(i, i, "located", [0]));
-    const after = envelope(history, [FIRST_CHANNEL], 3, 100);
+    const after = envelope(history, [FIRST_CHANNEL], 3, 1002, 100);
     const at = new Map(after[0]!.map((time, i) => [time, after[1]![i]]));
     before[0]!.slice(2, -2).forEach((time, i) => expect(at.get(time)).toBe(before[1]![i + 2]));
+  });
+});
+
+describe("envelope of a span", () => {
+  test("rows after the span are not part of it", () => {
+    const history = new History(1, 10);
+    [1, 2, 3, 4].forEach((time) => history.push(sample(time, time, "located", [time])));
+    expect(envelope(history, [FIRST_CHANNEL], 2, 3, 100)).toEqual([[1, 2, 3], [1, 2, 3]]);
   });
 });
 
@@ -215,10 +255,10 @@ describe("live", () => {
     expect([live.history.length, live.trail.aged().length]).toEqual([1, 1]);
   });
 
-  test("keeps the last 200 events", () => {
+  test("keeps the last 1,000 events", () => {
     const live = new Live(1);
-    for (let i = 0; i < 300; i++) live.take(message([], [{ time_s: i, event: "mark", text: String(i) }]));
-    expect([live.events.length, live.events[0]!.time_s, live.eventCount]).toEqual([200, 100, 300]);
+    for (let i = 0; i < 1100; i++) live.take(message([], [{ time_s: i, event: "mark", text: String(i) }]));
+    expect([live.events.length, live.events[0]!.time_s, live.eventCount]).toEqual([1000, 100, 1100]);
   });
 });
 

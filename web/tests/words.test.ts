@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 import type { EstimateRecord, EventRecord } from "../src/protocol";
-import { badFrameWords, begun, bytes, contactWords, eventWords, hertz, number, seconds, size, statusWords, unit } from "../src/words";
+import { axisNumbers, badFrameWords, begun, bytes, contactWords, eventWords, hertz, number, seconds, size, statusWords, unit } from "../src/words";
 
 describe("numbers", () => {
   test("a standard deviation says how many decimals mean something", () => {
@@ -22,6 +22,28 @@ describe("numbers", () => {
     expect([999, 1500, 2_340_000].map(bytes)).toEqual(["999 B", "1.5 kB", "2.3 MB"]);
     expect([1.5, 99.7, 20_000].map(hertz)).toEqual(["1.5 Hz", "100 Hz", "20,000 Hz"]);
     expect(["um", "mm", "N", "u", ""].map(unit)).toEqual(["µm", "mm", "N", "u", ""]);
+  });
+});
+
+describe("numbers of an axis", () => {
+  test("are whole, whatever their size", () => {
+    expect(axisNumbers([-20_000, 0, 20_000], 20_000)).toEqual(["−20,000", "0", "20,000"]);
+    expect(axisNumbers([-8_388_608, -8_388_600], 8)).toEqual(["−8,388,608", "−8,388,600"]);
+    expect(axisNumbers([1e-6, 2e-6], 1e-6)).toEqual(["1e−6", "2e−6"]);
+    expect(axisNumbers([0, 2.5e-6, 5e-6], 2.5e-6)).toEqual(["0", "2.5e−6", "5.0e−6"]);
+    expect(axisNumbers([5, 5.000001], 1e-6)).toEqual(["5.000000", "5.000001"]);
+    expect(axisNumbers([-0.5, 0, 0.5], 0.5)).toEqual(["−0.5", "0.0", "0.5"]);
+    expect(axisNumbers([0.0025, 0.005], 0.0025)).toEqual(["0.0025", "0.0050"]);
+    expect(axisNumbers([9995, 10_000], 5)).toEqual(["9995", "10,000"]);
+  });
+
+  test("tell neighbours apart", () => {
+    for (const step of [1e-9, 2.5e-5, 0.002, 0.25, 2.5, 20, 5e6]) {
+      for (const start of [0, step * 40, -step * 1234]) {
+        const numbers = axisNumbers([0, 1, 2, 3].map((i) => start + i * step), step);
+        expect(new Set(numbers).size, numbers.join(" ")).toBe(4);
+      }
+    }
   });
 });
 

@@ -81,6 +81,13 @@ pub enum Event {
         /// What, and why.
         text: String,
     },
+    /// A rule has raised an alarm.
+    Alarm {
+        /// Name of the rule.
+        name: String,
+        /// Its text.
+        text: String,
+    },
     /// Somebody's mark.
     Mark {
         /// Its text.
@@ -105,6 +112,7 @@ impl Event {
             Self::Channel { .. } => "channel",
             Self::Tared => "tared",
             Self::Trouble { .. } => "trouble",
+            Self::Alarm { .. } => "alarm",
             Self::Mark { .. } => "mark",
         }
     }

@@ -52,4 +52,11 @@ pub enum Command {
     Mark(String),
     /// Tell that something beside the session does not work, or works again.
     Trouble(String),
+    /// Raise an alarm.
+    Alarm {
+        /// Name of the rule.
+        name: String,
+        /// Its text.
+        text: String,
+    },
 }

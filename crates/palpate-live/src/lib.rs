@@ -11,6 +11,7 @@ pub mod feed;
 pub mod frame;
 pub mod input;
 pub mod login;
+pub mod monitor;
 pub mod pipeline;
 pub mod recording;
 pub mod rules;

@@ -1,4 +1,4 @@
-//! Rules: what is published, or sent to the board, when a contact is somewhere, or presses so hard, or something happens.
+//! Rules: messages, commands to the board and alarms when a contact is somewhere, presses with some force, or something happens.
 //!
 //! A rule file is TOML:
 //!
@@ -20,12 +20,17 @@
 //! [[rule]]
 //! event = "touch_down"
 //! command = "brake"              # a line to the board that the readings come from
+//!
+//! [[rule]]
+//! force = ["20 N", "1 kN"]
+//! alarm = "too hard"             # an event of the session, which the dashboard shows large
 //! ```
 
 use crate::event::EventRecord;
 use crate::sample::Sample;
 use crate::session::Output;
 use palpate_core::{ContactEstimate, Status};
+use palpate_estimators::estimator::Locator;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_length_mm};
 use serde::Deserialize;
@@ -60,6 +65,19 @@ pub enum Action {
     },
     /// Sends a line to the board that the readings come from.
     Command(String),
+    /// Raises an alarm with this text.
+    Alarm(String),
+}
+
+/// Rules of a file by what they do.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RulesByAction {
+    /// Rules that publish messages.
+    pub publishing: Rules,
+    /// Rules that send commands to the board.
+    pub commanding: Rules,
+    /// Rules that raise alarms.
+    pub alarming: Rules,
 }
 
 /// When a rule acts.
@@ -111,6 +129,8 @@ const EVENTS: [&str; 14] = [
 const AWAY: [&str; 2] = ["source_lost", "source_ended"];
 /// Most bytes of a command.
 const LONGEST_COMMAND: usize = 200;
+/// Most characters of an alarm.
+const LONGEST_ALARM: usize = 200;
 /// Most rules of a file.
 const MOST: usize = 1000;
 
@@ -133,6 +153,17 @@ struct RuleIn {
     topic: Option<Spanned<String>>,
     message: Option<Spanned<String>>,
     command: Option<Spanned<String>>,
+    alarm: Option<Spanned<String>>,
+}
+
+impl RuleError {
+    /// The problem with the line of the text that is meant.
+    pub fn with_line(&self, text: &str) -> String {
+        match self.span.as_ref().and_then(|span| text.get(..span.start)) {
+            Some(before) => format!("line {}: {}", before.matches('\n').count() + 1, self.problem),
+            None => self.problem.clone(),
+        }
+    }
 }
 
 impl Rules {
@@ -164,15 +195,76 @@ impl Rules {
         self.0.iter().find(asks)
     }
 
-    /// The rules that publish messages, and those that send commands to the board.
-    pub fn by_action(self) -> (Self, Self) {
-        let publishes = |rule: &Rule| matches!(rule.action, Action::Publish { .. });
-        let (publishing, commanding) = self.0.into_iter().partition(publishes);
-        (Self(publishing), Self(commanding))
+    /// The rules by what they do.
+    pub fn by_action(self) -> RulesByAction {
+        let mut sorted = RulesByAction::default();
+        for rule in self.0 {
+            let kind = match rule.action {
+                Action::Publish { .. } => &mut sorted.publishing,
+                Action::Command(_) => &mut sorted.commanding,
+                Action::Alarm(_) => &mut sorted.alarming,
+            };
+            kind.0.push(rule);
+        }
+        sorted
+    }
+
+    /// The rules as a file's text.
+    pub fn to_toml(&self) -> String {
+        self.0.iter().map(Rule::to_toml).collect::<Vec<_>>().join("\n")
+    }
+
+    /// Checks that all rules raise alarms, and can act with this locator.
+    ///
+    /// # Errors
+    /// The first rule that does not, in words.
+    pub fn check_alarms(&self, locator: &Locator) -> Result<(), String> {
+        if let Some(rule) = self.0.iter().find(|rule| !matches!(rule.action, Action::Alarm(_))) {
+            return Err(format!(
+                "rule `{}` does not raise an alarm; `palpate serve --rules FILE` and `palpate record` take others",
+                rule.name
+            ));
+        }
+        match self.first_of_force() {
+            Some(rule) if !locator.tells_force() => {
+                Err(format!("rule `{}` asks for a `force`, which this locator does not estimate", rule.name))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
 impl Rule {
+    fn to_toml(&self) -> String {
+        let quoted = |text: &str| toml::Value::from(text).to_string();
+        let mut lines = vec!["[[rule]]".to_owned(), format!("name = {}", quoted(&self.name))];
+        match &self.condition {
+            Condition::Event(event) => lines.push(format!("event = {}", quoted(event))),
+            Condition::Contact { x_m, y_m, force_n, hold } => {
+                let bands = [("x", x_m, 1e3, "mm"), ("y", y_m, 1e3, "mm"), ("force", force_n, 1.0, "N")];
+                for (key, band, factor, unit) in bands {
+                    let Some((low, high)) = band else { continue };
+                    // Twelve digits hide the last bits of the change of unit.
+                    let rounded = |value: f64| format!("{value:.11e}").parse().unwrap_or(value);
+                    let (low, high) = (rounded(low * factor), rounded(high * factor));
+                    lines.push(format!("{key} = [\"{low} {unit}\", \"{high} {unit}\"]"));
+                }
+                if !hold.is_zero() {
+                    lines.push(format!("hold = \"{} s\"", hold.as_secs_f64()));
+                }
+            }
+        }
+        match &self.action {
+            Action::Publish { topic, message } => {
+                lines.push(format!("topic = {}", quoted(topic)));
+                lines.push(format!("message = {}", quoted(message)));
+            }
+            Action::Command(line) => lines.push(format!("command = {}", quoted(line))),
+            Action::Alarm(text) => lines.push(format!("alarm = {}", quoted(text))),
+        }
+        lines.join("\n") + "\n"
+    }
+
     fn read(number: usize, given: Spanned<RuleIn>, extent: Extent) -> Result<Self, RuleError> {
         let span = given.span();
         let given = given.into_inner();
@@ -214,7 +306,10 @@ impl Rule {
                 ));
             }
         };
-        let action = action(span, given.topic, given.message, given.command)?;
+        let action = match given.alarm {
+            None => action(span, given.topic, given.message, given.command)?,
+            Some(alarm) => alarm_of(alarm, [given.topic, given.message, given.command])?,
+        };
         if let (Condition::Event(event), Action::Command(_), Some(at)) = (&condition, &action, event_at)
             && AWAY.contains(&event.as_str())
         {
@@ -261,10 +356,28 @@ fn action(
         }
         (Some(topic), None, None) => Err(error_at(topic.span(), "`topic` needs a `message`".to_owned())),
         (None, Some(message), None) => Err(error_at(message.span(), "`message` needs a `topic`".to_owned())),
-        (None, None, None) => {
-            Err(error_at(rule, "the rule has no `topic` and `message`, and no `command`".to_owned()))
-        }
+        (None, None, None) => Err(error_at(
+            rule,
+            "the rule has no `topic` and `message`, no `command` and no `alarm`".to_owned(),
+        )),
     }
+}
+
+/// The action of a rule with an `alarm`, beside which it has no `others`.
+fn alarm_of(alarm: Spanned<String>, others: [Option<Spanned<String>>; 3]) -> Result<Action, RuleError> {
+    if let Some(other) = others.into_iter().flatten().next() {
+        let problem = "a rule has an `alarm`, or `topic` and `message`, or a `command`; write two rules";
+        return Err(error_at(other.span(), problem.to_owned()));
+    }
+    let text = alarm.get_ref();
+    let length = text.chars().count();
+    if text.trim().is_empty() || length > LONGEST_ALARM || text.contains(char::is_control) {
+        let problem = format!(
+            "`alarm` has {length} characters; it must be a line of 1 to {LONGEST_ALARM}, without control characters"
+        );
+        return Err(error_at(alarm.span(), problem));
+    }
+    Ok(Action::Alarm(alarm.into_inner()))
 }
 
 fn error_at(span: Range<usize>, problem: String) -> RuleError {
@@ -353,6 +466,11 @@ impl RuleWatch {
     /// Watch over rules of which none has acted.
     pub fn new(rules: Rules) -> Self {
         Self { states: vec![State::default(); rules.0.len()], rules }
+    }
+
+    /// The rules.
+    pub fn rules(&self) -> &Rules {
+        &self.rules
     }
 
     /// Takes the next output of a session, and hands on the rules that act now.
@@ -499,6 +617,26 @@ mod tests {
     }
 
     #[test]
+    fn rules_as_text_are_read_as_the_same_rules() {
+        let text = FILE.to_owned()
+            + "[[rule]]\nname = \"a \\\"b\\\"\"\nx = [\"0.1 mm\", \"12.3 mm\"]\nforce = [\"0.3 N\", \"2 kN\"]\nhold = \"50 ms\"\nalarm = \"ö\"\n\
+               [[rule]]\nevent = \"mark\"\ncommand = \"led on\"\n";
+        let rules = Rules::from_toml(&text, beam()).unwrap();
+        assert_eq!(Rules::from_toml(&rules.to_toml(), beam()).unwrap(), rules, "{}", rules.to_toml());
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        let text = "[[rule]]\nevent = \"tared\"\nalarm = \"\"\n";
+        let error = Rules::from_toml(text, beam()).unwrap_err();
+        assert!(
+            error.with_line(text).starts_with("line 3: `alarm` has 0 characters"),
+            "{}",
+            error.with_line(text)
+        );
+    }
+
+    #[test]
     fn what_is_wrong_is_named_at_its_place() {
         let cases = [
             (r#"x = ["5 mm", "1 mm"]"#, r#"["5 mm", "1 mm"]"#),
@@ -543,9 +681,9 @@ mod tests {
     #[test]
     fn a_rule_publishes_or_commands_and_its_mistakes_are_named_at_their_place() {
         let rules = "[[rule]]\nevent = \"mark\"\ncommand = \"led on\"\n".to_owned() + FILE;
-        let (publishing, commanding) = Rules::from_toml(&rules, beam()).unwrap().by_action();
-        assert_eq!(publishing.as_slice().len(), 2);
-        assert_eq!(commanding.as_slice()[0].action, Action::Command("led on".to_owned()));
+        let sorted = Rules::from_toml(&rules, beam()).unwrap().by_action();
+        assert_eq!((sorted.publishing.as_slice().len(), sorted.alarming.as_slice().len()), (2, 0));
+        assert_eq!(sorted.commanding.as_slice()[0].action, Action::Command("led on".to_owned()));
         let long = format!("command = \"{}\"", "x".repeat(201));
         for (lines, meant) in [
             ("command = \"a\\nb\"", "\"a\\nb\""),
@@ -556,6 +694,9 @@ mod tests {
             ("topic = \"t\"", "\"t\""),
             ("message = \"m\"", "\"m\""),
             ("topic = \"t/#\"\nmessage = \"m\"", "\"t/#\""),
+            ("alarm = \" \"", "\" \""),
+            ("alarm = \"a\\u0007\"", "\"a\\u0007\""),
+            ("alarm = \"a\"\ncommand = \"c\"", "\"c\""),
         ] {
             let text = format!("[[rule]]\nevent = \"mark\"\n{lines}\n");
             let error = Rules::from_toml(&text, beam()).unwrap_err();

@@ -5,28 +5,32 @@ import { TIME, type History } from "./history";
 /** Times, then values by column; null where there is none. */
 export type Series = (number | null)[][];
 
+/** Shortest stretch of time that two points stand for, in seconds; longer ones are this times a power of two. */
+const SHORTEST_S = 2 ** -12;
+
 /**
- * The rows of a history from a time on, of the columns asked for. Beyond `most` rows, each stretch of 2ⁿ rows gives two points: its lowest and
- * its highest value, in the order in which they came. Stretches begin at multiples of their length, counted from the first row that ever was:
- * points stay where they are while the window moves over them.
+ * The rows of a history in a span of time, of the columns asked for. Beyond `most` rows, a stretch of time gives two points a column: its lowest and
+ * its highest value, in the order in which they came. Stretches begin at multiples of their length, so that points stay where they are while the window moves.
  */
-export function envelope(history: History, columns: number[], from_s: number, most: number): Series {
+export function envelope(history: History, columns: number[], from_s: number, to_s: number, most: number): Series {
   const first = Math.max(0, history.firstFrom(from_s) - 1);
+  const end = history.firstFrom(to_s + 1e-9);
   const out: Series = [[], ...columns.map(() => [])];
-  let stretch = 1;
-  while (2 * (history.length - first) > most * stretch) stretch *= 2;
-  if (stretch <= 2) {
-    for (let row = first; row < history.length; row++) {
+  if (end - first <= most) {
+    for (let row = first; row < end; row++) {
       out[0]!.push(history.at(TIME, row));
       columns.forEach((column, i) => out[i + 1]!.push(orNull(history.at(column, row))));
     }
     return out;
   }
-  let begin = first - ((history.oldest + first) % stretch);
-  for (; begin < history.length; begin += stretch) {
-    const [from, to] = [Math.max(begin, 0), Math.min(begin + stretch, history.length)];
+  let stretch_s = SHORTEST_S;
+  while (2 * (to_s - from_s) > most * stretch_s) stretch_s *= 2;
+  for (let from = first; from < end; ) {
+    const next = (Math.floor(history.at(TIME, from) / stretch_s) + 1) * stretch_s;
+    const to = Math.max(from + 1, Math.min(end, history.firstFrom(next)));
     out[0]!.push(history.at(TIME, from), history.at(TIME, (from + to - 1) >> 1));
     columns.forEach((column, i) => out[i + 1]!.push(...extremes(history, column, from, to)));
+    from = to;
   }
   return out;
 }

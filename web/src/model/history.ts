@@ -1,4 +1,4 @@
-// The readings of the last minute, for charts.
+// The readings of the last ten minutes, for charts: the newest as they came, older ones thinned.
 
 import type { SampleRecord } from "../protocol";
 import { isPlaced } from "../words";
@@ -19,34 +19,86 @@ export const FIRST_CHANNEL = 10;
 /** Half the width of a 95 % interval, in standard deviations. */
 const Z_95 = 1.96;
 
-/** A ring of rows. What is not known is NaN. */
+/** Seconds that a history keeps. */
+export const KEPT_S = 600;
+/** Seconds of older rows that two rows stand for. */
+const BUCKET_S = 0.1;
+/** Rows of the older part: two a bucket, and as many gaps at most. */
+const OLD_ROWS = Math.ceil((3 * KEPT_S) / BUCKET_S);
+
+/**
+ * Rows by time, the oldest first; unknown values are NaN. The newest rows are kept as they came. A row that gives way to a newer one goes into a bucket of
+ * 0.1 s, of which two rows stay: the lowest and the highest value of every column, so that no peak is lost.
+ */
 export class History {
-  private readonly columns: Float64Array[];
-  private start = 0;
-  private count = 0;
-  private gone = 0;
+  private readonly recent: Ring;
+  private readonly old: Ring;
+  private bucket: Bucket;
 
   constructor(
     readonly channels: number,
-    readonly capacity: number,
+    capacity: number,
   ) {
-    this.columns = Array.from({ length: FIRST_CHANNEL + channels }, () => new Float64Array(capacity));
+    const columns = FIRST_CHANNEL + channels;
+    this.recent = new Ring(columns, capacity);
+    this.old = new Ring(columns, OLD_ROWS);
+    this.bucket = new Bucket(columns);
   }
 
   get length(): number {
-    return this.count;
+    return this.old.count + this.recent.count;
   }
 
-  /** Number of the oldest row, counted from the first that ever was. */
-  get oldest(): number {
-    return this.gone;
-  }
-
-  /** Adds a sample; the oldest row gives way when all are taken. */
   push(sample: SampleRecord): void {
-    const row = this.next();
+    this.add(this.row(sample));
+  }
+
+  /** Adds a row without values, so that no line is drawn over a stretch without readings. */
+  pushGap(time_s: number): void {
+    this.add(gap(time_s, FIRST_CHANNEL + this.channels));
+  }
+
+  /** Adds samples from before the first row; samples that are not before it are left out. */
+  pushBefore(samples: readonly SampleRecord[], gaps: readonly number[]): void {
+    if (this.old.count > 0) return;
+    const first = this.recent.count === 0 ? Infinity : this.recent.at(TIME, 0);
+    const rows = [...samples.map((sample) => this.row(sample)), ...gaps.map((time_s) => gap(time_s, FIRST_CHANNEL + this.channels))];
+    rows.sort((one, other) => one[TIME]! - other[TIME]!);
+    for (const row of rows) if (row[TIME]! < first) this.old.push(row);
+  }
+
+  clear(): void {
+    this.recent.clear();
+    this.old.clear();
+    this.bucket.clear();
+  }
+
+  /** The time of the newest row; NaN of an empty history. */
+  lastTime(): number {
+    return this.length === 0 ? NaN : this.at(TIME, this.length - 1);
+  }
+
+  at(column: number, row: number): number {
+    const old = this.old.count;
+    return row < old ? this.old.at(column, row) : this.recent.at(column, row - old);
+  }
+
+  /** The first row that is not before a time. */
+  firstFrom(time_s: number): number {
+    let low = 0;
+    let high = this.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.at(TIME, middle) < time_s) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  private row(sample: SampleRecord): Float64Array {
+    const row = new Float64Array(FIRST_CHANNEL + this.channels);
     const set = (column: number, value: number | undefined) => {
-      this.columns[column]![row] = value ?? NaN;
+      row[column] = value ?? NaN;
     };
     set(TIME, sample.time_s);
     const placed = isPlaced(sample.status);
@@ -56,54 +108,123 @@ export class History {
     set(Y, placed ? sample.y_mm : NaN);
     set(Y_LOW, placed ? sample.y_95_mm?.[0] : NaN);
     set(Y_HIGH, placed ? sample.y_95_mm?.[1] : NaN);
-    // Of a reading that no contact explains nothing is known of the force; 0 would look like a release.
+    // The force of a reading that no contact explains is unknown; 0 would look like a release.
     const force = placed ? sample.force_n : sample.status === "no_contact" ? 0 : NaN;
     const half = Z_95 * (sample.sd_force_n ?? NaN);
     set(FORCE, force);
     set(FORCE_LOW, placed ? (sample.force_95_n?.[0] ?? (force ?? NaN) - half) : NaN);
     set(FORCE_HIGH, placed ? (sample.force_95_n?.[1] ?? (force ?? NaN) + half) : NaN);
     for (let i = 0; i < this.channels; i++) set(FIRST_CHANNEL + i, sample.reading[i]);
+    return row;
   }
 
-  /** Adds a row without values, so that no line is drawn over a stretch without readings. */
-  pushGap(time_s: number): void {
-    const row = this.next();
-    this.columns.forEach((column) => (column[row] = NaN));
-    this.columns[TIME]![row] = time_s;
+  private add(row: Float64Array): void {
+    const evicted = this.recent.push(row);
+    if (evicted !== null) this.bucket.add(evicted, this.old);
+    const oldest = this.lastTime() - KEPT_S;
+    while (this.old.count > 0 && this.old.at(TIME, 0) < oldest) this.old.shift();
+  }
+}
+
+function gap(time_s: number, columns: number): Float64Array {
+  const row = new Float64Array(columns).fill(NaN);
+  row[TIME] = time_s;
+  return row;
+}
+
+/** A ring of rows. */
+class Ring {
+  private readonly columns: Float64Array[];
+  private readonly evicted: Float64Array;
+  private start = 0;
+  count = 0;
+
+  constructor(
+    columns: number,
+    private readonly capacity: number,
+  ) {
+    this.columns = Array.from({ length: columns }, () => new Float64Array(capacity));
+    this.evicted = new Float64Array(columns);
   }
 
-  clear(): void {
-    this.count = 0;
-    this.start = 0;
-    this.gone = 0;
+  /** Adds a row; gives the oldest one where it had to give way, until the next call. */
+  push(row: ArrayLike<number>): Float64Array | null {
+    const full = this.count === this.capacity;
+    const place = (this.start + this.count) % this.capacity;
+    this.columns.forEach((column, i) => {
+      if (full) this.evicted[i] = column[place]!;
+      column[place] = row[i]!;
+    });
+    if (full) this.start = (this.start + 1) % this.capacity;
+    else this.count += 1;
+    return full ? this.evicted : null;
   }
 
-  /** The time of the newest row; NaN of an empty history. */
-  lastTime(): number {
-    return this.count === 0 ? NaN : this.at(TIME, this.count - 1);
+  shift(): void {
+    this.start = (this.start + 1) % this.capacity;
+    this.count -= 1;
   }
 
   at(column: number, row: number): number {
     return this.columns[column]![(this.start + row) % this.capacity]!;
   }
 
-  /** The first row that is not before a time. */
-  firstFrom(time_s: number): number {
-    let low = 0;
-    let high = this.count;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.at(TIME, middle) < time_s) low = middle + 1;
-      else high = middle;
-    }
-    return low;
+  clear(): void {
+    this.start = this.count = 0;
+  }
+}
+
+/** Lowest and highest values of the rows of one stretch of time, in the order in which they came. */
+class Bucket {
+  private number = NaN;
+  private readonly first: Float64Array;
+  private readonly second: Float64Array;
+  /** Columns whose highest value came first. */
+  private readonly falls: Uint8Array;
+
+  constructor(columns: number) {
+    this.first = new Float64Array(columns);
+    this.second = new Float64Array(columns);
+    this.falls = new Uint8Array(columns);
   }
 
-  private next(): number {
-    if (this.count < this.capacity) return (this.start + this.count++) % this.capacity;
-    const row = this.start;
-    this.start = (this.start + 1) % this.capacity;
-    this.gone += 1;
-    return row;
+  /** Adds a row; a stretch that has ended goes to `into`. A row without values ends its stretch. */
+  add(row: Float64Array, into: Ring): void {
+    const number = Math.floor(row[TIME]! / BUCKET_S);
+    const isGap = row.every((value, i) => i === TIME || Number.isNaN(value));
+    if (number !== this.number || isGap) {
+      this.end(into);
+      if (isGap) return void into.push(row);
+      this.number = number;
+      this.first.set(row);
+      this.second.set(row);
+      this.falls.fill(0);
+      return;
+    }
+    this.second[TIME] = row[TIME]!;
+    for (let i = 0; i < row.length; i++) if (i !== TIME) this.widen(i, row[i]!);
+  }
+
+  clear(): void {
+    this.number = NaN;
+  }
+
+  private widen(i: number, value: number): void {
+    if (Number.isNaN(value)) return;
+    const [low, high] = this.falls[i] === 1 ? [this.second[i]!, this.first[i]!] : [this.first[i]!, this.second[i]!];
+    if (Number.isNaN(low)) {
+      this.first[i] = this.second[i] = value;
+    } else if (value > high) {
+      [this.first[i], this.second[i], this.falls[i]] = [low, value, 0];
+    } else if (value < low) {
+      [this.first[i], this.second[i], this.falls[i]] = [high, value, 1];
+    }
+  }
+
+  private end(into: Ring): void {
+    if (Number.isNaN(this.number)) return;
+    into.push(this.first);
+    if (this.second[TIME]! > this.first[TIME]!) into.push(this.second);
+    this.number = NaN;
   }
 }

@@ -1,16 +1,16 @@
 // What the page knows of the session, from its messages.
 
-import type { EventRecord, SampleRecord, StateRecord, StreamMessage } from "../protocol";
+import type { EventRecord, PastRecord, SampleRecord, StateRecord, StreamMessage } from "../protocol";
 import { Baseline } from "./baseline";
 import { History } from "./history";
 import { Trail } from "./trail";
 
 /** Events that are kept; moves are many, and only in the recording. */
-const EVENTS = 200;
-/** Rows of a history at most: a minute of 1,000 readings a second. */
+const EVENTS = 1_000;
+/** Rows of a history that are kept as they came: a minute of 1,000 readings a second, ten minutes of 100. */
 const ROWS = 60_000;
 
-/** The session as the page shows it: pure, so that a test sees the page's own answer to a message. */
+/** The session by its messages. */
 export class Live {
   readonly history: History;
   readonly trail = new Trail();
@@ -40,6 +40,17 @@ export class Live {
     }
     while (next < told.length) this.note(told[next++]!);
     return told;
+  }
+
+  /** Takes what the server kept of the session from before the first message. */
+  takePast(past: PastRecord): void {
+    const firstEvent = this.events[0]?.time_s ?? Infinity;
+    const events = past.events.filter((event) => event.time_s < firstEvent);
+    const gaps = events.flatMap((event) => (event.event === "gap" ? [event.time_s - event.seconds / 2] : []));
+    this.history.pushBefore(past.samples, gaps);
+    this.events.unshift(...events.slice(-Math.max(0, EVENTS - this.events.length)));
+    this.eventCount += events.length;
+    if (this.baseline.mean === null) past.samples.forEach((sample) => this.baseline.push(sample));
   }
 
   private add(sample: SampleRecord): void {

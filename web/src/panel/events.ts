@@ -1,24 +1,64 @@
-// The list of events, and what is said aloud.
+// The log of events, its search, and what is said aloud.
 
-import { element, need } from "../dom";
-import type { Live } from "../model/live";
+import { element, need, setText } from "../dom";
+import type { Snapshot } from "../model/snapshot";
 import type { EventRecord } from "../protocol";
 import { clock, eventWords } from "../words";
 
 /** Events listed at most. */
-const LISTED = 60;
+const LISTED = 200;
+
+/** Kinds of events that a person can choose. */
+const KINDS: Record<string, string> = {
+  touch_down: "contact",
+  lift_off: "contact",
+  second_contact: "contact",
+  outside_model: "contact",
+  move: "contact",
+  source_opened: "source",
+  source_lost: "source",
+  source_ended: "source",
+  gap: "source",
+  clock_set: "source",
+  channel: "source",
+  trouble: "source",
+  tared: "source",
+  alarm: "alarm",
+  mark: "mark",
+};
 
 export class Events {
-  private written = -1;
+  private written = "";
 
-  write(live: Live): void {
-    if (live.eventCount === this.written) return;
-    this.written = live.eventCount;
-    const newest = live.events.slice(-LISTED).reverse();
+  constructor() {
+    // The next snapshot is a quarter of a second away.
+    need("events-search").oninput = need("events-kind").onchange = () => (this.written = "");
+  }
+
+  write({ events, eventCount }: Snapshot): void {
+    const search = need<HTMLInputElement>("events-search").value;
+    const kind = need<HTMLSelectElement>("events-kind").value;
+    const written = JSON.stringify([eventCount, search, kind]);
+    if (written === this.written) return;
+    this.written = written;
+    const found = findEvents(events, search, kind);
+    const listed = found.slice(-LISTED).reverse();
+    const all = search === "" && kind === "" && found.length <= LISTED;
+    setText(need("events-count"), all ? "" : `${listed.length} of ${events.length}`);
     need("events").replaceChildren(
-      ...newest.map((event) => element("li", "", element("time", "quiet", clock(event.time_s)), ` ${eventWords(event)}`)),
+      ...listed.map((event) => element("li", event.event === "alarm" ? "alarmed" : "", element("time", "quiet", clock(event.time_s)), ` ${eventWords(event)}`)),
     );
   }
+}
+
+/** Events of a kind whose time and words have every word of a search, in any case. */
+export function findEvents(events: readonly EventRecord[], search: string, kind: string): EventRecord[] {
+  const words = search.toLowerCase().split(/\s+/).filter((word) => word !== "");
+  return events.filter((event) => {
+    if (kind !== "" && KINDS[event.event] !== kind) return false;
+    const text = `${clock(event.time_s)} ${eventWords(event)}`.toLowerCase();
+    return words.every((word) => text.includes(word));
+  });
 }
 
 /** Says touch-down, lift-off and what else a person must know to a screen reader: the newest of a message. */

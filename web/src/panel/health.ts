@@ -1,7 +1,7 @@
 // Health of channels and source, in words.
 
 import { element, need, setText } from "../dom";
-import type { Live } from "../model/live";
+import type { Snapshot } from "../model/snapshot";
 import type { SessionInfo } from "../protocol";
 import { badFrameWords, channelWords, hertz, number, seconds, size, unit } from "../words";
 
@@ -22,28 +22,31 @@ export class Health {
     need("source").replaceChildren();
   }
 
-  write(live: Live): void {
-    this.rows.forEach((row, i) => this.writeChannel(row, live, i));
-    const state = live.state;
+  writeChannels(shown: Snapshot): void {
+    this.rows.forEach((row, i) => this.writeChannel(row, shown, i));
+  }
+
+  writeFacts(shown: Snapshot): void {
+    const state = shown.state;
     const counters = state?.counters;
     const bad = Object.entries(counters?.bad_frames ?? {});
-    this.fact("Source", this.sourceWords(live));
+    this.fact("Source", this.sourceWords(shown));
     this.fact("Readings a second", state === null ? "—" : hertz(state.rate_hz));
-    this.fact("Age of the last reading", ageWords(live));
+    this.fact("Age of the last reading", ageWords(shown));
     this.fact("Readings located", (counters?.readings ?? 0).toLocaleString("en-GB"));
     this.fact("Frames lost", (counters?.lost_frames ?? 0).toLocaleString("en-GB"));
     this.fact("Gaps", String(counters?.gaps ?? 0));
     this.fact("Bad frames", bad.length === 0 ? "none" : bad.map(([cause, n]) => `${n} ${badFrameWords(cause)}`).join("; "));
-    this.fact("Messages this browser missed", String(live.missed));
+    this.fact("Messages this browser missed", String(shown.missed));
     this.fact("Baseline", tareWords(this.session));
   }
 
-  private writeChannel(row: HTMLTableCellElement[], live: Live, i: number): void {
-    const channel = live.state?.channels[i];
+  private writeChannel(row: HTMLTableCellElement[], shown: Snapshot, i: number): void {
+    const channel = shown.state?.channels[i];
     const [state, now, noise, range] = row;
     if (channel === undefined || !state || !now || !noise || !range) return;
     const symbol = unit(this.session.channels[i]?.unit ?? "");
-    const value = live.sample?.reading[i];
+    const value = shown.live?.reading[i];
     state.dataset.state = channel.state;
     setText(state, channel.range === null ? "no reading yet" : channelWords(channel.state));
     setText(now, value === undefined ? "—" : `${number(value, channel.noise_sd)} ${symbol}`);
@@ -51,8 +54,8 @@ export class Health {
     setText(range, channel.range === null ? "—" : channel.range.map((end) => number(end, channel.noise_sd)).join("\nto "));
   }
 
-  private sourceWords(live: Live): string {
-    if (live.state?.source != null) return live.state.source;
+  private sourceWords(shown: Snapshot): string {
+    if (shown.state?.source != null) return shown.state.source;
     return this.session.source === null ? "none" : `${this.session.source}: not there, looked for again`;
   }
 
@@ -67,9 +70,9 @@ export class Health {
   }
 }
 
-function ageWords(live: Live): string {
-  if (live.sample === null) return "—";
-  const age_s = Date.now() / 1000 - live.sample.time_s;
+function ageWords(shown: Snapshot): string {
+  if (shown.live === null) return "—";
+  const age_s = Date.now() / 1000 - shown.live.time_s;
   // The reading has the time of the server, and the page that of the browser.
   return age_s < -0.05 ? "unknown: the server's clock is ahead of this browser's" : seconds(Math.max(0, age_s));
 }

@@ -1,11 +1,12 @@
 // Status, position and force, as large numbers.
 
 import { need, setText } from "../dom";
+import type { Snapshot } from "../model/snapshot";
 import type { SampleRecord, SessionInfo } from "../protocol";
 import { isPlane } from "../view/surface";
 import { isPlaced, number, statusWords } from "../words";
 
-export function writeNumbers(session: SessionInfo, sample: SampleRecord | null): void {
+export function writeNumbers({ session, sample }: Snapshot): void {
   const status = need("status");
   if (sample === null) {
     status.dataset.status = "none";

@@ -2,14 +2,16 @@
 
 import { forceFactor, limitAt } from "../model/limit";
 import { fit, linear, ticks } from "../model/scale";
+import type { Snapshot } from "../model/snapshot";
 import type { SampleRecord, SessionInfo } from "../protocol";
-import { isPlaced, number, size } from "../words";
+import { axisNumbers, isPlaced, number, size } from "../words";
 import { need, setText } from "../dom";
-import { begin, disc, segment, type Frame } from "./canvas";
+import { begin, disc, segment, textWithin, widest, type Frame } from "./canvas";
 import { palette } from "./palette";
 import { isPlane } from "./surface";
 
-const MARGIN = { left: 46, right: 12, top: 12, bottom: 30 };
+/** Room around the curve, in pixels; on the left as much again as the numbers of the axis take. */
+const MARGIN = { left: 8, right: 12, top: 12, bottom: 30 };
 
 export class Budget {
   private canvas = document.createElement("canvas");
@@ -21,8 +23,8 @@ export class Budget {
     need("budget").hidden = session.limit === null;
   }
 
-  /** Words and picture for a sample. */
-  draw(sample: SampleRecord | null): void {
+  /** Words and picture of the budget. */
+  draw({ sample }: Snapshot): void {
     const words = budgetWords(this.session, sample);
     setText(need("budget-words"), words);
     this.canvas.setAttribute("aria-label", words);
@@ -63,7 +65,10 @@ function drawCurve({ ctx, width, height }: Frame, session: SessionInfo, sample: 
   const lowest = Math.floor(Math.log10(Math.min(...sds)));
   const highest = Math.max(lowest + 1, Math.ceil(Math.log10(Math.max(...sds))));
   const [top, bottom] = [MARGIN.top, height - MARGIN.bottom];
-  const x = linear([0, surface.length_mm], [MARGIN.left, width - MARGIN.right]);
+  const powers = Array.from({ length: highest - lowest + 1 }, (_, i) => lowest + i);
+  const numbers = powers.map((power) => axisNumbers([10 ** power], 10 ** power)[0]!);
+  const left = MARGIN.left + 6 + widest(ctx, numbers);
+  const x = linear([0, surface.length_mm], [left, width - MARGIN.right]);
   const log = linear([lowest, highest], [bottom, top]);
   const y = (sd_mm: number) => log(Math.min(highest, Math.max(lowest, Math.log10(sd_mm))));
   ctx.fillStyle = quiet;
@@ -71,13 +76,13 @@ function drawCurve({ ctx, width, height }: Frame, session: SessionInfo, sample: 
   ctx.lineWidth = 1;
   ctx.textAlign = "right";
   ctx.textBaseline = "middle";
-  for (let power = lowest; power <= highest; power++) {
+  powers.forEach((power, i) => {
     segment(ctx, x(0), log(power), width - MARGIN.right, log(power));
-    ctx.fillText(String(Number((10 ** power).toPrecision(1))), x(0) - 6, log(power));
-  }
+    ctx.fillText(numbers[i]!, x(0) - 6, log(power));
+  });
   ctx.textAlign = "center";
   ctx.textBaseline = "top";
-  for (const mm of ticks(surface.length_mm, Math.max(2, Math.floor(width / 80)))) ctx.fillText(number(mm, 1), x(mm), bottom + 6);
+  for (const mm of ticks(surface.length_mm, Math.max(2, Math.floor(width / 80)))) textWithin(ctx, number(mm, 1), x(mm), bottom + 6, width);
   ctx.textAlign = "left";
   ctx.fillText("sd, mm", 2, height - 14);
   ctx.strokeStyle = accent;

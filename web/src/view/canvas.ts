@@ -33,3 +33,15 @@ export function segment(ctx: CanvasRenderingContext2D, x0: number, y0: number, x
   ctx.lineTo(x1, y1);
   ctx.stroke();
 }
+
+/** Width in pixels of the widest of some texts, in the canvas's font. */
+export function widest(ctx: CanvasRenderingContext2D, texts: readonly string[]): number {
+  return Math.ceil(Math.max(0, ...texts.map((text) => ctx.measureText(text).width)));
+}
+
+/** Writes a text centred on a pixel, moved in from the edges of a canvas of this width. */
+export function textWithin(ctx: CanvasRenderingContext2D, text: string, px: number, y: number, width: number): void {
+  const half = ctx.measureText(text).width / 2 + 2;
+  ctx.textAlign = "center";
+  ctx.fillText(text, Math.min(Math.max(px, half), Math.max(half, width - half)), y);
+}

@@ -3,10 +3,12 @@
 import uPlot from "uplot";
 import { envelope } from "../model/envelope";
 import * as column from "../model/history";
-import type { History } from "../model/history";
+import type { Snapshot } from "../model/snapshot";
+import { summary } from "../model/summary";
 import type { SessionInfo } from "../protocol";
-import { clock, unit } from "../words";
+import { axisNumbers, clock, seconds, unit } from "../words";
 import { element, need } from "../dom";
+import { segment, widest } from "./canvas";
 import { channelStroke, onTheme, palette } from "./palette";
 import { isPlane } from "./surface";
 
@@ -16,59 +18,78 @@ const MOST_POINTS = 2_000;
 /** Seconds between two times that are written at the axis. */
 const SECONDS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200];
 
-/** What of a history the charts show. */
-export interface Span {
-  from_s: number;
-  to_s: number;
-  /** Instant that a line marks: that of a replay. */
-  head_s: number | null;
-}
-
-/** What each channel reads untouched, where that is known. */
-export type Untouched = number[] | null;
+/** Milliseconds between two changes of the text that stands for a chart. */
+const TEXT_MS = 2_000;
 
 export class Charts {
   private position: Chart;
   private force: Chart;
   private channels: Chart;
   private hidden = new Set<number>();
-  private shown: { history: History; span: Span; untouched: Untouched } | null = null;
+  private shown: Snapshot | null = null;
+  private texted_ms = -Infinity;
 
   constructor(private session: SessionInfo) {
     const plane = isPlane(session);
     const x = banded("x", () => palette().contact, [column.X, column.X_LOW, column.X_HIGH]);
     const y = banded("y", () => palette().accent, [column.Y, column.Y_LOW, column.Y_HIGH], [6, 3]);
-    this.position = new Chart("chart-position", plane ? [...x, ...y] : x, plane ? 2 : 1, "Position over time");
-    this.force = new Chart("chart-force", banded("F", () => palette().accent, [column.FORCE, column.FORCE_LOW, column.FORCE_HIGH]), 1, "Force over time");
-    this.channels = new Chart("chart-channels", this.channelLines(), 0, "Readings over time");
+    this.position = new Chart("chart-position", plane ? [...x, ...y] : x, plane ? 2 : 1);
+    this.force = new Chart("chart-force", banded("F", () => palette().accent, [column.FORCE, column.FORCE_LOW, column.FORCE_HIGH]), 1);
+    this.channels = new Chart("chart-channels", this.channelLines(), 0);
     this.writeButtons();
     const units = [...new Set(session.channels.map((channel) => unit(channel.unit)))];
     need("chart-channels-title").textContent = units.length === 1 && units[0] !== "" ? `Channels in ${units[0]}` : "Channels";
     const known = session.force.known_n;
     need("chart-force-title").textContent = known === null ? "Force in N, with its 95 % interval" : `Force in N: known to be ${known} N of every contact`;
-    const zeroed = need<HTMLInputElement>("zeroed");
-    zeroed.addEventListener("change", () => this.again());
+    need("zeroed").onchange = () => this.again();
     onTheme(() => {
-      this.position.rebuild();
-      this.force.rebuild();
-      this.channels.rebuild();
+      this.all.forEach((chart) => chart.rebuild());
       this.writeButtons();
       this.again();
     });
   }
 
-  /** Draws a stretch of a history. */
-  draw(history: History, span: Span, untouched: Untouched): void {
-    this.shown = { history, span, untouched };
-    this.position.draw(history, span);
-    this.force.draw(history, span);
-    const zeroed = need<HTMLInputElement>("zeroed").checked;
-    this.channels.draw(history, span, zeroed ? (i) => untouched?.[i] ?? 0 : undefined);
+  private get all(): Chart[] {
+    return [this.position, this.force, this.channels];
   }
 
-  /** Draws what is shown once more: after a change of theme or choice while paused. */
+  draw(shown: Snapshot): void {
+    this.shown = shown;
+    if (Number.isNaN(shown.span.to_s)) return;
+    this.position.draw(shown);
+    this.force.draw(shown);
+    const zeroed = need<HTMLInputElement>("zeroed").checked;
+    this.channels.draw(shown, zeroed ? (i) => shown.untouched?.[i] ?? 0 : undefined);
+    this.writeTexts(shown);
+  }
+
+  /** Draws the snapshot once more: after a change of theme or choice while paused. */
   private again(): void {
-    if (this.shown !== null) this.draw(this.shown.history, this.shown.span, this.shown.untouched);
+    if (this.shown !== null) this.draw(this.shown);
+  }
+
+  /** Texts of the charts for screen readers; they change slowly, so that they can be read. */
+  private writeTexts(shown: Snapshot): void {
+    const now = performance.now();
+    if (now - this.texted_ms < TEXT_MS) return;
+    this.texted_ms = now;
+    const { history, span } = shown;
+    const across = isPlane(this.session);
+    const position = [summary(history, span, across ? "x" : "Position", column.X, "mm"), across ? summary(history, span, "y", column.Y, "mm") : ""];
+    this.position.describe(`Position over ${seconds(span.to_s - span.from_s)}. ${position.join(" ").trim()}`);
+    this.force.describe(`Force over ${seconds(span.to_s - span.from_s)}. ${summary(history, span, "Force", column.FORCE, "N")}`);
+    const channels = this.session.channels.map((channel, i) => summary(history, span, channel.name, column.FIRST_CHANNEL + i, unit(channel.unit)));
+    this.channels.describe(`Readings of ${channels.length} channels over ${seconds(span.to_s - span.from_s)}. ${channels.join(" ")}`);
+  }
+
+  /** The charts one below the other, as a picture. */
+  png(): HTMLCanvasElement {
+    const titles = ["Position in mm", need("chart-force-title").textContent, need("chart-channels-title").textContent];
+    return stacked(this.all.map((chart, i) => ({ title: titles[i] ?? "", canvas: chart.canvas })), this.legend());
+  }
+
+  private legend(): { name: string; stroke: string; dash: number[] }[] {
+    return this.session.channels.flatMap((channel, i) => (this.hidden.has(i) ? [] : [{ name: channel.name, ...channelStroke(i) }]));
   }
 
   private channelLines(): Line[] {
@@ -130,21 +151,64 @@ class Chart {
   private host: HTMLElement;
   private plot: uPlot;
   private head_s: number | null = null;
+  /** Range of the values that a person chose; null where the chart chooses. */
+  private range: [number, number] | null = null;
 
   constructor(
     id: string,
     private lines: Line[],
     private bandCount: number,
-    label: string,
   ) {
     this.host = need(id);
     this.host.setAttribute("role", "img");
-    this.host.setAttribute("aria-label", label);
     this.host.replaceChildren();
     this.plot = this.build();
+    this.bindZoom(need(`${id}-zoom`));
     new ResizeObserver(() => {
       this.plot.setSize({ width: this.host.clientWidth, height: this.host.clientHeight });
     }).observe(this.host);
+  }
+
+  get canvas(): HTMLCanvasElement {
+    return this.plot.ctx.canvas;
+  }
+
+  describe(words: string): void {
+    this.host.setAttribute("aria-label", words);
+  }
+
+  private bindZoom(group: HTMLElement): void {
+    const factors: Record<string, number | null> = { in: 0.5, out: 2, all: null };
+    group.querySelectorAll("button").forEach((button) => {
+      button.onclick = () => this.zoom(factors[button.value] ?? null);
+    });
+  }
+
+  /** Scales the range of the values about its middle; null lets the chart choose it again. */
+  private zoom(factor: number | null): void {
+    const { min, max } = this.plot.scales.y!;
+    if (factor === null || min == null || max == null) return this.setRange(null);
+    const [middle, half] = [(min + max) / 2, (factor * (max - min)) / 2];
+    // A range that doubles cannot tell apart has no axis.
+    if (half > 1e-12 * Math.abs(middle) && half < 1e300) this.setRange([middle - half, middle + half]);
+  }
+
+  private setRange(range: [number, number] | null): void {
+    this.range = range;
+    this.host.classList.toggle("zoomed", range !== null);
+    this.plot.redraw(false, true);
+    this.plot.setData(this.plot.data, false);
+    const { min, max } = this.plot.scales.x!;
+    if (min != null && max != null) this.plot.setScale("x", { min, max });
+  }
+
+  /** Takes a rectangle that was drawn: its height is the new range of the values, its width the new range of the times while the page is paused. */
+  private select(plot: uPlot): void {
+    const { left, top, width, height } = plot.select;
+    const [whole_w, whole_h] = [plot.over.clientWidth, plot.over.clientHeight];
+    if (width > 0 && height > 0 && height < whole_h) this.setRange([plot.posToVal(top + height, "y"), plot.posToVal(top, "y")]);
+    if (width > 0 && width < whole_w) plot.setScale("x", { min: plot.posToVal(left, "x"), max: plot.posToVal(left + width, "x") });
+    plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
   }
 
   rebuild(): void {
@@ -156,10 +220,11 @@ class Chart {
     this.lines.forEach((line, i) => this.plot.setSeries(i + 1, { show: line.shown?.() ?? true }));
   }
 
-  /** Draws a stretch of a history, each column less an offset where one is asked for. */
-  draw(history: History, span: Span, offset?: (line: number) => number): void {
+  /** Draws the span of a snapshot, each column less an offset where one is given. */
+  draw({ history, span }: Snapshot, offset?: (line: number) => number): void {
     this.head_s = span.head_s;
-    const data = envelope(history, this.lines.map((line) => line.column), span.from_s, MOST_POINTS);
+    const columns = this.lines.map((line) => line.column);
+    const data = envelope(history, columns, span.from_s, span.to_s, MOST_POINTS);
     if (offset !== undefined) {
       for (let i = 1; i < data.length; i++) {
         const off = offset(i - 1);
@@ -183,12 +248,12 @@ class Chart {
       width: Math.max(1, this.host.clientWidth),
       height: Math.max(1, this.host.clientHeight),
       legend: { show: false },
-      padding: [6, 8, 0, 0],
-      cursor: { y: false, points: { size: 5 } },
-      scales: { x: { time: true }, y: { range: (_, low, high) => roomy(low, high) } },
+      padding: [6, (plot) => Math.ceil(widthOf(plot, ["00:00:00"]) / 2) + 2, 0, 0],
+      cursor: { y: false, points: { size: 5 }, drag: { x: true, y: true, uni: 20, setScale: false } },
+      scales: { x: { time: true }, y: { range: (_, low, high) => this.range ?? roomy(low, high) } },
       axes: [
         { ...axis, size: 28, space: 84, values: (_, times) => times.map((time) => clock(time).slice(0, 8)), incrs: SECONDS },
-        { ...axis, size: 52, space: 30 },
+        { ...axis, size: widthOfNumbers, space: 30, incrs: STEPS, values: (_, values, _axis, _space, step) => axisNumbers(values, step) },
       ],
       series: [
         {},
@@ -202,7 +267,7 @@ class Chart {
         })),
       ],
       bands,
-      hooks: { draw: [(plot) => this.drawHead(plot)] },
+      hooks: { draw: [(plot) => this.drawHead(plot)], setSelect: [(plot) => this.select(plot)] },
     };
     return new uPlot(options, [[], ...this.lines.map(() => [])], this.host);
   }
@@ -222,6 +287,71 @@ class Chart {
     plot.ctx.stroke();
     plot.ctx.restore();
   }
+}
+
+/** Steps between two numbers of an axis: 1, 2, 2.5 or 5 times a power of ten. */
+const STEPS = Array.from({ length: 64 }, (_, i) => i - 32).flatMap((power) => [1, 2, 2.5, 5].map((step) => Number(`${step}e${power}`)));
+/** Least width of an axis, and what it takes beside its numbers, in pixels. */
+const AXIS_LEAST = 40;
+const AXIS_ROOM = 18;
+
+/** Width of an axis that holds its numbers. */
+function widthOfNumbers(plot: uPlot, numbers: string[] | null): number {
+  if (numbers === null || numbers.length === 0) return AXIS_LEAST;
+  return Math.max(AXIS_LEAST, Math.ceil(widthOf(plot, numbers)) + AXIS_ROOM);
+}
+
+/** Width in CSS pixels of the widest of some texts in the font of the axes. */
+function widthOf(plot: uPlot, texts: string[]): number {
+  const ratio = window.devicePixelRatio || 1;
+  plot.ctx.save();
+  plot.ctx.font = palette().font.replace(/^[\d.]+/, (px) => String(Number(px) * ratio));
+  const width = widest(plot.ctx, texts) / ratio;
+  plot.ctx.restore();
+  return width;
+}
+
+/** Charts with their titles one below the other, and the legend of the last. */
+function stacked(charts: { title: string; canvas: HTMLCanvasElement }[], legend: { name: string; stroke: string; dash: number[] }[]): HTMLCanvasElement {
+  const ratio = window.devicePixelRatio || 1;
+  const out = document.createElement("canvas");
+  const line = 22 * ratio;
+  out.width = Math.max(...charts.map(({ canvas }) => canvas.width)) + 16 * ratio;
+  const ctx = out.getContext("2d")!;
+  const font = `${13 * ratio}px system-ui, sans-serif`;
+  ctx.font = font;
+  const rows: { name: string; stroke: string; dash: number[]; x: number; row: number }[] = [];
+  let [x, row] = [8 * ratio, 0];
+  for (const entry of legend) {
+    const width = 40 * ratio + ctx.measureText(entry.name).width;
+    if (x + width > out.width && x > 8 * ratio) [x, row] = [8 * ratio, row + 1];
+    rows.push({ ...entry, x, row });
+    x += width;
+  }
+  const charted = charts.reduce((sum, { canvas }) => sum + canvas.height + line, 0);
+  out.height = charted + (rows.length === 0 ? 0 : (row + 1) * line) + 8 * ratio;
+  const { ink, card } = palette();
+  ctx.fillStyle = card;
+  ctx.fillRect(0, 0, out.width, out.height);
+  ctx.font = font;
+  ctx.textBaseline = "middle";
+  let top = 0;
+  for (const { title, canvas } of charts) {
+    ctx.fillStyle = ink;
+    ctx.fillText(title, 8 * ratio, top + line / 2);
+    ctx.drawImage(canvas, 8 * ratio, top + line);
+    top += line + canvas.height;
+  }
+  for (const { name, stroke, dash, x, row } of rows) {
+    const y = top + (row + 0.5) * line;
+    ctx.strokeStyle = stroke;
+    ctx.lineWidth = 2 * ratio;
+    ctx.setLineDash(dash.map((length) => length * ratio));
+    segment(ctx, x, y, x + 24 * ratio, y);
+    ctx.fillStyle = ink;
+    ctx.fillText(name, x + 30 * ratio, y);
+  }
+  return out;
 }
 
 /** The range of an axis: a tenth more than the values take, and some where they take none. */

@@ -3,10 +3,10 @@
 import type { ContactRecord, PlaceRecord, SurfaceInfo } from "../protocol";
 import { linear, roundUp, ticks } from "../model/scale";
 import { naturalSpline } from "../model/spline";
+import type { Snapshot } from "../model/snapshot";
 import { isPlaced, number } from "../words";
-import { disc, segment, type Frame } from "./canvas";
+import { disc, segment, textWithin, type Frame } from "./canvas";
 import { palette } from "./palette";
-import type { Shown } from "./surface";
 import { drawTargets } from "./targets";
 
 /** Millimetres of the units that deflections are read in. */
@@ -23,7 +23,7 @@ export class LineView {
   /** Times that the deflections are exaggerated; null where none are drawn. */
   exaggeration: number | null = null;
 
-  draw(frame: Frame, shown: Shown): void {
+  draw(frame: Frame, shown: Snapshot): void {
     const { ctx, width, height } = frame;
     const surface = shown.session.surface;
     if (surface === null) return;
@@ -43,7 +43,7 @@ export class LineView {
   }
 
   /** Deflection in pixels at a pixel along the surface, from the sensors that measure it. */
-  private shape(shown: Shown, surface: SurfaceInfo, height: number, x: (mm: number) => number): (px: number) => number {
+  private shape(shown: Snapshot, surface: SurfaceInfo, height: number, x: (mm: number) => number): (px: number) => number {
     const { session, deflections } = shown;
     const measured = session.channels.flatMap((channel, i) => {
       const mm = MM[channel.unit];
@@ -86,7 +86,7 @@ function drawAxis(ctx: CanvasRenderingContext2D, surface: SurfaceInfo, x: (mm: n
   ctx.textBaseline = "top";
   for (const mm of ticks(surface.length_mm, Math.max(2, Math.floor((right - left) / 70)))) {
     segment(ctx, x(mm), y, x(mm), y + 4);
-    ctx.fillText(number(mm, surface.length_mm >= 50 ? 1 : 0.1), x(mm), y + 7);
+    textWithin(ctx, number(mm, surface.length_mm >= 50 ? 1 : 0.1), x(mm), y + 7, ctx.canvas.clientWidth);
   }
   ctx.textAlign = "right";
   ctx.textBaseline = "bottom";
@@ -136,7 +136,7 @@ function drawBeam(ctx: CanvasRenderingContext2D, left: number, right: number, le
   ctx.lineCap = "butt";
 }
 
-function drawSensors(ctx: CanvasRenderingContext2D, shown: Shown, x: (mm: number) => number, level: number, shape: (px: number) => number): void {
+function drawSensors(ctx: CanvasRenderingContext2D, shown: Snapshot, x: (mm: number) => number, level: number, shape: (px: number) => number): void {
   const { sensor, card, quiet } = palette();
   const placed = shown.session.channels.filter((channel) => channel.x_mm !== null);
   const apart = placed.length > 1 ? (x(shown.session.surface!.length_mm) - x(0)) / placed.length : Infinity;
@@ -169,7 +169,7 @@ function drawNext(ctx: CanvasRenderingContext2D, next: PlaceRecord, x: (mm: numb
   label(ctx, `${next.x_mm.toFixed(1)} mm`, px, level - 56, palette().ink);
 }
 
-function drawContact({ ctx, height }: Frame, shown: Shown, x: (mm: number) => number, level: number, shape: (px: number) => number): void {
+function drawContact({ ctx, height }: Frame, shown: Snapshot, x: (mm: number) => number, level: number, shape: (px: number) => number): void {
   const { contact, card, ink } = palette();
   const sample = shown.sample;
   ctx.fillStyle = contact;

@@ -3,27 +3,30 @@
 import type { ContactRecord, PlaceRecord } from "../protocol";
 import { ofCovariance, ofIntervals, RADIUS_95, type Ellipse } from "../model/ellipse";
 import { fit, linear, ticks } from "../model/scale";
+import type { Snapshot } from "../model/snapshot";
 import { isPlaced, number } from "../words";
-import { disc, segment, type Frame } from "./canvas";
+import { disc, segment, textWithin, widest, type Frame } from "./canvas";
 import { palette } from "./palette";
-import type { Shown } from "./surface";
 import { drawTargets } from "./targets";
 
-const MARGIN = { left: 44, right: 16, top: 14, bottom: 30 };
+/** Room around the surface, in pixels; on the left as much again as the numbers of the axis take. */
+const MARGIN = { left: 12, right: 16, top: 14, bottom: 30 };
 
 interface Place {
   x: (mm: number) => number;
   y: (mm: number) => number;
 }
 
-export function drawPlane({ ctx, width, height }: Frame, shown: Shown): void {
+export function drawPlane({ ctx, width, height }: Frame, shown: Snapshot): void {
   const surface = shown.session.surface;
   if (surface === null || surface.width_mm === null) return;
   const [length, across] = [surface.length_mm, surface.width_mm];
+  ctx.font = palette().font;
+  const numbers = Math.max(widest(ctx, ["mm"]), widest(ctx, [number(0, 1), number(across, 1)]));
   const frame = {
-    left: MARGIN.left,
+    left: MARGIN.left + numbers,
     top: MARGIN.top,
-    width: width - MARGIN.left - MARGIN.right,
+    width: width - MARGIN.left - numbers - MARGIN.right,
     height: height - MARGIN.top - MARGIN.bottom,
   };
   const { left, top, perUnit } = fit({ length, width: across }, frame);
@@ -32,7 +35,6 @@ export function drawPlane({ ctx, width, height }: Frame, shown: Shown): void {
     x: linear([0, length], [left, left + length * perUnit]),
     y: linear([0, across], [top + across * perUnit, top]),
   };
-  ctx.font = palette().font;
   drawFrame(ctx, place, length, across, perUnit);
   drawSensors(ctx, shown, place);
   if (shown.calibration !== null) {
@@ -61,7 +63,7 @@ function drawFrame(ctx: CanvasRenderingContext2D, { x, y }: Place, length: numbe
   ctx.textBaseline = "top";
   for (const mm of ticks(length, count(length))) {
     segment(ctx, x(mm), y(0), x(mm), y(across));
-    ctx.fillText(number(mm, 1), x(mm), y(0) + 6);
+    textWithin(ctx, number(mm, 1), x(mm), y(0) + 6, ctx.canvas.clientWidth);
   }
   ctx.textAlign = "right";
   ctx.textBaseline = "middle";
@@ -77,7 +79,7 @@ function drawFrame(ctx: CanvasRenderingContext2D, { x, y }: Place, length: numbe
   ctx.strokeRect(x(0), y(across), x(length) - x(0), y(0) - y(across));
 }
 
-function drawSensors(ctx: CanvasRenderingContext2D, shown: Shown, { x, y }: Place): void {
+function drawSensors(ctx: CanvasRenderingContext2D, shown: Snapshot, { x, y }: Place): void {
   const { sensor, quiet } = palette();
   ctx.textAlign = "left";
   ctx.textBaseline = "bottom";
@@ -107,7 +109,7 @@ function drawNext(ctx: CanvasRenderingContext2D, next: PlaceRecord, { x, y }: Pl
   ctx.fillText(`${next.x_mm.toFixed(1)}, ${(next.y_mm ?? 0).toFixed(1)} mm`, px + (ctx.textAlign === "right" ? -16 : 16), py - 12);
 }
 
-function drawTrail(ctx: CanvasRenderingContext2D, shown: Shown, { x, y }: Place): void {
+function drawTrail(ctx: CanvasRenderingContext2D, shown: Snapshot, { x, y }: Place): void {
   ctx.fillStyle = palette().contact;
   for (const point of shown.trail) {
     ctx.globalAlpha = 0.35 * (1 - point.age);

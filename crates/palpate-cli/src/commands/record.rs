@@ -11,8 +11,9 @@ use palpate_live::event::Event;
 use palpate_live::input::Input;
 use palpate_live::pipeline;
 use palpate_live::recording::{RecordingStatus, RecordingSwitch};
+use palpate_live::rules::RulesByAction;
 use palpate_live::session::Counters;
-use palpate_live::sink::{Batch, CommandSink, JsonLines, MqttSink, MqttUrl, Sink};
+use palpate_live::sink::{AlarmSink, Alarms, Batch, CommandSink, JsonLines, MqttSink, MqttUrl, Sink};
 use palpate_live::source::{Source, SourceUrl};
 use palpate_live::stamp::HostClock;
 use palpate_mechanics::units::format_count;
@@ -77,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.rules {
         rules::refuse_untold_forces(&rules, path, &locator)?;
     }
-    let (publishing, commanding) = rules.by_action();
+    let RulesByAction { publishing, commanding, alarming } = rules.by_action();
     if let (None, Some(path)) = (&arguments.mqtt, &arguments.rules) {
         rules::refuse_publishing(&publishing, path, "--mqtt mqtt://host/topic names a broker")?;
     }
@@ -108,6 +109,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         })?;
         sinks.push(Box::new(CommandSink::new(commanding, commander, to.clone())));
     }
+    let alarms = Alarms::default();
+    alarms.set(alarming);
+    sinks.push(Box::new(AlarmSink::new(alarms, to.clone())));
     let estimation = arguments.session.config().estimation;
     let recording = RecordingSwitch::new(&locator, estimation, &arguments.from.to_string(), to.clone());
     let recording = recording.map_err(Complaint::new)?;
@@ -207,6 +211,7 @@ impl Sink for Words {
                 Event::SourceOpened { name } => remark!("reading {name}"),
                 Event::SourceLost { why } => remark!("the source is lost: {why}"),
                 Event::Trouble { text } => remark!("{text}"),
+                Event::Alarm { name, text } => remark!("alarm of rule `{name}`: {text}"),
                 Event::Channel { name, state } => remark!("channel {name} is {}", state_in_words(*state)),
                 _ => {}
             }

@@ -13,7 +13,7 @@ use crate::target::{Inputs, Target};
 use palpate_estimators::estimator::{Estimator, Locator};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::calibration::{DepthKnowledge, Journal, plan};
-use palpate_live::rules::Rules;
+use palpate_live::rules::RulesByAction;
 use palpate_live::server::{Access, AccessError, CalibrationPlan, Live, LiveError, Server, ServerError};
 use palpate_live::simulated_board::BoardConfig;
 use palpate_live::source::SourceUrl;
@@ -34,8 +34,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Serve a dashboard: contacts, readings and events of a board, live in a browser.
 ///
-/// A rig is fitted first, to its simulation or to --data, or calibrated in the browser with --calibrate. Without arguments a simulated board on the
-/// bench of the founding paper is shown.
+/// A rig is fitted first, to its simulation or to --data, or calibrated in the browser with --calibrate. With --from alone the page shows what the
+/// board sends, makes a rig for it and calibrates that. Without arguments a simulated board on the bench of the founding paper is shown.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The locator, or a rig to fit
@@ -68,7 +68,7 @@ pub struct Arguments {
     record: Option<PathBuf>,
     #[command(flatten)]
     session: SessionOptions,
-    /// Send the commands of a rule file to the board
+    /// Send the commands of a rule file to the board, and raise its alarms
     #[arg(long, value_name = "FILE.toml")]
     rules: Option<PathBuf>,
     /// The address to listen at; any but loopback needs --token
@@ -104,10 +104,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     sinks.push(Box::new(|_, _, _| Ok(Box::new(Words))));
     let live = match calibration(arguments)? {
         Some(plan) => {
-            let commanding = commands(arguments, plan.rig.setup.surface().extent())?;
-            configured(Live::calibrating(plan, PathBuf::new()), arguments).with_commands(commanding)
+            let rules = rules_of(arguments, plan.rig.setup.surface().extent())?;
+            with_rules(configured(Live::calibrating(plan, PathBuf::new()), arguments), rules)
         }
-        None => live(arguments)?,
+        None => match (&arguments.locator, &arguments.from) {
+            (None, Some(from)) => bringing_up(from, arguments)?,
+            _ => live(arguments)?,
+        },
     };
     let live = Arc::new(live.with_sinks(sinks));
     let server =
@@ -117,7 +120,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             }
             ServerError::Run(_) => Complaint::new(&error),
         })?;
-    if !arguments.calibrate {
+    let has_subject = arguments.locator.is_some() || arguments.from.is_none();
+    if !arguments.calibrate && has_subject {
         begin(&live, arguments)?;
     }
     let query = token.map_or_else(String::new, |token| format!("?token={token}"));
@@ -145,6 +149,17 @@ fn check_folder(folder: &Path) -> Result<(), Failure> {
     }
 }
 
+/// A board without a rig: browsers look at it, make a rig and calibrate it.
+fn bringing_up(from: &SourceUrl, arguments: &Arguments) -> Result<Live, Failure> {
+    if let Some(path) = &arguments.rules {
+        let complaint = Complaint::new(format!("--rules {}: rules need a locator", path.display()));
+        return Err(complaint.help("name the locator, or leave --rules out").into());
+    }
+    let live = Live::bringing_up(from.clone(), PathBuf::new())
+        .map_err(|error| Complaint::new(error).help("--from names the source"))?;
+    Ok(configured(live, arguments))
+}
+
 /// The locator of the arguments, without a session.
 fn live(arguments: &Arguments) -> Result<Live, Failure> {
     let path = arguments.locator.as_deref().unwrap_or(Path::new(DEMO_NAME));
@@ -153,7 +168,7 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
         Some(path) => RigOrLocator::read(path)?,
     };
     // Read before a fit, which may take its time.
-    let commanding = commands(arguments, read.setup().surface().extent())?;
+    let rules = rules_of(arguments, read.setup().surface().extent())?;
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (locator, simulated) = match read {
         RigOrLocator::Locator(locator) => {
@@ -171,7 +186,8 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
         }
     };
     if let Some(path) = &arguments.rules {
-        rules::refuse_untold_forces(&commanding, path, &locator)?;
+        rules::refuse_untold_forces(&rules.commanding, path, &locator)?;
+        rules::refuse_untold_forces(&rules.alarming, path, &locator)?;
     }
     if let Err(error) = locator.tare() {
         remark!("warning: no tare, so offsets that have moved stay in the readings: {error}");
@@ -179,17 +195,21 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
     // A locator that does not go with the options is refused before anything is served.
     arguments.session.session(&locator, path)?;
     // URLs name paths as the command line does: from the folder it was started in.
-    let live = Live::new(locator, &name, simulated, PathBuf::new()).with_commands(commanding);
+    let live = with_rules(Live::new(locator, &name, simulated, PathBuf::new()), rules);
     Ok(configured(live, arguments))
 }
 
-/// The rules of the arguments, which send commands to the board.
-fn commands(arguments: &Arguments, extent: Extent) -> Result<Rules, Failure> {
-    let (publishing, commanding) = rules::read(arguments.rules.as_deref(), extent)?.by_action();
+/// The rules of the arguments: commands to the board, and alarms.
+fn rules_of(arguments: &Arguments, extent: Extent) -> Result<RulesByAction, Failure> {
+    let rules = rules::read(arguments.rules.as_deref(), extent)?.by_action();
     if let Some(path) = &arguments.rules {
-        rules::refuse_publishing(&publishing, path, "`palpate record --mqtt` has one")?;
+        rules::refuse_publishing(&rules.publishing, path, "`palpate record --mqtt` has one")?;
     }
-    Ok(commanding)
+    Ok(rules)
+}
+
+fn with_rules(live: Live, rules: RulesByAction) -> Live {
+    live.with_commands(rules.commanding).with_alarms(rules.alarming)
 }
 
 /// The same with the recordings and sessions of the arguments.
@@ -255,7 +275,9 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
             let simulated = Observer::of_stages().watch(|watch| rig.simulate_watched(arguments.seed, watch));
             simulated.map_err(|error| {
                 let about = |error| Complaint::about(path, error);
-                Failure::of_work(error, |error| about(error).help("--data names a recording to fit"))
+                Failure::of_work(error, |error| {
+                    about(error).help("--data names a recording to fit; --calibrate makes one in the browser")
+                })
             })?
         }
     };

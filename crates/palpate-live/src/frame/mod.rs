@@ -12,6 +12,7 @@ mod text;
 pub use binary::encode_into;
 pub use channel::Channel;
 pub use decoder::{ColumnsError, Decoder, LONGEST_MESSAGE};
+pub(crate) use names::is_reserved;
 pub use quote::quote;
 
 use std::time::Duration;

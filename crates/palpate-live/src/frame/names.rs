@@ -81,6 +81,11 @@ impl Names {
     }
 }
 
+/// True for a name of the time or of the number of a frame.
+pub fn is_reserved(name: &str) -> bool {
+    Names::new(&[]).role(name) != Role::Ignored
+}
+
 /// A frame whose values come one by one.
 pub struct Filling<'a> {
     factors: &'a [f64],

@@ -1,7 +1,9 @@
 //! A locator in live use: the session that runs, and the beginning of another.
 
+use super::bring_up::{BringUp, BringUpError, BringUpRecord};
 use super::calibration::{CalibrationPlan, CalibrationRecord, Calibrator, CalibratorError};
 use super::lock::locked;
+use super::rig_maker::{MadeRig, MadeRigRecord, RigForm, RigFormError};
 use super::session_info::SessionInfo;
 use super::web_sink::{Hub, WebSink};
 use crate::frame::{Channel, ColumnsError};
@@ -11,21 +13,24 @@ use crate::recording::{self, Excerpt, RecordingError, RecordingStatus, Recording
 use crate::rules::Rules;
 use crate::session::{Session, SessionConfig, SessionError};
 use crate::simulated_board::BoardConfig;
-use crate::sink::{CommandSink, OpenSink, Sink};
+use crate::sink::{AlarmSink, Alarms, CommandSink, OpenSink, Sink};
 use crate::source::{SendError, Source, SourceError, SourceUrl};
 use crate::stamp::HostClock;
 use palpate_estimators::estimator::Locator;
 use palpate_rig::Rig;
 use std::path::PathBuf;
 use std::sync::mpsc::{SyncSender, sync_channel};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
 
 /// A locator in live use.
 pub struct Live {
     /// Replaced once, where a calibration ends with a locator.
     subject: Mutex<Arc<Subject>>,
-    calibrator: Option<Calibrator>,
+    /// Set from the start, or once a rig was made for a board without one.
+    calibrator: OnceLock<Calibrator>,
+    /// A board without a rig.
+    bring_up: Option<BringUp>,
     simulated: Option<(Rig, BoardConfig)>,
     /// Folder that paths in URLs of sources are relative to.
     folder: PathBuf,
@@ -35,6 +40,10 @@ pub struct Live {
     config: SessionConfig,
     /// Rules whose commands go to the board.
     commands: Rules,
+    /// Rules that raise alarms, which browsers set.
+    alarms: Alarms,
+    /// Their text, as it was set.
+    alarm_text: Mutex<String>,
     /// Sinks of each session beside browsers and recordings.
     sinks: Vec<OpenSink>,
     clock: HostClock,
@@ -105,6 +114,15 @@ pub enum LiveError {
     /// The columns of a source are not those of the locator's channels.
     #[error(transparent)]
     Columns(#[from] ColumnsError),
+    /// A board without a rig cannot be looked at.
+    #[error(transparent)]
+    BringUp(#[from] BringUpError),
+    /// No rig can be made.
+    #[error(transparent)]
+    RigForm(#[from] RigFormError),
+    /// Alarms cannot be set.
+    #[error("{0}")]
+    Rule(String),
     /// Sessions are not recorded.
     #[error("there is no folder for recordings")]
     NoFolder,
@@ -118,7 +136,7 @@ impl Live {
     /// bench.
     pub fn new(locator: Locator, name: &str, simulated: Option<(Rig, BoardConfig)>, folder: PathBuf) -> Self {
         let subject = Subject::of_locator(locator, name, simulated.is_some());
-        Self::of_subject(subject, None, simulated, folder)
+        Self::of_subject(subject, simulated, folder)
     }
 
     /// A rig without a locator, which browsers calibrate first.
@@ -128,23 +146,35 @@ impl Live {
             channels: Channel::all_of(&plan.rig.setup),
             info: SessionInfo::of_setup(&plan.rig.setup),
         };
-        Self::of_subject(subject, Some(Calibrator::new(plan)), None, folder)
+        let live = Self::of_subject(subject, None, folder);
+        // It was empty.
+        let _ = live.calibrator.set(Calibrator::new(plan));
+        live
     }
 
-    fn of_subject(
-        subject: Subject,
-        calibrator: Option<Calibrator>,
-        simulated: Option<(Rig, BoardConfig)>,
-        folder: PathBuf,
-    ) -> Self {
+    /// A board without a rig, which browsers look at and make a rig for.
+    ///
+    /// # Errors
+    /// [`LiveError::BringUp`] where the source cannot be opened.
+    pub fn bringing_up(from: SourceUrl, folder: PathBuf) -> Result<Self, LiveError> {
+        let subject = Subject { locator: None, channels: Vec::new(), info: SessionInfo::without_rig() };
+        let live = Self::of_subject(subject, None, folder);
+        let bring_up = BringUp::begin(from, &live.folder, live.clock)?;
+        Ok(Self { bring_up: Some(bring_up), ..live })
+    }
+
+    fn of_subject(subject: Subject, simulated: Option<(Rig, BoardConfig)>, folder: PathBuf) -> Self {
         Self {
             subject: Mutex::new(Arc::new(subject)),
-            calibrator,
+            calibrator: OnceLock::new(),
+            bring_up: None,
             simulated,
             folder,
             recordings: None,
             config: SessionConfig::default(),
             commands: Rules::default(),
+            alarms: Alarms::default(),
+            alarm_text: Mutex::default(),
             sinks: Vec::new(),
             clock: HostClock::new(),
             hub: Hub::default(),
@@ -168,6 +198,38 @@ impl Live {
     #[must_use]
     pub fn with_commands(self, commands: Rules) -> Self {
         Self { commands, ..self }
+    }
+
+    /// Adds rules that raise alarms.
+    #[must_use]
+    pub fn with_alarms(self, rules: Rules) -> Self {
+        *locked(&self.alarm_text) = rules.to_toml();
+        self.alarms.set(rules);
+        self
+    }
+
+    /// Text of the rules that raise alarms.
+    pub(super) fn alarm_text(&self) -> String {
+        locked(&self.alarm_text).clone()
+    }
+
+    /// Replaces the rules that raise alarms by those of a file's text; none for a text without rules.
+    ///
+    /// # Errors
+    /// [`LiveError::NoLocator`], or [`LiveError::Rule`] for a text that is no rule file, a rule that does something else, and a rule that would never act.
+    pub(super) fn set_alarms(&self, text: &str) -> Result<(), LiveError> {
+        let subject = self.subject();
+        let locator = subject.locator.as_ref().ok_or(LiveError::NoLocator)?;
+        let rules = match text.trim() {
+            "" => Rules::default(),
+            _ => Rules::from_toml(text, locator.setup.surface().extent())
+                .map_err(|error| LiveError::Rule(error.with_line(text)))?,
+        };
+        rules.check_alarms(locator).map_err(LiveError::Rule)?;
+        let mut kept = locked(&self.alarm_text);
+        self.alarms.set(rules);
+        text.clone_into(&mut kept);
+        Ok(())
     }
 
     /// The same with sinks for each session, beside browsers and recordings.
@@ -200,7 +262,7 @@ impl Live {
 
     /// Refuses another source than that of the calibration, where there is one.
     pub(super) fn check_source_is_free(&self) -> Result<(), LiveError> {
-        match &self.calibrator {
+        match self.calibrator.get() {
             Some(calibrator) => Err(LiveError::Calibrates { from: calibrator.plan().from.to_string() }),
             None => Ok(()),
         }
@@ -226,6 +288,7 @@ impl Live {
         let (channels, extent) = (Channel::all_of(&locator.setup), locator.setup.surface().extent());
         let mut sinks: Vec<Box<dyn Sink>> =
             vec![Box::new(WebSink::new(self.hub.clone(), &channels, extent)), Box::new(switch.clone())];
+        sinks.push(Box::new(AlarmSink::new(self.alarms.clone(), inputs.clone())));
         for open in &self.sinks {
             sinks.push(open(&channels, extent, inputs.clone())?);
         }
@@ -235,6 +298,7 @@ impl Live {
         if let Some(running) = running.take() {
             running.end();
         }
+        self.hub.forget_past();
         let run = move || {
             // What is refused was refused above.
             let Ok(mut session) = Session::new(&locator, &config) else { return };
@@ -322,6 +386,64 @@ impl Live {
         self.lock().as_ref().map(|running| running.switch.clone())
     }
 
+    /// The board without a rig.
+    fn board(&self) -> Result<&BringUp, BringUpError> {
+        let board = self.bring_up.as_ref().filter(|_| self.calibrator.get().is_none());
+        board.ok_or(BringUpError::HasRig)
+    }
+
+    /// State of a board without a rig.
+    ///
+    /// # Errors
+    /// [`LiveError::BringUp`] where there is a rig.
+    pub(super) fn seen(&self) -> Result<BringUpRecord, LiveError> {
+        Ok(self.board()?.record())
+    }
+
+    /// Opens another port for a board without a rig.
+    ///
+    /// # Errors
+    /// [`LiveError::BringUp`].
+    pub(super) fn choose_port(&self, port: Option<&str>, baud: Option<u32>) -> Result<(), LiveError> {
+        Ok(self.board()?.choose(port, baud, &self.folder)?)
+    }
+
+    /// Makes a rig for a board without one; once it is written, the server calibrates it.
+    ///
+    /// # Errors
+    /// [`LiveError::BringUp`] where there is a rig, and [`LiveError::RigForm`].
+    pub(super) fn make_rig(&self, form: &RigForm) -> Result<MadeRigRecord, LiveError> {
+        let board = self.board()?;
+        let mut made = MadeRig::new(form, &board.from(), &board.channels(), &self.folder)?;
+        if !form.write {
+            return Ok(made.record);
+        }
+        // One request at a time makes the rig.
+        let mut subject = locked(&self.subject);
+        self.board()?;
+        made.write(form.overwrite)?;
+        board.end();
+        *subject = Arc::new(Subject {
+            locator: None,
+            channels: Channel::all_of(&made.rig.setup),
+            info: SessionInfo::of_setup(&made.rig.setup),
+        });
+        let plan = CalibrationPlan {
+            comment: format!("presses for {}", made.record.file),
+            rig: made.rig,
+            from: made.from,
+            presses: made.presses,
+            out: made.out,
+            force_n: None,
+            machine: None,
+            before: Vec::new(),
+            seed: 0,
+        };
+        // It was empty: the board had no rig.
+        let _ = self.calibrator.set(Calibrator::new(plan));
+        Ok(made.record)
+    }
+
     /// The calibration, where there is one.
     ///
     /// # Errors
@@ -331,19 +453,19 @@ impl Live {
     }
 
     pub(super) fn calibrator(&self) -> Result<&Calibrator, LiveError> {
-        self.calibrator.as_ref().ok_or(LiveError::NotCalibrating)
+        self.calibrator.get().ok_or(LiveError::NotCalibrating)
     }
 
     /// Notes that somebody watches, who could stop a machine.
     pub(super) fn attend(&self) {
-        if let Some(calibrator) = &self.calibrator {
+        if let Some(calibrator) = self.calibrator.get() {
             calibrator.attendance().note();
         }
     }
 
     /// True while a machine needs somebody who watches it.
     pub(super) fn needs_attendance(&self) -> bool {
-        self.calibrator.as_ref().is_some_and(|calibrator| calibrator.attendance().is_needed())
+        self.calibrator.get().is_some_and(|calibrator| calibrator.attendance().is_needed())
     }
 
     /// Begins the calibration, or goes on with one that was ended early.
@@ -377,8 +499,11 @@ impl Live {
 
     /// Ends the session and the calibration, where they run.
     pub fn end(&self) {
-        if let Some(calibrator) = &self.calibrator {
+        if let Some(calibrator) = self.calibrator.get() {
             calibrator.end();
+        }
+        if let Some(board) = &self.bring_up {
+            board.end();
         }
         self.end_session();
     }
@@ -411,7 +536,15 @@ impl Live {
             .with_source(self.source())
             .with_estimation(self.config.estimation)
             .with_recording(recording)
-            .with_calibration(self.calibrator.as_ref())
+            .with_calibration(self.calibrator.get())
+            .with_bring_up(self.board().is_ok())
+    }
+
+    /// The last minutes of the session as a record of JSON.
+    pub(super) fn past(&self) -> String {
+        // The session waits for the lock: it is free again before the text is put together.
+        let past = locked(&self.hub.past).clone();
+        past.to_json()
     }
 
     fn subject(&self) -> Arc<Subject> {

@@ -4,6 +4,7 @@
 //! which are counted, and the session never waits for it.
 
 mod body;
+mod bring_up;
 mod calibration;
 mod connections;
 mod guard;
@@ -11,16 +12,20 @@ mod live;
 mod lock;
 mod machine;
 mod page;
+mod past;
 mod pressing;
+mod rig_maker;
 mod routes;
 mod session_info;
 mod shared;
 mod stream;
 mod web_sink;
 
+pub use bring_up::BringUpError;
 pub use calibration::{CalibrationPlan, CalibratorError};
 pub use guard::{Access, AccessError};
 pub use live::{Live, LiveError};
+pub use rig_maker::RigFormError;
 pub use web_sink::{Hub, WebSink};
 
 use std::net::SocketAddr;

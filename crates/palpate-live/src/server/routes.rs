@@ -1,9 +1,11 @@
 //! Routes of the server.
 
 use super::body::{JsonAnswer, JsonBody, Refusal};
+use super::bring_up::{BringUpError, BringUpRecord};
 use super::calibration::{CalibrationRecord, CalibratorError};
 use super::guard::{Access, EMERGENCY_STOP, Guard, guarded};
 use super::live::{Live, LiveError};
+use super::rig_maker::{MadeRigRecord, RigForm, RigFormError};
 use super::session_info::SessionInfo;
 use super::{page, stream};
 use crate::input::Command;
@@ -32,10 +34,14 @@ pub fn router(access: Access, live: Arc<Live>) -> Router {
     Router::new()
         .route("/api/session", get(session))
         .route("/api/stream", get(stream::stream))
+        .route("/api/history", get(history))
         .route("/api/tare", post(tare))
         .route("/api/mark", post(mark))
         .route("/api/source", post(source))
         .route("/api/record", post(record))
+        .route("/api/alarms", get(alarms).post(set_alarms))
+        .route("/api/bring-up", get(bring_up).post(choose_port))
+        .route("/api/rig", post(make_rig))
         .route("/api/calibration", get(calibration).post(calibrate))
         .route(EMERGENCY_STOP, post(emergency_stop))
         .route("/api/recordings", get(recordings))
@@ -53,6 +59,11 @@ pub fn router(access: Access, live: Arc<Live>) -> Router {
 
 async fn session(State(live): State<Arc<Live>>) -> JsonAnswer<SessionInfo> {
     JsonAnswer(live.info())
+}
+
+/// The last minutes of the session.
+async fn history(State(live): State<Arc<Live>>) -> Response {
+    ([(CONTENT_TYPE, "application/json")], live.past()).into_response()
 }
 
 /// An object without fields that matter.
@@ -78,6 +89,24 @@ async fn mark(State(live): State<Arc<Live>>, JsonBody(Mark { text }): JsonBody<M
     done(live.command(Command::Mark(text)))
 }
 
+async fn alarms(State(live): State<Arc<Live>>) -> JsonAnswer<Value> {
+    JsonAnswer(json!({ "text": live.alarm_text() }))
+}
+
+/// A rule file of alarms.
+#[derive(Deserialize)]
+struct AlarmFile {
+    text: String,
+}
+
+async fn set_alarms(
+    State(live): State<Arc<Live>>,
+    JsonBody(AlarmFile { text }): JsonBody<AlarmFile>,
+) -> Result<JsonAnswer<Value>, Refusal> {
+    live.set_alarms(&text).map_err(|error| refusal(&error))?;
+    Ok(alarms(State(live)).await)
+}
+
 #[derive(Deserialize)]
 struct Source {
     url: String,
@@ -94,6 +123,38 @@ async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBod
     }
     // A session that ends is waited for, and a board is prepared.
     blocking(move || live.begin_simulated()).await.map(|()| JsonAnswer(json!({})))
+}
+
+async fn bring_up(State(live): State<Arc<Live>>) -> Result<JsonAnswer<BringUpRecord>, Refusal> {
+    // Ports are looked for.
+    blocking(move || live.seen()).await.map(JsonAnswer)
+}
+
+/// A serial port of the server's machine, and its bits a second.
+#[derive(Deserialize)]
+struct Port {
+    port: Option<String>,
+    baud: Option<u32>,
+}
+
+async fn choose_port(
+    State(live): State<Arc<Live>>,
+    JsonBody(Port { port, baud }): JsonBody<Port>,
+) -> Result<JsonAnswer<BringUpRecord>, Refusal> {
+    blocking(move || {
+        live.choose_port(port.as_deref(), baud)?;
+        live.seen()
+    })
+    .await
+    .map(JsonAnswer)
+}
+
+async fn make_rig(
+    State(live): State<Arc<Live>>,
+    JsonBody(form): JsonBody<RigForm>,
+) -> Result<JsonAnswer<MadeRigRecord>, Refusal> {
+    // A source that ends is waited for, and the rig is written to the disk.
+    blocking(move || live.make_rig(&form)).await.map(JsonAnswer)
 }
 
 async fn calibration(State(live): State<Arc<Live>>) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
@@ -178,6 +239,23 @@ fn refusal(error: &LiveError) -> Refusal {
         LiveError::Source(_) | LiveError::Columns(_) | LiveError::Pace(_) | LiveError::OneWay(_) => {
             (StatusCode::BAD_REQUEST, "start `palpate serve` with another source")
         }
+        LiveError::BringUp(BringUpError::Source(_)) => (StatusCode::BAD_REQUEST, "choose another port"),
+        LiveError::BringUp(BringUpError::Thread(_)) => {
+            (StatusCode::INTERNAL_SERVER_ERROR, "start palpate again")
+        }
+        LiveError::BringUp(BringUpError::HasRig) => {
+            (StatusCode::CONFLICT, "start `palpate serve --from URL` without a rig")
+        }
+        LiveError::BringUp(_) => (StatusCode::BAD_REQUEST, "GET /api/bring-up lists the ports"),
+        LiveError::RigForm(RigFormError::Exists { .. }) => {
+            (StatusCode::CONFLICT, "choose another name, or have it replaced with `overwrite`")
+        }
+        LiveError::RigForm(RigFormError::Presses { .. }) => (StatusCode::CONFLICT, "choose another name"),
+        LiveError::RigForm(RigFormError::Write { .. }) => {
+            (StatusCode::INTERNAL_SERVER_ERROR, "see that the folder takes files")
+        }
+        LiveError::RigForm(_) => (StatusCode::BAD_REQUEST, "correct it and try again"),
+        LiveError::Rule(_) => (StatusCode::BAD_REQUEST, "docs/live-recording.md says what a rule has"),
         LiveError::Session(_) => (StatusCode::CONFLICT, "start `palpate serve` without --track"),
         LiveError::Thread(_) => (StatusCode::INTERNAL_SERVER_ERROR, "start palpate again"),
         LiveError::NoFolder => (StatusCode::CONFLICT, "start `palpate serve` with --record FOLDER"),

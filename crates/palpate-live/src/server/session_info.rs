@@ -23,7 +23,8 @@ const FORCE_N: f64 = 1.0;
 pub struct SessionInfo {
     version: &'static str,
     locator: Option<Value>,
-    surface: Value,
+    /// Null where there is no rig.
+    surface: Option<Value>,
     channels: Vec<Value>,
     force: Value,
     tare: Value,
@@ -34,6 +35,8 @@ pub struct SessionInfo {
     has_simulated: bool,
     /// True where the server has a calibration, which `/api/calibration` tells.
     calibrates: bool,
+    /// True where there is a board without a rig, which `/api/bring-up` shows.
+    brings_up: bool,
 }
 
 impl SessionInfo {
@@ -59,7 +62,7 @@ impl SessionInfo {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             locator: None,
-            surface: surface(setup.surface()),
+            surface: Some(surface(setup.surface())),
             channels: channels(setup),
             force: json!({ "known_n": known_n, "unknown": known_n.is_none() }),
             tare: json!({ "available": false, "follows": false, "why": why }),
@@ -69,6 +72,26 @@ impl SessionInfo {
             recording: None,
             has_simulated: false,
             calibrates: false,
+            brings_up: false,
+        }
+    }
+
+    /// The description of a board without a rig.
+    pub fn without_rig() -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            locator: None,
+            surface: None,
+            channels: Vec::new(),
+            force: json!({ "known_n": null, "unknown": true }),
+            tare: json!({ "available": false, "follows": false, "why": "there is no rig yet" }),
+            limit: None,
+            estimation: Estimation::default(),
+            source: None,
+            recording: None,
+            has_simulated: false,
+            calibrates: false,
+            brings_up: true,
         }
     }
 
@@ -85,6 +108,11 @@ impl SessionInfo {
     /// The same, where there is a calibration.
     pub fn with_calibration(self, calibrator: Option<&Calibrator>) -> Self {
         Self { calibrates: calibrator.is_some(), ..self }
+    }
+
+    /// Says whether there is a board without a rig.
+    pub fn with_bring_up(self, brings_up: bool) -> Self {
+        Self { brings_up, ..self }
     }
 
     /// The same, where sessions are recorded in a folder: its name, and the state of the recording that goes on.

@@ -1,16 +1,19 @@
 //! The sink that browsers read: each message is encoded once, and its bytes are shared by all of them.
 
 use super::connections::most_open;
+use super::lock::locked;
+use super::past::Past;
 use crate::event::EventRecord;
 use crate::frame::Channel;
 use crate::sample::{Sample, SampleRecord};
+use crate::session::Output;
 use crate::sink::{Batch, Sink, StateRecord};
 use axum::body::Bytes;
 use axum::extract::ws::Utf8Bytes;
 use palpate_core::Status;
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use tokio::sync::{Semaphore, broadcast};
 
 /// Messages that wait for a browser at 60 Hz: about a second.
@@ -29,6 +32,8 @@ pub struct Hub {
     pub(super) json: broadcast::Sender<Utf8Bytes>,
     pub(super) binary: broadcast::Sender<Bytes>,
     pub(super) places: Arc<Semaphore>,
+    /// The last minutes of the session.
+    pub(super) past: Arc<Mutex<Past>>,
 }
 
 impl Default for Hub {
@@ -38,7 +43,15 @@ impl Default for Hub {
             json: broadcast::Sender::new(BATCHES),
             binary: broadcast::Sender::new(BATCHES),
             places: Arc::new(Semaphore::new(most_open())),
+            past: Arc::default(),
         }
+    }
+}
+
+impl Hub {
+    /// Leaves out the past of a session that has ended.
+    pub(super) fn forget_past(&self) {
+        *locked(&self.past) = Past::default();
     }
 }
 
@@ -72,6 +85,24 @@ impl WebSink {
         Self { hub, channels: channels.to_vec(), extent, recent: Vec::new() }
     }
 
+    /// Keeps the samples and events of a batch for browsers that come later.
+    fn keep(&self, batch: &Batch) {
+        let mut past = locked(&self.hub.past);
+        for output in &batch.outputs {
+            match output {
+                Output::Sample(sample) => {
+                    let time_s = sample.unix_ns as f64 * 1e-9;
+                    if past.is_due(time_s)
+                        && let Ok(text) = serde_json::to_string(&self.record(sample))
+                    {
+                        past.push_sample(time_s, &text);
+                    }
+                }
+                Output::Event(event) => past.push_event(event),
+            }
+        }
+    }
+
     fn record(&self, sample: &Sample) -> SampleRecord {
         SampleRecord::new(sample, &self.channels, self.extent)
     }
@@ -79,6 +110,7 @@ impl WebSink {
 
 impl Sink for WebSink {
     fn batch(&mut self, batch: &Arc<Batch>) {
+        self.keep(batch);
         if self.hub.states.receiver_count() > 0 {
             self.recent.push(Arc::clone(batch));
         }

@@ -204,6 +204,7 @@ impl<'a> Session<'a> {
             Command::Tare => self.taring.begin(),
             Command::Mark(text) => self.tell(at, Event::Mark { text }, out),
             Command::Trouble(text) => self.tell(at, Event::Trouble { text }, out),
+            Command::Alarm { name, text } => self.tell(at, Event::Alarm { name, text }, out),
         }
     }
 

@@ -1,5 +1,6 @@
 //! Sinks: where the outputs of a session go.
 
+mod alarms;
 mod commands;
 #[cfg(feature = "foxglove")]
 pub mod foxglove;
@@ -7,6 +8,7 @@ mod json_lines;
 mod mqtt;
 pub mod ros;
 
+pub use alarms::{AlarmSink, Alarms};
 pub use commands::CommandSink;
 pub use json_lines::JsonLines;
 pub use mqtt::{MqttSink, MqttUrl, MqttUrlError};

@@ -1,6 +1,7 @@
 //! The web server over real sockets.
 #![forbid(unsafe_code)]
 
+mod bring_up;
 mod client;
 mod machine;
 mod routes;

@@ -294,3 +294,58 @@ fn only_regular_files_are_recordings() {
         }
     }
 }
+
+#[test]
+fn a_page_that_is_loaded_again_gets_the_past_of_the_session() {
+    let (_live, server) = served(None);
+    assert_eq!(get(&server, "/api/history").1, json!({ "samples": [], "events": [] }));
+    assert_eq!(post(&server, "/api/source", r#"{"url":"simulated"}"#).0, 200);
+    assert_eq!(post(&server, "/api/mark", r#"{"text":"here"}"#).0, 200);
+    let end = Instant::now() + Duration::from_secs(20);
+    let past = loop {
+        let (_, past) = get(&server, "/api/history");
+        if past["samples"].as_array().unwrap().len() >= 5 {
+            break past;
+        }
+        assert!(Instant::now() < end, "{past}");
+        std::thread::sleep(Duration::from_millis(50));
+    };
+    let samples = past["samples"].as_array().unwrap();
+    let times: Vec<f64> = samples.iter().map(|sample| sample["time_s"].as_f64().unwrap()).collect();
+    assert!(times.windows(2).all(|pair| (pair[1] * 10.0).floor() > (pair[0] * 10.0).floor()), "{times:?}");
+    assert_eq!(samples[0]["reading"].as_array().unwrap().len(), 8);
+    assert!(past["events"].as_array().unwrap().iter().any(|event| event["text"] == "here"), "{past}");
+    // Another session has a past of its own.
+    assert_eq!(post(&server, "/api/source", r#"{"url":"simulated"}"#).0, 200);
+    let (_, past) = get(&server, "/api/history");
+    assert!(!past["events"].as_array().unwrap().iter().any(|event| event["text"] == "here"), "{past}");
+}
+
+#[test]
+fn alarms_are_checked_set_and_raised() {
+    let (_live, server) = served(None);
+    let set = |text: &str| post(&server, "/api/alarms", &json!({ "text": text }).to_string());
+    for (text, words) in [
+        ("[[rule]]\nevent = \"mark\"\nalarm = \"\"\n", "line 3: `alarm` has 0 characters"),
+        ("[[rule]]\nx = [\"1 m\", \"2 m\"]\nalarm = \"a\"\n", "line 2: `x` is from 1 m to 2 m"),
+        ("[[rule]]\nevent = \"mark\"\ncommand = \"brake\"\n", "does not raise an alarm"),
+        ("rules", "line 1"),
+    ] {
+        let (status, refusal) = set(text);
+        assert!(status == 400 && refusal["error"].as_str().unwrap().contains(words), "{refusal}");
+    }
+    let file = "# mine\n[[rule]]\nname = \"marked\"\nevent = \"mark\"\nalarm = \"look\"\n";
+    assert_eq!(set(file), (200, json!({ "text": file })));
+    assert_eq!(get(&server, "/api/alarms").1, json!({ "text": file }));
+    assert_eq!(post(&server, "/api/source", r#"{"url":"simulated"}"#).0, 200);
+    let mut socket = follow(&server, "", None).unwrap();
+    assert_eq!(post(&server, "/api/mark", r#"{"text":"here"}"#).0, 200);
+    let alarm = loop {
+        let events = next(&mut socket)["events"].as_array().unwrap().clone();
+        if let Some(alarm) = events.into_iter().find(|event| event["event"] == "alarm") {
+            break alarm;
+        }
+    };
+    assert_eq!((&alarm["name"], &alarm["text"]), (&json!("marked"), &json!("look")));
+    assert_eq!(set(""), (200, json!({ "text": "" })));
+}

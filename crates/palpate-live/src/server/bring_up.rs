@@ -1,0 +1,213 @@
+//! A board without a rig: its source, watched until a page makes a rig for it.
+
+use super::lock::locked;
+use crate::input::Input;
+use crate::monitor::{Monitor, MonitorRecord};
+use crate::pipeline::WAITING;
+use crate::source::{Source, SourceError, SourceUrl};
+use crate::stamp::HostClock;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+/// Greatest number of bits a second of a serial port.
+const GREATEST_BAUD: u32 = 20_000_000;
+
+/// A port or a rate that cannot be taken.
+#[derive(Debug, thiserror::Error)]
+pub enum BringUpError {
+    /// A rig was made already, or the server was started with one.
+    #[error("this server has a rig already")]
+    HasRig,
+    /// Only serial ports have a port and a rate to choose.
+    #[error("the source {from} has no port and no baud rate")]
+    NotSerial {
+        /// The source.
+        from: String,
+    },
+    /// A port that is not there.
+    #[error("there is no serial port {port}")]
+    NoPort {
+        /// Its name.
+        port: String,
+    },
+    /// A rate that no port has.
+    #[error("{baud} baud; a port takes 1 to {GREATEST_BAUD}")]
+    Baud {
+        /// The rate.
+        baud: u32,
+    },
+    /// The source cannot be opened.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// There is no thread for it.
+    #[error("no thread for the source: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+/// A serial port of this machine.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PortRecord {
+    /// Its path, on Windows its name.
+    pub name: String,
+    /// What is plugged into it, where that is known.
+    pub device: Option<String>,
+}
+
+/// A board without a rig, as a record of JSON.
+#[derive(Clone, Debug, Serialize)]
+pub struct BringUpRecord {
+    /// Source of the readings, as its URL.
+    from: String,
+    /// The serial port and its bits a second; null of other sources.
+    port: Option<String>,
+    baud: Option<u32>,
+    /// Serial ports of this machine.
+    ports: Vec<PortRecord>,
+    #[serde(flatten)]
+    seen: MonitorRecord,
+}
+
+/// A board without a rig.
+pub struct BringUp {
+    clock: HostClock,
+    state: Mutex<State>,
+}
+
+struct State {
+    from: SourceUrl,
+    watched: Option<Watched>,
+}
+
+/// The source while it is watched.
+struct Watched {
+    monitor: Arc<Mutex<Monitor>>,
+    inputs: SyncSender<Input>,
+    thread: JoinHandle<()>,
+    source: Source,
+}
+
+impl BringUp {
+    /// Watches a source.
+    ///
+    /// # Errors
+    /// [`BringUpError`] where it cannot be opened.
+    pub fn begin(from: SourceUrl, folder: &Path, clock: HostClock) -> Result<Self, BringUpError> {
+        let watched = Some(Watched::open(&from, folder, clock)?);
+        Ok(Self { clock, state: Mutex::new(State { from, watched }) })
+    }
+
+    /// Source of the readings.
+    pub fn from(&self) -> SourceUrl {
+        locked(&self.state).from.clone()
+    }
+
+    /// State of the board. Listing the ports may take a while.
+    pub fn record(&self) -> BringUpRecord {
+        let ports = ports();
+        let state = locked(&self.state);
+        let monitor = state.watched.as_ref().map(|watched| Arc::clone(&watched.monitor));
+        let now = self.clock.now().elapsed;
+        let seen =
+            monitor.map_or_else(|| Monitor::default().record(now), |monitor| locked(&monitor).record(now));
+        let (port, baud) = match &state.from {
+            SourceUrl::Serial { port, baud, .. } => (Some(port.display().to_string()), Some(*baud)),
+            _ => (None, None),
+        };
+        BringUpRecord { from: state.from.to_string(), port, baud, ports, seen }
+    }
+
+    /// Opens another serial port of this machine, or the same at another rate.
+    ///
+    /// # Errors
+    /// [`BringUpError`] where the source is no serial port, or the port or the rate cannot be taken.
+    pub fn choose(&self, port: Option<&str>, baud: Option<u32>, folder: &Path) -> Result<(), BringUpError> {
+        let mut state = locked(&self.state);
+        let SourceUrl::Serial { port: old_port, baud: old_baud, columns } = state.from.clone() else {
+            return Err(BringUpError::NotSerial { from: state.from.to_string() });
+        };
+        let port = match port.map(PathBuf::from) {
+            Some(port) if port != old_port => {
+                // A page opens ports of this machine, and no other file.
+                let is_port = |one: &PortRecord| Path::new(&one.name) == port;
+                if !ports().iter().any(is_port) {
+                    return Err(BringUpError::NoPort { port: port.display().to_string() });
+                }
+                port
+            }
+            _ => old_port,
+        };
+        let baud = baud.unwrap_or(old_baud);
+        if !(1..=GREATEST_BAUD).contains(&baud) {
+            return Err(BringUpError::Baud { baud });
+        }
+        // The port must be free before it is opened again.
+        if let Some(watched) = state.watched.take() {
+            watched.end();
+        }
+        state.from = SourceUrl::Serial { port, baud, columns };
+        state.watched = Some(Watched::open(&state.from, folder, self.clock)?);
+        Ok(())
+    }
+
+    /// Names of the channels that were found, and whether the board gives them.
+    pub fn channels(&self) -> (Vec<String>, bool) {
+        let state = locked(&self.state);
+        let Some(watched) = &state.watched else { return (Vec::new(), false) };
+        let monitor = locked(&watched.monitor);
+        (monitor.channel_names(), monitor.is_named())
+    }
+
+    /// Ends it, so that the source is free.
+    pub fn end(&self) {
+        if let Some(watched) = locked(&self.state).watched.take() {
+            watched.end();
+        }
+    }
+}
+
+impl Watched {
+    fn open(from: &SourceUrl, folder: &Path, clock: HostClock) -> Result<Self, BringUpError> {
+        let (inputs, received) = sync_channel(WAITING);
+        let monitor = Arc::<Mutex<Monitor>>::default();
+        let source = Source::open(from, folder, clock, inputs.clone())?;
+        let watching = Arc::clone(&monitor);
+        let thread = std::thread::Builder::new()
+            .name("bring-up".to_owned())
+            .spawn(move || watch(&received, &watching))?;
+        Ok(Self { monitor, inputs, thread, source })
+    }
+
+    fn end(self) {
+        let Self { inputs, thread, source, .. } = self;
+        drop(source);
+        // Refused only by a thread that has ended.
+        let _ = inputs.send(Input::Stop);
+        let _ = thread.join();
+    }
+}
+
+fn watch(inputs: &Receiver<Input>, monitor: &Mutex<Monitor>) {
+    while let Ok(input) = inputs.recv() {
+        match input {
+            Input::Arrived(arrived) => locked(monitor).receive(&arrived),
+            Input::Command(_) => {}
+            Input::Stop => return,
+        }
+    }
+}
+
+/// Serial ports of this machine; none where they cannot be listed.
+fn ports() -> Vec<PortRecord> {
+    let ports = serialport::available_ports().unwrap_or_default();
+    let record = |port: serialport::SerialPortInfo| PortRecord {
+        device: match port.port_type {
+            serialport::SerialPortType::UsbPort(usb) => usb.product.or(usb.manufacturer),
+            _ => None,
+        },
+        name: port.port_name,
+    };
+    ports.into_iter().map(record).collect()
+}

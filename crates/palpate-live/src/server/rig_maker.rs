@@ -1,0 +1,391 @@
+//! A first rig for a board whose surface has no model, made from what a person fills in.
+
+use crate::calibration::{PlanError, plan};
+use crate::source::{SourceUrl, SourceUrlError};
+use crate::whole_file;
+use palpate_rig::{Rig, RigError};
+use serde::{Deserialize, Serialize};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Most characters of a file's name.
+const LONGEST_NAME: usize = 100;
+
+/// What a person fills in.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RigForm {
+    /// Name of the rig's file, in the folder that the server was started in.
+    pub file: String,
+    /// Names of the channels, in the order in which the board sends them; an empty one is left out.
+    pub channels: Vec<String>,
+    /// Length of the surface.
+    pub length_mm: f64,
+    /// Width of a surface that is located in two directions.
+    #[serde(default)]
+    pub width_mm: Option<f64>,
+    /// Places to press: along the length and, of two directions, across it.
+    pub places: Vec<usize>,
+    /// Presses of each place.
+    pub repeats: usize,
+    /// Force of every press.
+    pub force_n: f64,
+    /// True where contacts in use press with this force too.
+    pub force_is_known: bool,
+    /// Replaces files that are there.
+    #[serde(default)]
+    pub overwrite: bool,
+    /// Writes the file; without it the text alone is made.
+    #[serde(default)]
+    pub write: bool,
+}
+
+/// A form that gives no rig.
+#[derive(Debug, thiserror::Error)]
+pub enum RigFormError {
+    /// A name that is not a plain file name.
+    #[error("`{name}` cannot name a rig: use letters, digits, `-`, `_`, and `.toml` at the end")]
+    Name {
+        /// The name.
+        name: String,
+    },
+    /// Another number of channels than the board sends.
+    #[error("{given} channels, and the board sends {sent} values")]
+    Channels {
+        /// Channels of the form.
+        given: usize,
+        /// Values of the board.
+        sent: usize,
+    },
+    /// The board names its values, and the form names another one.
+    #[error("channel `{given}`: the board calls it `{sent}`")]
+    Renamed {
+        /// Name of the form.
+        given: String,
+        /// Name of the board.
+        sent: String,
+    },
+    /// Another number of places than directions.
+    #[error("{given} numbers of places, and the surface has {directions} directions")]
+    Places {
+        /// Numbers of the form.
+        given: usize,
+        /// Directions of the surface.
+        directions: usize,
+    },
+    /// Values without names cannot be left out of this source.
+    #[error("the source {from} cannot leave unnamed values out")]
+    LeftOut {
+        /// The source.
+        from: String,
+    },
+    /// The rig has something that cannot be.
+    #[error("{0}")]
+    Rig(#[from] RigError),
+    /// There is nowhere to press.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// Names that the URL of the source cannot have.
+    #[error("{0}")]
+    Columns(#[from] SourceUrlError),
+    /// A file is there already.
+    #[error("{path} is there already")]
+    Exists {
+        /// The file.
+        path: String,
+    },
+    /// Presses of an earlier calibration are there, which are not replaced.
+    #[error("{path} has presses of an earlier calibration: choose another name for the rig")]
+    Presses {
+        /// The file.
+        path: String,
+    },
+    /// The file cannot be written.
+    #[error("cannot write {path}: {error}")]
+    Write {
+        /// The file.
+        path: String,
+        /// Why.
+        error: std::io::Error,
+    },
+}
+
+/// A rig with the files of its calibration.
+#[derive(Debug)]
+pub struct MadeRig {
+    /// The rig.
+    pub rig: Rig,
+    /// Source of its readings.
+    pub from: SourceUrl,
+    /// Files and text.
+    pub record: MadeRigRecord,
+    /// The rig's file.
+    path: PathBuf,
+    /// File of the presses.
+    pub presses: PathBuf,
+    /// File of the locator.
+    pub out: PathBuf,
+}
+
+/// A rig that was made, as a record of JSON.
+#[derive(Clone, Debug, Serialize)]
+pub struct MadeRigRecord {
+    /// The rig's file.
+    pub file: String,
+    /// Its text.
+    pub text: String,
+    /// The command that calibrates it later.
+    pub command: String,
+    /// True where it is on the disk.
+    pub written: bool,
+    /// Files that would be replaced.
+    pub exists: Vec<String>,
+}
+
+impl MadeRig {
+    /// The rig of a form, for a board that sends these values.
+    ///
+    /// # Errors
+    /// [`RigFormError`] for a form that gives no rig.
+    pub fn new(
+        form: &RigForm,
+        from: &SourceUrl,
+        (sent, named): &(Vec<String>, bool),
+        folder: &Path,
+    ) -> Result<Self, RigFormError> {
+        let stem = checked_stem(&form.file)?;
+        let used = used_channels(form, sent, *named)?;
+        let from = if *named { from.clone() } else { with_columns(from, form)? };
+        let text = text_of(form, &used)?;
+        let rig = Rig::from_toml(&text)?;
+        plan(&rig, None, &[], &[])?;
+        let names = [form.file.clone(), format!("{stem}-presses.csv"), format!("{stem}.locator.json")];
+        let [path, presses, out] = names.clone().map(|name| folder.join(name));
+        let [file, presses_name, out_name] = names;
+        let exists = [(&file, &path), (&out_name, &out)];
+        let exists = exists.into_iter().filter(|(_, path)| is_there(path)).map(|(name, _)| name.clone());
+        let record = MadeRigRecord {
+            exists: exists.collect(),
+            command: format!(
+                "palpate serve {file} --calibrate --from '{from}' --presses {presses_name} --out {out_name}"
+            ),
+            file,
+            text,
+            written: false,
+        };
+        Ok(Self { rig, from, record, path, presses, out })
+    }
+
+    /// Writes the rig's file.
+    ///
+    /// # Errors
+    /// [`RigFormError::Exists`] for a file that is there, unless it is to be replaced; [`RigFormError::Presses`], [`RigFormError::Write`].
+    pub fn write(&mut self, overwrite: bool) -> Result<(), RigFormError> {
+        let name = |path: &Path| path.display().to_string();
+        if is_there(&self.presses) {
+            return Err(RigFormError::Presses { path: name(&self.presses) });
+        }
+        if let Some(path) = self.record.exists.first().filter(|_| !overwrite) {
+            return Err(RigFormError::Exists { path: path.clone() });
+        }
+        whole_file::write(&self.path, self.record.text.as_bytes())
+            .map_err(|error| RigFormError::Write { path: name(&self.path), error })?;
+        self.record.written = true;
+        Ok(())
+    }
+}
+
+fn is_there(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
+}
+
+/// Stem of a plain file name that ends in `.toml`.
+fn checked_stem(name: &str) -> Result<&str, RigFormError> {
+    let plain = |stem: &&str| {
+        let is_plain = |one: char| one.is_ascii_alphanumeric() || matches!(one, '-' | '_' | '.');
+        !stem.is_empty()
+            && !stem.starts_with(['.', '-'])
+            && stem.len() <= LONGEST_NAME
+            && stem.chars().all(is_plain)
+    };
+    let stem = name.strip_suffix(".toml").filter(plain);
+    stem.ok_or_else(|| RigFormError::Name { name: name.chars().take(LONGEST_NAME).collect() })
+}
+
+/// Channels of the form that are used; those of a board that names its values keep their names.
+fn used_channels(form: &RigForm, sent: &[String], named: bool) -> Result<Vec<String>, RigFormError> {
+    if form.channels.len() != sent.len() {
+        return Err(RigFormError::Channels { given: form.channels.len(), sent: sent.len() });
+    }
+    let pairs = form.channels.iter().zip(sent).filter(|(given, _)| !given.is_empty());
+    if let Some((given, sent)) = pairs.clone().find(|(given, sent)| named && given != sent) {
+        return Err(RigFormError::Renamed { given: given.clone(), sent: sent.clone() });
+    }
+    Ok(pairs.map(|(given, _)| given.clone()).collect())
+}
+
+/// The source with names for its values, those that are left out among them.
+fn with_columns(from: &SourceUrl, form: &RigForm) -> Result<SourceUrl, RigFormError> {
+    let left_out = form.channels.iter().any(String::is_empty);
+    let mut named = from.clone();
+    match &mut named {
+        SourceUrl::Serial { columns, .. }
+        | SourceUrl::Tcp { columns, .. }
+        | SourceUrl::Udp { columns, .. }
+        | SourceUrl::Mqtt { columns, .. } => {
+            let name = |(i, name): (usize, &String)| match name.as_str() {
+                "" => format!("unused-{}", i + 1),
+                name => name.to_owned(),
+            };
+            *columns = form.channels.iter().enumerate().map(name).collect();
+        }
+        _ if left_out => return Err(RigFormError::LeftOut { from: from.to_string() }),
+        _ => {}
+    }
+    // Names that the URL would take apart are refused.
+    let text = named.to_string();
+    let again: SourceUrl = text.parse()?;
+    if again == named {
+        return Ok(named);
+    }
+    let problem = "a name of a channel has a character that separates names there".to_owned();
+    Err(SourceUrlError::Parameter { text, problem }.into())
+}
+
+/// Text of the rig's file.
+fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> {
+    let quoted = |text: &str| toml::Value::from(text).to_string();
+    let mm = |value: f64| quoted(&format!("{value} mm"));
+    let force = quoted(&format!("{} N", form.force_n));
+    let names: Vec<String> = channels.iter().map(|name| quoted(name)).collect();
+    let mut text = String::from("# Made on the dashboard's page for a board without a rig.\n\n[surface]\n");
+    let mut line = |line: String| {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{line}");
+    };
+    line("kind = \"measured\"  # no model: the influence functions come from the presses".to_owned());
+    line(format!("length = {}", mm(form.length_mm)));
+    if let Some(width_mm) = form.width_mm {
+        line(format!("width = {}", mm(width_mm)));
+    }
+    line("\n[sensors]\nmeasure = \"raw\"  # whatever the channels read: counts, volts".to_owned());
+    line(format!("\n[recording]\nchannels = [{}]", names.join(", ")));
+    if form.force_is_known {
+        line(format!("\n[contact]\nforce = {force}  # of every contact"));
+    }
+    line("\n[training]".to_owned());
+    match (form.width_mm, form.places.as_slice()) {
+        (None, [count]) => line(format!("arrangement = \"even\"\ncount = {count}")),
+        (Some(_), [columns, rows]) => line(format!("arrangement = \"grid\"\ngrid = [{columns}, {rows}]")),
+        (width_mm, places) => {
+            let directions = 1 + usize::from(width_mm.is_some());
+            return Err(RigFormError::Places { given: places.len(), directions });
+        }
+    }
+    line(format!("repeats = {}\nforce = {force}  # of every press", form.repeats));
+    line("\n[estimator]\nkind = \"influence\"".to_owned());
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn form() -> RigForm {
+        RigForm {
+            file: "strip.toml".to_owned(),
+            channels: vec!["left".to_owned(), String::new(), "right \"b\"".to_owned()],
+            length_mm: 300.0,
+            width_mm: None,
+            places: vec![10],
+            repeats: 2,
+            force_n: 2.0,
+            force_is_known: false,
+            overwrite: false,
+            write: true,
+        }
+    }
+
+    fn serial() -> SourceUrl {
+        "serial:///dev/ttyACM0?baud=115200".parse().unwrap()
+    }
+
+    fn sent() -> (Vec<String>, bool) {
+        (["s1", "s2", "s3"].map(String::from).to_vec(), false)
+    }
+
+    #[test]
+    fn makes_a_rig_of_a_line_whose_source_names_its_values() {
+        let folder = tempfile::tempdir().unwrap();
+        let made = MadeRig::new(&form(), &serial(), &sent(), folder.path()).unwrap();
+        let channels = crate::frame::Channel::all_of(&made.rig.setup);
+        let labels: Vec<&str> = channels.iter().map(|channel| channel.label.as_str()).collect();
+        assert_eq!(labels, ["left", "right \"b\""]);
+        assert_eq!(made.from.columns(), ["left", "unused-2", "right \"b\""]);
+        assert_eq!(plan(&made.rig, None, &[], &[]).unwrap().len(), 20);
+        assert_eq!(made.rig.setup.force_n(), None);
+        assert!(made.record.command.contains("--from 'serial:///dev/ttyACM0?"), "{}", made.record.command);
+    }
+
+    #[test]
+    fn makes_a_rig_of_a_plane_and_of_a_board_that_names_its_values() {
+        let plane = RigForm {
+            width_mm: Some(120.0),
+            places: vec![5, 3],
+            force_is_known: true,
+            channels: vec!["a".to_owned(), String::new()],
+            ..form()
+        };
+        let named = (vec!["a".to_owned(), "b".to_owned()], true);
+        let made = MadeRig::new(&plane, &serial(), &named, Path::new("")).unwrap();
+        assert_eq!(plan(&made.rig, None, &[], &[]).unwrap().len(), 30);
+        assert_eq!((made.rig.setup.force_n(), made.from), (Some(2.0), serial()));
+    }
+
+    #[test]
+    fn refuses_to_replace_files_without_a_word_and_presses_altogether() {
+        let folder = tempfile::tempdir().unwrap();
+        let made = || MadeRig::new(&form(), &serial(), &sent(), folder.path()).unwrap();
+        std::fs::write(folder.path().join("strip.toml"), "mine").unwrap();
+        assert_eq!(made().record.exists, ["strip.toml"]);
+        assert!(matches!(made().write(false), Err(RigFormError::Exists { .. })));
+        assert_eq!(std::fs::read_to_string(folder.path().join("strip.toml")).unwrap(), "mine");
+        made().write(true).unwrap();
+        assert!(std::fs::read_to_string(folder.path().join("strip.toml")).unwrap().contains("300 mm"));
+        std::fs::write(folder.path().join("strip-presses.csv"), "").unwrap();
+        assert!(matches!(made().write(true), Err(RigFormError::Presses { .. })));
+    }
+
+    #[test]
+    fn refuses_names_of_other_folders_and_forms_that_cannot_be() {
+        let refused = |change: fn(&mut RigForm)| {
+            let mut form = form();
+            change(&mut form);
+            MadeRig::new(&form, &serial(), &sent(), Path::new("")).unwrap_err().to_string()
+        };
+        for name in
+            ["../a.toml", "/a.toml", "a/b.toml", ".toml", "..toml", ".a.toml", "a.txt", "a b.toml", "-a.toml"]
+        {
+            let form = RigForm { file: name.to_owned(), ..form() };
+            let made = MadeRig::new(&form, &serial(), &sent(), Path::new(""));
+            assert!(matches!(made, Err(RigFormError::Name { .. })), "{name}");
+        }
+        assert!(refused(|form| form.length_mm = -1.0).contains("length"));
+        assert!(refused(|form| form.length_mm = f64::NAN).contains("length"));
+        assert!(refused(|form| form.force_n = 0.0).contains("force"));
+        assert!(refused(|form| form.places = vec![0]).contains("count"));
+        assert!(refused(|form| form.places = vec![2, 2]).contains("directions"));
+        assert!(refused(|form| form.channels.truncate(1)).contains("board sends 3"));
+        assert!(refused(|form| form.channels = vec![String::new(); 3]).len() > 5);
+        assert!(refused(|form| form.channels[2] = "left".to_owned()).len() > 5);
+        assert!(refused(|form| form.channels[2] = "a,b".to_owned()).contains("separates"));
+        let named = (vec!["a".to_owned(), "b".to_owned(), "c".to_owned()], true);
+        let made = MadeRig::new(&form(), &serial(), &named, Path::new(""));
+        assert!(matches!(made, Err(RigFormError::Renamed { .. })));
+        let replay = "file:a.mcap".parse().unwrap();
+        assert!(matches!(
+            MadeRig::new(&form(), &replay, &sent(), Path::new("")),
+            Err(RigFormError::LeftOut { .. })
+        ));
+    }
+}
