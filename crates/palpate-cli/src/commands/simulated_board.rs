@@ -185,7 +185,7 @@ fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<PluggedMachine>, F
         SimulatedMachine::with_config(firmware, stage.clone(), extent, force_n.unwrap_or(1.0), config);
     let link = Link::open(url).map_err(Complaint::new)?;
     remark!("a machine of {} firmware at {}", firmware.name(), link.name());
-    Ok(Some(PluggedMachine { machine, link, was_there: false }))
+    Ok(Some(PluggedMachine { machine, link, was_there: false, was_stopped: false }))
 }
 
 /// A machine at its link.
@@ -193,6 +193,7 @@ struct PluggedMachine {
     machine: SimulatedMachine,
     link: Link,
     was_there: bool,
+    was_stopped: bool,
 }
 
 impl PluggedMachine {
@@ -207,6 +208,12 @@ impl PluggedMachine {
             self.machine.open();
         }
         self.machine.receive(&bytes);
+        let is_stopped = self.machine.is_stopped();
+        if is_stopped && !self.was_stopped {
+            let finger = if self.machine.contact().is_some() { "pressing" } else { "up" };
+            remark!("the machine was stopped with its finger {finger}");
+        }
+        self.was_stopped = is_stopped;
         match self.machine.take_answers() {
             answers if answers.is_empty() => Ok(()),
             answers => self.link.send(&answers),

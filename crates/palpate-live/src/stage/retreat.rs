@@ -19,13 +19,19 @@ impl<L: StageLink> GcodeStage<L> {
         if !self.has_moved {
             return Finger::Unmoved;
         }
+        let was_up = self.at_mm.is_some_and(|at_mm| self.is_up(at_mm[2]) && self.is_up(self.target_mm[2]));
         let is_lost = self.at_mm.is_none() || matches!(doubt, Doubt::Restart { .. });
-        let finger = if is_lost { Finger::Unknown } else { self.try_to_lift().unwrap_or(Finger::Unknown) };
+        let lifted = if is_lost { Finger::Unknown } else { self.try_to_lift().unwrap_or(Finger::Unknown) };
+        let finger = if was_up { Finger::Up } else { lifted };
         // Where even this cannot be sent, the finger is where it is.
         match self.halt() {
             Ok(()) => finger,
             Err(_) => Finger::Unknown,
         }
+    }
+
+    fn is_up(&self, z_mm: f64) -> bool {
+        z_mm >= self.travel_z_mm() - TOLERANCE_MM
     }
 
     fn try_to_lift(&mut self) -> Result<Finger, Fault> {
@@ -41,7 +47,7 @@ impl<L: StageLink> GcodeStage<L> {
         if !self.is_on_way(at_mm) {
             return Ok(Finger::Unknown);
         }
-        if at_mm[2] >= self.travel_z_mm() - TOLERANCE_MM {
+        if self.is_up(at_mm[2]) {
             return Ok(Finger::Up);
         }
         self.at_mm = Some(at_mm);
