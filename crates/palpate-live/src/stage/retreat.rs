@@ -59,8 +59,12 @@ impl<L: StageLink> GcodeStage<L> {
     fn hold(&mut self) -> Result<(), Fault> {
         self.pass_over(LIFE)?;
         let until = self.link.now() + LIFE;
-        if self.status_report(until)?.state == "Idle" {
-            return self.synchronize(LIFE);
+        let state = self.status_report(until)?.state;
+        match state.as_str() {
+            "Idle" => return self.synchronize(LIFE),
+            "Run" | "Hold" => {}
+            // After an alarm the position may be lost.
+            _ => return Err(Fault::Doubt(Doubt::Answer { command: "?".to_owned(), answer: state })),
         }
         self.link.write_all(b"!")?;
         let until = self.link.now() + HOLD;
