@@ -446,7 +446,8 @@ impl<L: StageLink> GcodeStage<L> {
         self.ask("M115", ANSWER, |_, line| {
             is_named |= line.contains("FIRMWARE_NAME:") && line.contains("Marlin");
             is_at_once |= line.trim() == "Cap:EMERGENCY_PARSER:1";
-            line.starts_with("Cap:") || line.contains("FIRMWARE_NAME:") || line.starts_with("area:")
+            // Firmwares describe themselves in words of their own.
+            !line.starts_with("Error") && !line.starts_with("Resend")
         })?;
         if !is_named {
             let expected = "a FIRMWARE_NAME of Marlin";
