@@ -324,21 +324,21 @@ impl<L: StageLink> GcodeStage<L> {
         self.reject_unasked()?;
         self.link.write_all(b"?")?;
         self.link.flush()?;
-        while let Some(line) = self.next_line(until)? {
-            let Some(status) = status(&line) else { return Err(self.unexpected("?", line)) };
-            if let Some(offset_mm) = status.offset_mm {
-                self.work_offset_mm = offset_mm;
-            }
-            let from_machine =
-                status.machine_mm.map(|at| std::array::from_fn(|axis| at[axis] - self.work_offset_mm[axis]));
-            return Ok(StatusReport {
-                state: status.state.to_owned(),
-                is_held: status.is_held,
-                names_offset: status.offset_mm.is_some() || status.work_mm.is_some(),
-                work_mm: status.work_mm.or(from_machine),
-            });
+        let Some(line) = self.next_line(until)? else {
+            return Err(Fault::Doubt(Doubt::Silent { command: "?".to_owned(), seconds: ANSWER.as_secs() }));
+        };
+        let Some(status) = status(&line) else { return Err(self.unexpected("?", line)) };
+        if let Some(offset_mm) = status.offset_mm {
+            self.work_offset_mm = offset_mm;
         }
-        Err(Fault::Doubt(Doubt::Silent { command: "?".to_owned(), seconds: ANSWER.as_secs() }))
+        let from_machine =
+            status.machine_mm.map(|at| std::array::from_fn(|axis| at[axis] - self.work_offset_mm[axis]));
+        Ok(StatusReport {
+            state: status.state.to_owned(),
+            is_held: status.is_held,
+            names_offset: status.offset_mm.is_some() || status.work_mm.is_some(),
+            work_mm: status.work_mm.or(from_machine),
+        })
     }
 
     fn learn_work_offset(&mut self) -> Result<(), Fault> {

@@ -641,7 +641,7 @@ impl State {
                 }
             }
             FaultKind::Resend if is_marlin => {
-                self.answer("Error:Line Number is not Last Line Number+1, Last Line: 0\nResend: 1\nok\n")
+                self.answer("Error:Line Number is not Last Line Number+1, Last Line: 0\nResend: 1\nok\n");
             }
             FaultKind::Resend => self.answer("error:2\r\n"),
             FaultKind::HomeFirst if is_marlin => self.answer("echo:Home XYZ First\nok\n"),
