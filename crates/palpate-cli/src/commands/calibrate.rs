@@ -345,7 +345,7 @@ fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
                 remark!("taken: press {}{force}{off}", calibration.journal().presses());
             }
             Note::Replaced => {
-                remark!("the reading grew: press {} is taken anew", calibration.journal().presses())
+                remark!("the reading grew: press {} is taken anew", calibration.journal().presses());
             }
             Note::AskedAgain(doubt) => remark!("not taken: {doubt}"),
             Note::StillWaiting(words) => remark!("{words}"),
