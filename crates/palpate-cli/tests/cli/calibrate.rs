@@ -46,7 +46,7 @@ impl Bench {
                 }
             }
         });
-        let mut next = || said.recv().expect("the board says where it is").1;
+        let next = || said.recv().expect("the board says where it is").1;
         let (stage, from) = (next(), next());
         let at = stage.rsplit(' ').next().unwrap();
         let stage = if link == "pty" { format!("gcode:serial://{at}") } else { format!("gcode:{at}") };
