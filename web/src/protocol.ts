@@ -177,6 +177,8 @@ export type Motion = "blind" | "homing" | "pressing" | "lifting" | "up" | "down"
 export interface MachineRecord {
   url: string;
   firmware: string | null;
+  /** The way in which a stop acts, where that is not at once. */
+  stopping: string | null;
   /** True from its greeting until its finger is lifted for good. */
   runs: boolean;
   motion: Motion | null;

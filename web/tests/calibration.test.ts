@@ -62,6 +62,7 @@ describe("words of a calibration", () => {
     const machine: MachineRecord = {
       url: "gcode:tcp://printer:23",
       firmware: "Marlin",
+      stopping: null,
       runs: true,
       motion: "homing",
       x_mm: null,

@@ -21,7 +21,7 @@ pub enum Failure {
     BadInput(Box<Complaint>),
     /// Exit code 3: it finished, but data was lost; the places were reported as they came.
     DataLost(String),
-    /// Exit code 130 after Ctrl-C, 143 after SIGTERM.
+    /// Exit code 128 and the signal: 130 after Ctrl-C, 143 after SIGTERM.
     Interrupted(String),
     /// Whoever read our output stopped reading, which is their right.
     NobodyReads,

@@ -33,7 +33,7 @@ use std::process::ExitCode;
 
 /// Turns an elastic surface with a few sensors into a calibrated contact locator.
 ///
-/// Exit codes: 0 done; 1 ran, but a stated goal was missed; 2 bad input; 3 finished with data lost; 130 interrupted by Ctrl-C; 143 ended by SIGTERM.
+/// Exit codes: 0 done; 1 ran, but a stated goal was missed; 2 bad input; 3 finished with data lost; 130 interrupted by Ctrl-C; 143 ended by SIGTERM, 129 by SIGHUP, 131 by SIGQUIT.
 #[derive(Parser)]
 #[command(name = "palpate", version, max_term_width = 100)]
 struct Arguments {

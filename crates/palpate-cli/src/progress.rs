@@ -4,36 +4,57 @@ use crate::remark::remark;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_numerics::watch::{Progress, Watch};
 use std::error::Error;
-use std::sync::atomic::{AtomicU8, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Number of the signal that came; 0 for none.
-static SIGNAL: AtomicU8 = AtomicU8::new(0);
+/// Number of the signal that came; 0 for none. Signal handlers write it.
+static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 /// Work that has not ended by itself so long after a signal is ended with the process.
 const PATIENCE: Duration = Duration::from_millis(700);
 /// SIGINT, which Ctrl-C sends.
-const INTERRUPT: u8 = 2;
+const INTERRUPT: usize = 2;
 
-/// Makes Ctrl-C (and a polite kill) ask long work to stop. What has not ended soon is ended with the process: everything that
-/// palpate writes is whole at any time.
-///
-/// To be called before there is any other thread: those begun later leave the signals to the one that waits for them.
+/// Makes Ctrl-C (and a polite kill, or a terminal that is closed) ask long work to stop. What has not ended soon is ended with the process:
+/// everything that palpate writes is whole at any time.
 pub fn install_signal_handler() {
     if let Err(error) = begin_to_listen() {
         remark!("Ctrl-C will end palpate at once: {error}");
     }
 }
 
+/// Signals that ask a process to end. A real handler takes them: signals that are only blocked reach the threads of serial ports, where `ppoll`
+/// opens them.
+#[cfg(unix)]
+fn ends() -> Vec<i32> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+    let mut ends = vec![SIGINT, SIGTERM, SIGQUIT];
+    // `nohup` has it ignored.
+    if !ignores(SIGHUP) {
+        ends.push(SIGHUP);
+    }
+    ends
+}
+
+/// True where the process was started with a signal ignored, as Linux says in hexadecimal.
+#[cfg(unix)]
+fn ignores(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask & (1 << (signal - 1)) != 0
+}
+
 #[cfg(unix)]
 fn begin_to_listen() -> Result<(), Box<dyn Error>> {
-    use nix::sys::signal::{SigSet, Signal};
-    // SIGHUP stays as it is: `nohup` has it ignored, and whatever is written is whole.
-    let signals = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM]);
-    signals.thread_block()?;
-    std::thread::Builder::new().spawn(move || {
-        while let Ok(signal) = signals.wait() {
-            stop(signal as u8);
+    let ends = ends();
+    for signal in &ends {
+        signal_hook::flag::register_usize(*signal, Arc::clone(&SIGNAL), *signal as usize)?;
+    }
+    let mut signals = signal_hook::iterator::Signals::new(ends)?;
+    std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        if signals.forever().next().is_some() {
+            end();
         }
     })?;
     Ok(())
@@ -41,12 +62,29 @@ fn begin_to_listen() -> Result<(), Box<dyn Error>> {
 
 #[cfg(not(unix))]
 fn begin_to_listen() -> Result<(), Box<dyn Error>> {
-    Ok(ctrlc::set_handler(|| stop(INTERRUPT))?)
+    Ok(ctrlc::set_handler(|| {
+        SIGNAL.store(INTERRUPT, Ordering::Relaxed);
+        end();
+    })?)
 }
 
-/// Asks the work to stop, and ends the process where it does not.
-fn stop(signal: u8) {
-    SIGNAL.store(signal, Ordering::Relaxed);
+/// Sets a flag as soon as a signal asks the process to end, or to be suspended: a machine must not go on unwatched.
+#[cfg(unix)]
+pub fn set_at_signal(flag: &Arc<AtomicBool>) -> std::io::Result<()> {
+    for signal in ends().into_iter().chain([signal_hook::consts::SIGTSTP]) {
+        signal_hook::flag::register(signal, Arc::clone(flag))?;
+    }
+    Ok(())
+}
+
+/// Does nothing where there are no signals: the flag is set by whoever asks [`interrupted`].
+#[cfg(not(unix))]
+pub fn set_at_signal(_: &Arc<AtomicBool>) -> std::io::Result<()> {
+    Ok(())
+}
+
+/// Ends the process where the work does not.
+fn end() {
     std::thread::sleep(PATIENCE);
     remark!("palpate: stopped");
     std::process::exit(interrupted_code().into());
@@ -59,10 +97,11 @@ pub fn interrupted() -> bool {
 
 /// Exit code of a command that was interrupted: 128 and the signal, as shells have it.
 pub fn interrupted_code() -> u8 {
-    match SIGNAL.load(Ordering::Relaxed) {
-        0 => 128 + INTERRUPT,
-        signal => 128 + signal,
-    }
+    let signal = match SIGNAL.load(Ordering::Relaxed) {
+        0 => INTERRUPT,
+        signal => signal,
+    };
+    128 + signal as u8
 }
 
 /// A bar on stderr, and the time so far where nobody knows how long work will be.

@@ -1,20 +1,25 @@
-//! A machine that presses by itself: lines of G-code, and a calibration with no hand on it.
+//! A machine that presses by itself: lines of G-code, its faults, and a calibration with no hand on it.
 
 use palpate_estimators::evaluation::{Evaluation, limit_ratio};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::simulate::SimulatedBench;
 use palpate_live::calibration::{Guide, Press, Progress, Waiting};
-use palpate_live::stage::{Firmware, GcodeStage, SimulatedMachine, StageError};
+use palpate_live::stage::{
+    Doubt, FaultKind, Finger, Firmware, GcodeStage, Greeting, MachineConfig, MachineFault, SimulatedLink,
+    SimulatedMachine, StageError, StageLink, Stopping,
+};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::units::mm;
 use palpate_rig::{Rig, Stage};
+use std::io::{self, Read, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
 const DEPTH_M: f64 = 1.5e-3;
+const FIRMWARES: [Firmware; 2] = [Firmware::Marlin, Firmware::Grbl];
 
 fn stage_setup() -> Stage {
     Stage {
@@ -26,6 +31,7 @@ fn stage_setup() -> Stage {
         press_m_per_s: mm(2.0),
         load_cell: None,
         force_limit_n: None,
+        dtr_reset: false,
     }
 }
 
@@ -33,16 +39,36 @@ fn rig() -> Rig {
     Rig::from_toml(RIG).unwrap()
 }
 
+fn machine(firmware: Firmware, config: MachineConfig) -> SimulatedMachine {
+    SimulatedMachine::with_config(firmware, stage_setup(), rig().setup.surface().extent(), 3.0, config)
+}
+
+fn connect(machine: &SimulatedMachine) -> Result<GcodeStage<SimulatedLink>, StageError> {
+    GcodeStage::connect(machine.link(), stage_setup(), Arc::default())
+}
+
+/// Homes, and presses at three places.
+fn press_three_places(machine: &SimulatedMachine) -> Result<(), StageError> {
+    let mut stage = connect(machine)?;
+    stage.home()?;
+    for at_mm in [60.0, 210.0, 270.0] {
+        stage.travel(Position::along(mm(at_mm)))?;
+        assert_eq!(machine.contact(), None, "it travels at a safe height");
+        stage.press(DEPTH_M)?;
+        let contact = machine.contact().unwrap();
+        assert!((contact.position.x_m - mm(at_mm)).abs() < 1e-4, "pressed at {contact:?}, not {at_mm} mm");
+        stage.lift()?;
+    }
+    Ok(())
+}
+
 #[test]
-fn the_finger_is_where_the_lines_send_it_of_either_firmware() {
-    for firmware in [Firmware::Marlin, Firmware::Grbl] {
-        let machine = SimulatedMachine::new(firmware, stage_setup(), rig().setup.surface().extent(), 3.0);
-        let mut stage = GcodeStage::connect(machine.clone(), stage_setup(), Arc::default()).unwrap();
-        assert_eq!(stage.firmware(), firmware);
-        assert!(
-            matches!(stage.travel(Position::along(mm(100.0))), Err(StageError::Refused { .. })),
-            "not homed"
-        );
+fn finger_is_where_lines_send_it_of_either_firmware() {
+    for firmware in FIRMWARES {
+        let machine = machine(firmware, MachineConfig::default());
+        let mut stage = connect(&machine).unwrap();
+        assert_eq!((stage.firmware(), stage.stopping()), (firmware, Stopping::AtOnce));
+        assert!(matches!(stage.travel(Position::along(mm(100.0))), Err(StageError::NotHomed)));
         stage.home().unwrap();
         stage.travel(Position::along(mm(123.0))).unwrap();
         assert_eq!(machine.contact(), None);
@@ -54,12 +80,239 @@ fn the_finger_is_where_the_lines_send_it_of_either_firmware() {
     }
 }
 
+/// Machines that are slow or quiet, and still do every move when they are asked for it.
 #[test]
-fn a_stop_reaches_the_machine_and_nothing_moves_after_it() {
-    for firmware in [Firmware::Marlin, Firmware::Grbl] {
-        let machine = SimulatedMachine::new(firmware, stage_setup(), rig().setup.surface().extent(), 3.0);
+fn slow_and_quiet_machines_stay_in_step() {
+    let seconds = Duration::from_secs;
+    let plain = || MachineConfig { is_paced: true, ..MachineConfig::default() };
+    let configs = [
+        MachineConfig { greeting: Greeting::None, ..plain() },
+        MachineConfig { greeting: Greeting::After(seconds(2)), ..plain() },
+        MachineConfig { greeting: Greeting::After(seconds(8)), ..plain() },
+        MachineConfig { greeting: Greeting::None, delay: seconds(2), ..plain() },
+        MachineConfig { greeting: Greeting::After(seconds(4)), delay: seconds(4), ..plain() },
+        MachineConfig { delay: Duration::from_millis(700), ..plain() },
+        MachineConfig { homing: seconds(240), ..plain() },
+        MachineConfig { emergency_parser: false, ..plain() },
+    ];
+    for firmware in FIRMWARES {
+        for config in &configs {
+            let machine = machine(firmware, config.clone());
+            let outcome = press_three_places(&machine);
+            assert!(outcome.is_ok(), "{firmware:?} {config:?}: {outcome:?}");
+            assert_eq!(machine.doubtful_moves(), 0, "{firmware:?} {config:?}");
+        }
+    }
+}
+
+/// The line at which a fault comes, in either dialect.
+fn lines_of(firmware: Firmware) -> [(&'static str, u32); 6] {
+    match firmware {
+        // A travel, a press, the lift after it, the wait of a travel, the wait of a press, homing.
+        Firmware::Marlin => [("G1 X", 2), ("G1 Z", 4), ("G1 Z", 5), ("M400", 2), ("M400", 3), ("G28", 1)],
+        Firmware::Grbl => [("G1 X", 2), ("G1 Z", 4), ("G1 Z", 5), ("G4", 2), ("G4", 3), ("$H", 1)],
+    }
+}
+
+/// Every fault, at every kind of line, of either firmware: no move but a lift follows, the machine is halted, and the finger is up where the words say so.
+#[test]
+fn any_fault_stops_the_machine_with_its_finger_up_or_says_why_not() {
+    use FaultKind::*;
+    let kinds = [Unknown, Lost, Silence, Resend, HomeFirst, Error, Reset, ResetMoving, Endstop, ExtraOk];
+    for firmware in FIRMWARES {
+        for (line, nth) in lines_of(firmware) {
+            for kind in kinds {
+                for is_paced in [false, true] {
+                    // Only Marlin has one.
+                    for emergency_parser in
+                        [true, false].into_iter().take(1 + usize::from(firmware == Firmware::Marlin))
+                    {
+                        let faults = vec![MachineFault { kind, line: line.to_owned(), nth }];
+                        let config =
+                            MachineConfig { faults, is_paced, emergency_parser, ..MachineConfig::default() };
+                        let name = format!("{firmware:?} {config:?}");
+                        let machine = machine(firmware, config);
+                        stops_for_a_fault(&machine, kind, &name);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn stops_for_a_fault(machine: &SimulatedMachine, kind: FaultKind, name: &str) {
+    let outcome = press_three_places(machine);
+    assert_eq!(machine.faults_met(), 1, "{name}: {outcome:?}");
+    let Err(StageError::Doubt { doubt, finger }) = outcome else { panic!("{name}: {outcome:?}") };
+    assert_eq!(machine.doubtful_moves(), 0, "{name}: {doubt}");
+    // A Marlin that halts by itself reads no stop any more.
+    assert!(machine.is_stopped() || kind == FaultKind::Error, "{name}: {doubt}");
+    match finger {
+        Finger::Lifted | Finger::Up => assert_eq!(machine.contact(), None, "{name}: {doubt}"),
+        Finger::Unknown => assert!(
+            matches!(
+                kind,
+                FaultKind::Silence
+                    | FaultKind::Error
+                    | FaultKind::Reset
+                    | FaultKind::ResetMoving
+                    | FaultKind::Endstop
+                    | FaultKind::HomeFirst
+            ) || name.contains("G28")
+                || name.contains("$H"),
+            "{name}: could be lifted after `{doubt}`"
+        ),
+        Finger::Unmoved => panic!("{name}: it has moved"),
+    }
+    let words = StageError::Doubt { doubt, finger }.to_string();
+    let quote = match (kind, name.starts_with("Marlin")) {
+        (FaultKind::Unknown, true) => "echo:Unknown command",
+        (FaultKind::Unknown, false) => "error:20",
+        (FaultKind::Resend, true) => "Error:Line Number is not Last Line Number+1",
+        (FaultKind::HomeFirst, true) => "echo:Home XYZ First",
+        (FaultKind::Error, true) => "Error:Printer halted. kill() called!",
+        (FaultKind::Error | FaultKind::Endstop, false) => "ALARM:1",
+        (FaultKind::Endstop, true) => "echo:endstops hit",
+        (FaultKind::Reset | FaultKind::ResetMoving, _) => "was reset",
+        (FaultKind::Lost | FaultKind::Silence, _) => "did not answer",
+        (FaultKind::ExtraOk, _) => "`ok`",
+        (_, false) => "error:",
+    };
+    assert!(words.contains(quote), "{name}: {words}");
+}
+
+#[test]
+fn reset_at_rest_is_seen_before_the_next_move() {
+    for firmware in FIRMWARES {
+        let machine = machine(firmware, MachineConfig::default());
+        let mut stage = connect(&machine).unwrap();
+        stage.home().unwrap();
+        stage.travel(Position::along(mm(100.0))).unwrap();
+        stage.press(DEPTH_M).unwrap();
+        stage.watch().unwrap();
+        machine.open();
+        let error = stage.watch().unwrap_err();
+        assert!(
+            matches!(error, StageError::Doubt { doubt: Doubt::Restart { .. }, finger: Finger::Unknown }),
+            "{error}"
+        );
+        assert!(matches!(stage.lift(), Err(StageError::Stopped)));
+        assert_eq!(machine.doubtful_moves(), 0);
+        assert!(machine.is_stopped());
+    }
+}
+
+#[test]
+fn clamped_position_is_no_place() {
+    for firmware in FIRMWARES {
+        let any = (f64::NEG_INFINITY, f64::INFINITY);
+        let soft_limits_m = Some([(0.0, mm(215.0)), any, any]);
+        let machine = machine(firmware, MachineConfig { soft_limits_m, ..MachineConfig::default() });
+        let error = press_three_places(&machine).unwrap_err();
+        let words = match firmware {
+            Firmware::Marlin => {
+                "the machine reports X 215.00 mm and was sent to X 225.00 mm; it was stopped with its finger up"
+            }
+            Firmware::Grbl => "the machine answered `ALARM:2` to `G1 X225.000 Y40.000 F3000.000`",
+        };
+        assert!(error.to_string().contains(words), "{error}");
+        assert!(machine.is_stopped() && machine.contact().is_none());
+    }
+}
+
+/// A link at which somebody asks for a stop at some time.
+struct StopAt {
+    link: SimulatedLink,
+    machine: SimulatedMachine,
+    at: Duration,
+    stop: Arc<AtomicBool>,
+}
+
+impl Read for StopAt {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.link.read(buffer);
+        if self.link.now() >= self.at && self.machine.is_moving() {
+            self.stop.store(true, Ordering::Relaxed);
+            self.at = self.at.min(self.link.now());
+        }
+        read
+    }
+}
+
+impl Write for StopAt {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.link.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.link.flush()
+    }
+}
+
+impl StageLink for StopAt {
+    fn now(&self) -> Duration {
+        self.link.now()
+    }
+
+    fn reset_by_dtr(&mut self) -> io::Result<bool> {
+        self.link.reset_by_dtr()
+    }
+
+    fn has_dtr(&self) -> bool {
+        self.link.has_dtr()
+    }
+}
+
+/// Stops at a hundred instants of travels and presses, in the machine's own time: within 50 ms also where its firmware reads none during a move.
+#[test]
+fn stop_takes_effect_within_50_ms_at_any_time_of_a_move() {
+    let (mut longest, mut stopped) = (Duration::ZERO, 0);
+    for (firmware, emergency_parser, dtr_reset) in [
+        (Firmware::Marlin, true, false),
+        (Firmware::Marlin, false, false),
+        (Firmware::Marlin, false, true),
+        (Firmware::Grbl, true, false),
+    ] {
+        for tenth in 0..25 {
+            let config = MachineConfig { is_paced: true, emergency_parser, ..MachineConfig::default() };
+            let machine = machine(firmware, config);
+            let stop = Arc::new(AtomicBool::new(false));
+            let at = Duration::from_millis(1_000 + 370 * tenth);
+            let link = StopAt { link: machine.link(), machine: machine.clone(), at, stop: Arc::clone(&stop) };
+            let setup = Stage { dtr_reset, ..stage_setup() };
+            let mut stage = GcodeStage::connect(link, setup, Arc::clone(&stop)).unwrap();
+            let expected = match (firmware, emergency_parser, dtr_reset) {
+                (Firmware::Marlin, false, false) => Stopping::BetweenMoves,
+                (Firmware::Marlin, false, true) => Stopping::ByReset,
+                _ => Stopping::AtOnce,
+            };
+            assert_eq!(stage.stopping(), expected);
+            let mut outcome = stage.home();
+            while outcome.is_ok() {
+                outcome = stage
+                    .travel(Position::along(mm(60.0)))
+                    .and_then(|()| stage.press(DEPTH_M))
+                    .and_then(|()| stage.lift())
+                    .and_then(|()| stage.travel(Position::along(mm(270.0))));
+            }
+            assert!(matches!(outcome, Err(StageError::Stopped)), "{outcome:?}");
+            let took = machine.stopped_at().unwrap().saturating_sub(at);
+            // The stop is asked for at the first read of a move from then on.
+            longest = longest.max(took);
+            stopped += 1;
+            assert!(!machine.is_moving() && matches!(stage.lift(), Err(StageError::Stopped)));
+        }
+    }
+    println!("{stopped} stops, the longest after {longest:?}");
+    assert!(longest <= Duration::from_millis(50), "{longest:?}");
+}
+
+#[test]
+fn stop_reaches_the_machine_and_nothing_moves_after_it() {
+    for firmware in FIRMWARES {
+        let machine = machine(firmware, MachineConfig::default());
         let stop = Arc::new(AtomicBool::new(false));
-        let mut stage = GcodeStage::connect(machine.clone(), stage_setup(), Arc::clone(&stop)).unwrap();
+        let mut stage = GcodeStage::connect(machine.link(), stage_setup(), Arc::clone(&stop)).unwrap();
         stage.home().unwrap();
         stop.store(true, Ordering::Relaxed);
         assert!(matches!(stage.press(DEPTH_M), Err(StageError::Stopped)));
@@ -69,11 +322,23 @@ fn a_stop_reaches_the_machine_and_nothing_moves_after_it() {
 }
 
 #[test]
-fn numbers_out_of_range_are_refused_with_their_bound() {
-    let machine = SimulatedMachine::new(Firmware::Grbl, stage_setup(), rig().setup.surface().extent(), 3.0);
+fn rejects_numbers_out_of_range_with_their_bound() {
+    let machine = machine(Firmware::Grbl, MachineConfig::default());
     let setup = Stage { depths_m: vec![0.0], ..stage_setup() };
-    let error = GcodeStage::connect(machine, setup, Arc::default()).unwrap_err().to_string();
+    let error = GcodeStage::connect(machine.link(), setup, Arc::default()).unwrap_err().to_string();
     assert!(error.contains("the depth") && error.contains("greater than 0"), "{error}");
+}
+
+#[test]
+fn rejects_descriptions_of_machines_with_the_parts_that_there_are() {
+    let config: MachineConfig = "no-greeting, paced,unknown@G1 Z:3,homing=90s".parse().unwrap();
+    assert_eq!((config.greeting, config.homing.as_secs()), (Greeting::None, 90));
+    let fault = MachineFault { kind: FaultKind::Unknown, line: "G1 Z".to_owned(), nth: 3 };
+    assert_eq!(config.faults, [fault]);
+    for wrong in ["fast", "delay=-1s", "delay=1e300s", "unknown@G1:0", "burns@G1", "greeting="] {
+        let error = wrong.parse::<MachineConfig>().unwrap_err().to_string();
+        assert!(error.contains(wrong) && error.contains("no-emergency-parser"), "{error}");
+    }
 }
 
 /// From nothing to a locator that is near what physics allows, by machine.
@@ -89,9 +354,8 @@ fn a_machine_calibrates_by_itself_to_the_limit() {
             training.repeats,
         )
     });
-    let machine =
-        SimulatedMachine::new(Firmware::Marlin, stage_setup(), rig.setup.surface().extent(), force_n);
-    let mut stage = GcodeStage::connect(machine.clone(), stage_setup(), Arc::default()).unwrap();
+    let machine = machine(Firmware::Marlin, MachineConfig::default());
+    let mut stage = connect(&machine).unwrap();
     stage.home().unwrap();
     let mut guide = Guide::new(plan.collect());
     let mut bench = SimulatedBench::new(&rig.setup, 5).unwrap();

@@ -27,6 +27,8 @@ pub struct Stage {
     pub load_cell: Option<String>,
     /// Force at the load cell beyond which the machine is stopped; greater than 0.
     pub force_limit_n: Option<f64>,
+    /// True where a stop may reset the machine by the DTR line of its serial port.
+    pub dtr_reset: bool,
 }
 
 impl Stage {
@@ -74,6 +76,8 @@ pub(crate) struct StageKeys {
     pub load_cell: Option<String>,
     /// Force at the load cell beyond which the machine is stopped.
     pub force_limit: Option<At<Positive<Force>>>,
+    /// Stop a machine whose firmware reads no stop during a move by a reset over the DTR line of its serial port; `false` unless said otherwise.
+    pub dtr_reset: Option<bool>,
 }
 
 /// x and y in a machine.
@@ -105,6 +109,7 @@ impl StageKeys {
             press_m_per_s: self.press_speed.map_or(PRESS_M_PER_S, |speed| speed.si),
             load_cell: self.load_cell.clone(),
             force_limit_n: self.force_limit.as_ref().map(|limit| limit.si),
+            dtr_reset: self.dtr_reset.unwrap_or(false),
         })
     }
 }

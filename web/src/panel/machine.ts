@@ -113,9 +113,9 @@ export function motionWords(machine: MachineRecord, state: CalibrationRecord): s
     case null:
       return `at ${machine.url}`;
     case "blind":
-      return "Nothing moves before a reading has come.";
+      return `Nothing moves before a reading has come${machine.stopping === null ? "" : `; ${machine.stopping}`}.`;
     case "homing":
-      return "Keep your hands away.";
+      return machine.stopping === null ? "Keep your hands away." : `Keep your hands away: ${machine.stopping}.`;
     case "pressing":
       return "The finger is on its way.";
     case "lifting":

@@ -14,7 +14,7 @@ use palpate_live::calibration::{
 use palpate_live::input::Input;
 use palpate_live::pipeline::WAITING;
 use palpate_live::source::{Source, SourceUrl};
-use palpate_live::stage::{StageThread, StageUrl};
+use palpate_live::stage::{Order, StageError, StageThread, StageUrl};
 use palpate_live::stamp::HostClock;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_length_mm;
@@ -49,6 +49,9 @@ pub struct Arguments {
     /// Force of every press, as in `--force "2 N"` [default: the rig's, or unknown]
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     force: Option<f64>,
+    /// Travel to every position at the height of travel, and press nowhere; nothing is read or written
+    #[arg(long, requires = "stage")]
+    dry_run: bool,
     /// Go on with the presses that the file of presses has
     #[arg(long)]
     resume: bool,
@@ -69,6 +72,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
     let machine = arguments.stage.as_ref();
     let stage = stage(&arguments.rig, &rig, machine, arguments.force)?;
+    if let (true, Some(stage)) = (arguments.dry_run, &stage) {
+        return dry_run(arguments, &rig, stage.clone());
+    }
     let journal = journal(arguments, &rig, stage.as_ref())?;
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
     let plan = calibration::plan(&rig, arguments.force, depths_m, journal.rows())
@@ -198,7 +204,10 @@ fn press_all(
         remark!("{count} frames were no reading: {}", cause.describe());
     }
     if calibration.guide().waiting() != Waiting::Nothing {
-        drop(machine);
+        if let Some(machine) = machine {
+            // No reading shows its finger any more.
+            machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error))?;
+        }
         return Err(Failure::DataLost(format!(
             "the source ended before all was pressed; {}",
             goes_on(arguments, &calibration)
@@ -210,15 +219,72 @@ fn press_all(
     }
 }
 
-/// The machine, greeted, where one presses.
+/// The machine, connected, where one presses.
 fn machine(arguments: &Arguments, stage: Option<Stage>) -> Result<Option<Machine>, Failure> {
     let (Some(url), Some(stage)) = (&arguments.stage, stage) else { return Ok(None) };
     let limit_n = stage.force_limit_n;
-    let thread = StageThread::open(url, stage, Arc::default()).map_err(|error| {
-        Complaint::new(format!("--stage {url}: {error}")).help("is it on, and at this port?")
+    Ok(Some(Machine::new(open_stage(url, stage)?, limit_n)))
+}
+
+/// Connects to a machine, which a signal stops at once; nothing moves yet.
+fn open_stage(url: &StageUrl, stage: Stage) -> Result<StageThread, Failure> {
+    let stop = Arc::default();
+    progress::set_at_signal(&stop).map_err(Complaint::new)?;
+    let thread = StageThread::open(url, stage, stop).map_err(|error| {
+        if progress::interrupted() {
+            return Failure::Interrupted("stopped before anything moved".to_owned());
+        }
+        let error = MachineError::from(error);
+        Complaint::new(format!("--stage {url}: {error}")).help(error.help()).into()
     })?;
-    remark!("a machine of {} firmware at {url}; Enter stops it at once", thread.firmware().name());
-    Ok(Some(Machine::new(thread, limit_n)))
+    remark!(
+        "a machine of {} firmware at {url}; Enter stops it: {}",
+        thread.firmware().name(),
+        thread.stopping()
+    );
+    Ok(thread)
+}
+
+/// Homes, and travels to every position at the height of travel.
+fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage) -> Result<(), Failure> {
+    let Some(url) = &arguments.stage else { return Ok(()) };
+    let plan = calibration::plan(rig, arguments.force, &[], &[])
+        .map_err(|error| Complaint::about(&arguments.rig, error))?;
+    let mut positions: Vec<_> = plan.iter().map(|press| press.position).collect();
+    positions.dedup();
+    let keys = keys();
+    let mut thread = open_stage(url, stage)?;
+    remark!("the machine looks for its end stops");
+    let orders = std::iter::once(Order::Home).chain(positions.iter().copied().map(Order::Travel));
+    for order in orders {
+        thread.order(order);
+        wait_for(&mut thread, &keys)?;
+        if let Order::Travel(position) = order {
+            let press = Press { position, force_n: None, depth_m: None };
+            remark!("above {}", place(press, rig.setup.surface().extent()));
+        }
+    }
+    thread.close();
+    output::say(format!(
+        "dry run: {} positions reached at the height of travel, none pressed",
+        positions.len()
+    ))
+}
+
+/// Waits for the end of a machine's move; anything that was typed stops it.
+fn wait_for(thread: &mut StageThread, keys: &Receiver<String>) -> Result<(), Failure> {
+    let ended = |error: MachineError| machine_failure(&error, "");
+    loop {
+        if let Some(done) = thread.done() {
+            return done.map(drop).map_err(|error| ended(error.into()));
+        }
+        if keys.recv_timeout(LOOK_EVERY).is_ok() || progress::interrupted() {
+            thread.stop();
+            return Err(ended(MachineError::ByHand));
+        }
+        // Without a keyboard the channel is closed, and does not wait.
+        std::thread::sleep(LOOK_EVERY / 10);
+    }
 }
 
 /// Has the machine do what is next; anything that was typed stops it.
@@ -242,9 +308,13 @@ fn step(
 }
 
 fn machine_ended(arguments: &Arguments, calibration: &Calibration, error: &MachineError) -> Failure {
-    let words = format!("{error}: {}; {}", error.help(), goes_on(arguments, calibration));
+    machine_failure(error, &format!("; {}", goes_on(arguments, calibration)))
+}
+
+fn machine_failure(error: &MachineError, more: &str) -> Failure {
+    let words = format!("{error}: {}{more}", error.help());
     match error {
-        MachineError::ByHand => Failure::Interrupted(words),
+        MachineError::ByHand | MachineError::Stage(StageError::Stopped) => Failure::Interrupted(words),
         MachineError::Stage(_) | MachineError::Silent => Failure::DataLost(words),
         _ => Failure::GoalMissed(words),
     }
@@ -275,7 +345,7 @@ fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
                 remark!("taken: press {}{force}{off}", calibration.journal().presses());
             }
             Note::Replaced => {
-                remark!("the reading grew: press {} is taken anew", calibration.journal().presses())
+                remark!("the reading grew: press {} is taken anew", calibration.journal().presses());
             }
             Note::AskedAgain(doubt) => remark!("not taken: {doubt}"),
             Note::StillWaiting(words) => remark!("{words}"),

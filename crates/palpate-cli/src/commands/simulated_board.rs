@@ -7,10 +7,9 @@ use crate::remark::remark;
 use palpate_live::simulated_board::{
     BoardConfig, FaultConfig, Finger, FrameForm, Link, LinkUrl, LoadCell, SimulatedBoard,
 };
-use palpate_live::stage::{Firmware, SimulatedMachine};
+use palpate_live::stage::{Firmware, MachineConfig, SimulatedMachine};
 use palpate_mechanics::units::format_count;
 use palpate_rig::Rig;
-use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -73,6 +72,9 @@ pub struct Arguments {
     /// Firmware of the machine
     #[arg(long, value_name = "FIRMWARE", default_value = "marlin", requires = "stage")]
     firmware: FirmwareName,
+    /// Behaviour of the machine, in parts separated by commas: `no-greeting`, `greeting=12s`, `delay=500ms`, `no-emergency-parser`, `paced`, `homing=90s`, `soft-limit-x=200mm`, and faults as in `unknown@G1 Z:3`, at the third line that begins with `G1 Z`
+    #[arg(long, value_name = "PARTS", requires = "stage")]
+    machine: Option<MachineConfig>,
     /// Send the load cell of the rig's [stage] too, with noise of this standard deviation, as in `--load-cell "5 mN"`
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     load_cell: Option<f64>,
@@ -178,10 +180,12 @@ fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<PluggedMachine>, F
         FirmwareName::Grbl => Firmware::Grbl,
     };
     let extent = rig.setup.surface().extent();
-    let machine = SimulatedMachine::new(firmware, stage.clone(), extent, force_n.unwrap_or(1.0));
+    let config = arguments.machine.clone().unwrap_or_default();
+    let machine =
+        SimulatedMachine::with_config(firmware, stage.clone(), extent, force_n.unwrap_or(1.0), config);
     let link = Link::open(url).map_err(Complaint::new)?;
     remark!("a machine of {} firmware at {}", firmware.name(), link.name());
-    Ok(Some(PluggedMachine { machine, link, was_there: false }))
+    Ok(Some(PluggedMachine { machine, link, was_there: false, was_stopped: false }))
 }
 
 /// A machine at its link.
@@ -189,24 +193,31 @@ struct PluggedMachine {
     machine: SimulatedMachine,
     link: Link,
     was_there: bool,
+    was_stopped: bool,
 }
 
 impl PluggedMachine {
-    /// Does what the other end asks for.
-    fn work(&mut self) -> std::io::Result<()> {
+    /// Does what the other end asks for, at a time since the start.
+    fn work(&mut self, now: Duration) -> std::io::Result<()> {
+        self.machine.advance_to(now);
         let Some(bytes) = self.link.bytes()? else {
             self.was_there = false;
             return Ok(());
         };
         if !std::mem::replace(&mut self.was_there, true) {
-            self.machine.reset();
+            self.machine.open();
         }
-        self.machine.write_all(&bytes)?;
-        let mut answers = [0; 512];
-        while let Ok(count) = self.machine.read(&mut answers) {
-            self.link.send(&answers[..count])?;
+        self.machine.receive(&bytes);
+        let is_stopped = self.machine.is_stopped();
+        if is_stopped && !self.was_stopped {
+            let finger = if self.machine.contact().is_some() { "pressing" } else { "up" };
+            remark!("the machine was stopped with its finger {finger}");
         }
-        Ok(())
+        self.was_stopped = is_stopped;
+        match self.machine.take_answers() {
+            answers if answers.is_empty() => Ok(()),
+            answers => self.link.send(&answers),
+        }
     }
 }
 
@@ -237,7 +248,7 @@ impl Plugged<'_> {
                 remark!("{news}");
             }
             if let Some(machine) = &mut self.machine {
-                machine.work().map_err(Complaint::new)?;
+                machine.work(now - start).map_err(Complaint::new)?;
                 self.board.finger_mut().hold(machine.machine.contact());
             }
             if next_disconnect.is_some_and(|at| now >= at) {

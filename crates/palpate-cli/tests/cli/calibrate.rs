@@ -3,6 +3,8 @@
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::Stdio;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
 
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{Evaluation, limit_ratio};
@@ -12,27 +14,44 @@ use crate::support::command::{Running, complained, palpate, said};
 
 const RIG: &str = include_str!("../../../../examples/fsi-like.toml");
 
-/// A board and its machine, both behind TCP, until it is dropped.
+/// A board and its machine until they are dropped: the board behind TCP, the machine there too or at a pseudo-terminal.
 struct Bench {
     _board: Running,
     from: String,
     stage: String,
+    /// Lines of the board, with the instants at which they came.
+    said: Receiver<(Instant, String)>,
 }
 
 impl Bench {
     fn start(folder: &Path, firmware: &str) -> Self {
-        let to_stderr = ["--to", "tcp://:0", "--stage", "tcp://:0", "--load-cell", "2 mN"];
+        Self::with(folder, "tcp://:0", &["--firmware", firmware])
+    }
+
+    /// With a machine at `link`, as further options describe it.
+    fn with(folder: &Path, link: &str, more: &[&str]) -> Self {
         let mut child = palpate(folder)
-            .args(["simulated-board", "rig.toml", "--rate", "200 Hz", "--firmware", firmware])
-            .args(to_stderr)
+            .args(["simulated-board", "rig.toml", "--rate", "200 Hz", "--to", "tcp://:0", "--stage", link])
+            .args(["--load-cell", "2 mN"])
+            .args(more)
             .stderr(Stdio::piped())
             .spawn()
             .expect("the board starts");
-        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
-        let stage = lines.next().expect("the place of the machine");
-        let from = lines.next().expect("the place of the board");
-        let stage = format!("gcode:{}", stage.rsplit(' ').next().unwrap());
-        Self { _board: Running(child), from, stage }
+        let stderr = BufReader::new(child.stderr.take().unwrap());
+        let (to, said) = channel();
+        std::thread::spawn(move || {
+            for line in stderr.lines().map_while(Result::ok) {
+                if to.send((Instant::now(), line)).is_err() {
+                    return;
+                }
+            }
+        });
+        let next = || said.recv().expect("the board says where it is").1;
+        let (stage, from) = (next(), next());
+        let at = stage.rsplit(' ').next().unwrap();
+        let stage = if link == "pty" { format!("gcode:serial://{at}") } else { format!("gcode:{at}") };
+        let from = from.rsplit(' ').next().unwrap().to_owned();
+        Self { _board: Running(child), from, stage, said }
     }
 
     fn calibrate(&self, folder: &Path, more: &[&str]) -> std::process::Command {
@@ -48,6 +67,15 @@ fn presses(folder: &Path) -> usize {
     let rig = Rig::from_toml(RIG).unwrap();
     let bytes = std::fs::read(folder.join("presses.csv")).unwrap();
     rig.setup.read_recording("presses.csv", bytes.as_slice()).unwrap().touched().rows.len()
+}
+
+/// Rows of the file of presses that have a depth, also where that is no recording yet.
+fn taken_presses(folder: &Path) -> usize {
+    let csv = std::fs::read_to_string(folder.join("presses.csv")).unwrap_or_default();
+    let mut lines = csv.lines().filter(|line| !line.starts_with('#'));
+    let heading = lines.next().unwrap_or_default();
+    let Some(depth) = heading.split(',').position(|cell| cell == "depth_mm") else { return 0 };
+    lines.filter(|line| line.split(',').nth(depth).is_some_and(|cell| cell != "0")).count()
 }
 
 /// From zero to a locator with no hand on it, and what it is worth at contacts that it has not seen.
@@ -135,6 +163,89 @@ fn too_much_force_and_enter_stop_the_machine_and_the_presses_are_kept() {
     assert_eq!(child.wait().unwrap().code(), Some(130));
     assert!(presses(folder.path()) >= 5);
     assert!(!folder.path().join("locator.json").exists());
+}
+
+/// Faults of machines, in the terminal: the line is quoted, nothing is learnt of a press that did not happen, and the exit code says that it ended early.
+#[test]
+fn fault_of_a_machine_ends_the_calibration_with_its_words() {
+    // The first `G1 Z` is the lift after homing, the second the first press, the third its lift.
+    for (firmware, config, words, finger, taken) in [
+        ("marlin", "unknown@G1 Z:2", "the machine answered `echo:Unknown command: \"G1 Z21", "up", 0),
+        ("marlin", "home-first@G1 X:2", "the machine answered `echo:Home XYZ First` to `G1 X", "up", 1),
+        ("marlin", "resend@G1 Z:3", "it was stopped, and its finger is lifted", "up", 1),
+        ("marlin", "reset-moving@G1 Z:2,paced", "the machine was reset: it sent `start`", "up", 0),
+        ("marlin", "error@G28", "`Error:Printer halted. kill() called!` to `G28`", "", 0),
+        ("grbl", "unknown@G1 Z:3", "the machine answered `error:20` to `G1 Z27", "up", 1),
+        ("grbl", "soft-limit-x=80mm", "the machine answered `ALARM:2` to `G1 X", "up", 1),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("rig.toml"), RIG.replace("repeats = 3", "repeats = 1")).unwrap();
+        let bench = Bench::with(folder.path(), "tcp://:0", &["--firmware", firmware, "--machine", config]);
+        let said = complained(&bench.calibrate(folder.path(), &[]).output().unwrap(), 3);
+        assert!(said.contains(words), "{config}: {said}");
+        assert!(said.contains("--resume goes on"), "{config}: {said}");
+        assert!(!folder.path().join("locator.json").exists(), "{config}");
+        if config != "soft-limit-x=80mm" {
+            assert_eq!(taken_presses(folder.path()), taken, "{config}");
+        }
+        if !finger.is_empty() {
+            let (_, stopped) = bench.said.recv_timeout(Duration::from_secs(5)).unwrap();
+            assert!(stopped.ends_with(&format!("stopped with its finger {finger}")), "{config}: {stopped}");
+        }
+    }
+}
+
+/// Signals in the middle of a press, to a process whose threads wait at serial ports: the machine is stopped each time, and the exit code is the signal's.
+#[cfg(unix)]
+#[test]
+fn signals_stop_the_machine_before_the_process_ends() {
+    let runs = [("INT", 130), ("TERM", 143), ("HUP", 129), ("QUIT", 131)].map(|(signal, code)| {
+        std::thread::spawn(move || {
+            let folder = tempfile::tempdir().unwrap();
+            std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
+            let bench = Bench::with(folder.path(), "pty", &["--machine", "paced"]);
+            let mut child = bench
+                .calibrate(folder.path(), &[])
+                .stdin(Stdio::piped())
+                .stderr(Stdio::piped())
+                .spawn()
+                .unwrap();
+            let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+            lines.find(|line| line.contains("looks for its end stops")).expect("it homes");
+            // It lifts, travels and goes down for seconds.
+            std::thread::sleep(Duration::from_millis(700));
+            let asked = Instant::now();
+            let id = child.id().to_string();
+            std::process::Command::new("kill").args([&format!("-{signal}"), &id]).status().unwrap();
+            let (at, line) = bench.said.recv_timeout(Duration::from_secs(5)).expect("the machine is stopped");
+            assert!(line.contains("the machine was stopped"), "{line}");
+            assert_eq!(child.wait().unwrap().code(), Some(code), "{signal}");
+            let rest: Vec<String> = lines.collect();
+            assert!(rest.iter().any(|line| line.contains("stopped")), "{rest:?}");
+            (signal, at - asked)
+        })
+    });
+    for run in runs {
+        let (signal, took) = run.join().unwrap();
+        println!("{signal}: stopped after {took:?}");
+        // 50 ms on a machine that does nothing else.
+        assert!(took < Duration::from_millis(500), "{signal}: {took:?}");
+    }
+}
+
+#[test]
+fn dry_run_presses_nowhere_and_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
+    // Any press would end it.
+    let config = "no-emergency-parser,unknown@G1 Z21,unknown@G1 Z20";
+    let bench = Bench::with(folder.path(), "tcp://:0", &["--machine", config]);
+    let output = bench.calibrate(folder.path(), &["--dry-run"]).output().unwrap();
+    let words = said(&output);
+    assert!(words.contains("dry run: 9 positions reached at the height of travel, none pressed"), "{words}");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(stderr.contains("has no emergency parser") && stderr.contains("pieces of 40 ms"), "{stderr}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "the rig alone");
 }
 
 /// A channel at the end of its range would be read wrong, and may be about to break.

@@ -2,7 +2,7 @@
 
 use super::guide::{Press, Waiting};
 use super::run::{Calibration, Note};
-use crate::stage::{Done, Order, StageError, StageThread};
+use crate::stage::{Done, Doubt, Finger, Order, StageError, StageThread, Stopping};
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
@@ -65,12 +65,18 @@ impl MachineError {
     pub fn help(&self) -> &'static str {
         match self {
             Self::Stage(StageError::Line(_)) => "see that it is on, and at this port",
-            Self::Stage(StageError::Refused { .. } | StageError::Silent { .. }) => {
-                "see what its own display says, and that its way is free; then reset it"
+            Self::Stage(StageError::Doubt { doubt: Doubt::OffPosition { .. }, .. }) => {
+                "see that `origin`, `touch` and `depths` of [stage] are within its travel; then reset it"
+            }
+            Self::Stage(StageError::Doubt { finger: Finger::Unmoved, .. }) => {
+                "reset it, and see that no other program uses its port"
+            }
+            Self::Stage(StageError::Doubt { .. }) => {
+                "see its own display, and that its way is free; then reset it"
             }
             Self::Stage(StageError::Unknown { .. }) => "give the baud rate of its firmware",
-            Self::Stage(StageError::OutOfRange(_)) => "mend [stage] of the rig",
-            Self::Stage(StageError::Stopped) | Self::ByHand => {
+            Self::Stage(StageError::OutOfRange(_) | StageError::NoResetLine) => "mend [stage] of the rig",
+            Self::Stage(StageError::Stopped | StageError::NotHomed) | Self::ByHand => {
                 "reset it, as by its button, before it goes on"
             }
             Self::Saturated { .. } => "reset it, and press less deep: `depths` of [stage]",
@@ -124,6 +130,8 @@ pub struct Machine {
     readings: u64,
     read_at: Instant,
     unseen: u32,
+    /// Error with which it ends once its finger is lifted.
+    ends_with: Option<MachineError>,
 }
 
 impl Machine {
@@ -139,7 +147,13 @@ impl Machine {
             readings: 0,
             read_at: now,
             unseen: 0,
+            ends_with: None,
         }
+    }
+
+    /// The way in which a stop acts on it.
+    pub fn stopping(&self) -> Stopping {
+        self.thread.stopping()
     }
 
     /// Its motion.
@@ -187,7 +201,13 @@ impl Machine {
             return self.fail(MachineError::Silent);
         }
         match self.thread.done() {
-            Some(Ok(Done::Up)) => self.enter(Motion::Up, calibration),
+            Some(Ok(Done::Up)) => {
+                if let Some(error) = self.ends_with.take() {
+                    self.thread.close();
+                    return Err(error);
+                }
+                self.enter(Motion::Up, calibration);
+            }
             Some(Ok(Done::Down)) => self.enter(Motion::Down, calibration),
             Some(Err(error)) => return Err(error.into()),
             None => {}
@@ -205,6 +225,7 @@ impl Machine {
                 }
             }
             (Motion::Up, Waiting::Untouched | Waiting::Release) if self.since.elapsed() > RELEASED_WITHIN => {
+                self.thread.close();
                 return Err(MachineError::NoRest);
             }
             (Motion::Down, Waiting::Release | Waiting::Nothing) => {
@@ -215,7 +236,7 @@ impl Machine {
                 self.leave_out(calibration);
                 self.unseen += 1;
                 if self.unseen == MOST_UNSEEN {
-                    return Err(MachineError::Unseen);
+                    self.ends_with = Some(MachineError::Unseen);
                 }
                 return Ok(Some(MachineNote::Unseen));
             }
@@ -232,8 +253,10 @@ impl Machine {
     ///
     /// # Errors
     /// [`MachineError`] where it does not.
-    pub fn finish(self) -> Result<(), MachineError> {
-        Ok(self.thread.finish()?)
+    pub fn finish(mut self) -> Result<(), MachineError> {
+        let ends_with = self.ends_with.take();
+        self.thread.finish()?;
+        ends_with.map_or(Ok(()), Err)
     }
 
     fn leave_out(&mut self, calibration: &mut Calibration) {
@@ -250,7 +273,7 @@ impl Machine {
         calibration.set_guided(false);
         let motion = match order {
             Order::Home => Motion::Homing,
-            Order::Press { .. } => Motion::Pressing,
+            Order::Travel(_) | Order::Press { .. } => Motion::Pressing,
             Order::Lift => Motion::Lifting,
         };
         (self.motion, self.since) = (motion, Instant::now());

@@ -1,7 +1,7 @@
 //! The machine of a calibration as browsers see it, and the people who watch it.
 
 use crate::calibration::{Calibration, Machine, Motion, Note};
-use crate::stage::StageUrl;
+use crate::stage::{StageUrl, Stopping};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_rig::Stage;
@@ -57,6 +57,7 @@ impl Attendance {
 #[derive(Clone, Debug, Default)]
 pub struct MachineState {
     pub firmware: Option<&'static str>,
+    pub stopping: Option<Stopping>,
     pub motion: Option<Motion>,
     position: Option<Position>,
     depth_m: Option<f64>,
@@ -84,6 +85,8 @@ impl MachineState {
 pub struct MachineRecord {
     url: String,
     firmware: Option<&'static str>,
+    /// The way in which a stop acts, where that is not at once.
+    stopping: Option<String>,
     /// True while it runs: from its greeting until its finger is lifted for good.
     runs: bool,
     /// `None` while it is greeted.
@@ -125,6 +128,7 @@ impl MachineRecord {
         Self {
             url: url.to_string(),
             firmware: None,
+            stopping: None,
             runs: false,
             motion: None,
             x_mm: None,
@@ -160,6 +164,10 @@ impl MachineRecord {
             .map(|since| since.elapsed().as_secs_f64() / state.taken as f64 * left as f64);
         Self {
             firmware: state.firmware,
+            stopping: state
+                .stopping
+                .filter(|stopping| *stopping != Stopping::AtOnce)
+                .map(|stopping| stopping.to_string()),
             runs: true,
             motion: state.motion,
             x_mm: state.position.map(|position| position.x_m * 1e3),

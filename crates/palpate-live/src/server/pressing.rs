@@ -59,7 +59,11 @@ impl MachineRun {
 
     fn try_to_press(&self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) -> Result<(), MachineError> {
         let thread = StageThread::open(&self.url, self.stage.clone(), Arc::clone(&self.stop))?;
-        locked(shared).machine.firmware = Some(thread.firmware().name());
+        {
+            let machine = &mut locked(shared).machine;
+            machine.firmware = Some(thread.firmware().name());
+            machine.stopping = Some(thread.stopping());
+        }
         let mut machine = Machine::new(thread, self.stage.force_limit_n);
         loop {
             let arrived = match inputs.recv_timeout(LOOK) {

@@ -1,131 +1,145 @@
 //! Machines of Marlin or GRBL firmware.
 //!
 //! Both take lines of G-code (ISO 6983-1) and answer each with `ok` or an error. A move is answered when it has been understood, not when it is
-//! done, so that each is followed by a line that waits: `M400` (Marlin), a dwell `G4` (GRBL, which finishes its moves before one).
+//! done, so that each is followed by a line that waits: `M400` (Marlin), a dwell `G4` (GRBL, which finishes its moves before one). Marlin answers
+//! `ok` also to lines that it did not execute, so that an `ok` counts only where nothing unexpected came before it and the reported position is
+//! the target.
 
+use super::error::{Doubt, StageError};
+use super::firmware::{Answer, Firmware, position_mm, status};
+use super::link::StageLink;
 use palpate_mechanics::contact::Position;
-use palpate_numerics::OutOfRange;
 use palpate_rig::Stage;
-use std::io::{self, Read, Write};
+use std::collections::VecDeque;
+use std::fmt;
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// Firmware of a machine.
+/// Way in which a stop acts on a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Firmware {
-    /// That of most 3-D printers.
-    Marlin,
-    /// That of most small mills.
-    Grbl,
+pub enum Stopping {
+    /// In the middle of any move.
+    AtOnce,
+    /// By a reset of the board over DTR: its firmware reads no stop during a move.
+    ByReset,
+    /// Between two moves: its firmware reads no stop during one.
+    BetweenMoves,
 }
 
-impl Firmware {
-    /// Name in messages.
-    pub const fn name(self) -> &'static str {
+impl fmt::Display for Stopping {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Marlin => "Marlin",
-            Self::Grbl => "GRBL",
-        }
-    }
-
-    const fn home(self) -> &'static str {
-        match self {
-            Self::Marlin => "G28",
-            Self::Grbl => "$H",
-        }
-    }
-
-    const fn wait(self) -> &'static str {
-        match self {
-            Self::Marlin => "M400",
-            Self::Grbl => "G4 P0.01",
-        }
-    }
-
-    /// Bytes that stop a machine at once; those of GRBL are ones that it heeds in the middle of anything.
-    const fn stop(self) -> &'static [u8] {
-        match self {
-            Self::Marlin => b"M112\n",
-            Self::Grbl => b"!\x18",
+            Self::AtOnce => f.write_str("a stop acts at once"),
+            Self::ByReset => f.write_str(
+                "its firmware has no emergency parser: a stop resets the board by DTR, and the motors lose their hold",
+            ),
+            Self::BetweenMoves => write!(
+                f,
+                "its firmware has no emergency parser, so that a stop waits for the end of a move: moves are cut into pieces of {} ms, and homing cannot be stopped. Keep its switch within reach",
+                PIECE.as_millis()
+            ),
         }
     }
 }
 
-/// Link to a machine: a serial port, a connection.
-pub trait StageLink: Read + Write + Send {}
-
-impl<T: Read + Write + Send> StageLink for T {}
-
-/// A machine that does not do what it is asked for.
-#[derive(Debug, thiserror::Error)]
-pub enum StageError {
-    /// Its line is broken.
-    #[error("the line to the machine is broken: {0}")]
-    Line(#[from] io::Error),
-    /// A machine whose words name no firmware.
-    #[error(
-        "the machine says neither that it is Marlin nor that it is GRBL; it said: {said:?}. Is the baud rate right?"
-    )]
-    Unknown {
-        /// Its words.
-        said: String,
-    },
-    /// It refused a line.
-    #[error("the machine answered `{answer}` to `{line}`")]
-    Refused {
-        /// The line.
-        line: String,
-        /// Its answer.
-        answer: String,
-    },
-    /// It does not answer.
-    #[error("the machine did not answer `{line}` within {seconds} s")]
-    Silent {
-        /// The line.
-        line: String,
-        /// Seconds that it was waited for.
-        seconds: u64,
-    },
-    /// Somebody, or a limit, stopped it.
-    #[error("the machine was stopped; it needs a reset before it moves again")]
-    Stopped,
-    /// A number of its setup is not in its range.
-    #[error(transparent)]
-    OutOfRange(#[from] OutOfRange),
-}
-
-/// Time for a greeting: boards start anew when their port is opened.
+/// Time for the first words of a board: one with a boot loader and a memory card takes 10 s.
+const IDENTIFY: Duration = Duration::from_secs(15);
+/// Time after which a silent board is asked.
 const GREETING: Duration = Duration::from_secs(3);
-/// Time for an answer, and for one after a move or homing.
-const ANSWER: Duration = Duration::from_secs(5);
-const MOVE: Duration = Duration::from_secs(120);
-/// Time for what it says after a stop.
+/// Time for an answer that needs no move.
+pub(super) const ANSWER: Duration = Duration::from_secs(5);
+/// Time for homing: the slowest printers take two minutes.
+const HOMING: Duration = Duration::from_secs(300);
+/// Time for a move beyond twice its computed duration, which covers acceleration and what is planned before it.
+const MOVE_MARGIN: Duration = Duration::from_secs(10);
+const LONGEST_MOVE: Duration = Duration::from_secs(3600);
+/// Duration of a piece of a move, where a stop waits for its end.
+const PIECE: Duration = Duration::from_millis(40);
+const MOST_PIECES: f64 = 1e6;
+/// Time for what a machine says after a stop.
 const LAST_WORDS: Duration = Duration::from_millis(100);
-/// Most bytes of a line that is kept.
+/// Silence after which no answer is outstanding.
+const QUIET: Duration = Duration::from_millis(500);
+/// Time beyond its end for which a line without an end is read.
+const UNENDING: Duration = Duration::from_millis(100);
+/// Most bytes of a line that is kept, and of words that are quoted.
 const LONGEST: usize = 1024;
+/// Reports of GRBL within which it names the origin of its work coordinates (`REPORT_WCO_REFRESH_IDLE_COUNT` is 10).
+const OFFSET_REPORTS: usize = 11;
+/// Largest distance between a target and the reported position: `M114` has two decimals, and a step of a belt is 0.0125 mm.
+pub(super) const TOLERANCE_MM: f64 = 0.05;
+
+/// A reason to leave the order of work.
+#[derive(Debug)]
+pub(super) enum Fault {
+    Line(io::Error),
+    Stopped,
+    NotHomed,
+    Doubt(Doubt),
+}
+
+impl From<io::Error> for Fault {
+    fn from(error: io::Error) -> Self {
+        Self::Line(error)
+    }
+}
 
 /// A machine that presses at places of a surface.
 #[derive(Debug)]
 pub struct GcodeStage<L> {
-    link: L,
-    firmware: Firmware,
-    setup: Stage,
+    pub(super) link: L,
+    pub(super) firmware: Firmware,
+    pub(super) setup: Stage,
     stop: Arc<AtomicBool>,
-    line: Vec<u8>,
+    stopping: Stopping,
+    received: VecDeque<u8>,
+    /// Origin of GRBL's work coordinates in its own.
+    work_offset_mm: [f64; 3],
+    /// Position that was reported last; `None` before homing and after a halt.
+    pub(super) at_mm: Option<[f64; 3]>,
+    /// Target of the last move.
+    pub(super) target_mm: [f64; 3],
+    /// Numbers of the echoes that were asked for.
+    echoes: u32,
+    /// True from homing on.
+    pub(super) has_moved: bool,
+    is_halted: bool,
 }
 
-impl<L: Read + Write> GcodeStage<L> {
-    /// Greets a machine behind a link whose reads end after some 50 ms at most. Setting `stop` stops the machine whatever it does.
+impl<L: StageLink> GcodeStage<L> {
+    /// Connects to a machine, and matches its answers to commands; nothing moves. Setting `stop` stops the machine whatever it does.
     ///
     /// # Errors
-    /// [`StageError`] where its firmware is not known, or a number of the setup is not in its range.
+    /// [`StageError`] where its firmware is unknown, an answer is not the expected one, or a number of the setup is not in its range.
     pub fn connect(link: L, setup: Stage, stop: Arc<AtomicBool>) -> Result<Self, StageError> {
         setup.check()?;
-        let mut stage = Self { link, firmware: Firmware::Marlin, setup, stop, line: Vec::new() };
-        stage.firmware = stage.identify()?;
-        stage.order("G21", ANSWER)?;
-        stage.order("G90", ANSWER)?;
+        if setup.dtr_reset && !link.has_dtr() {
+            return Err(StageError::NoResetLine);
+        }
+        let mut stage = Self {
+            link,
+            firmware: Firmware::Marlin,
+            setup,
+            stop,
+            stopping: Stopping::AtOnce,
+            received: VecDeque::new(),
+            work_offset_mm: [0.0; 3],
+            at_mm: None,
+            target_mm: [0.0; 3],
+            echoes: 0,
+            has_moved: false,
+            is_halted: false,
+        };
+        let mut said = String::new();
+        let identified = stage.identify(&mut said);
+        match stage.end_of(identified)? {
+            Some(firmware) => stage.firmware = firmware,
+            None => return Err(StageError::Unknown { said }),
+        }
+        let agreed = stage.synchronize(ANSWER).and_then(|()| stage.learn_stopping());
+        stage.end_of(agreed)?;
         Ok(stage)
     }
 
@@ -134,144 +148,450 @@ impl<L: Read + Write> GcodeStage<L> {
         self.firmware
     }
 
-    /// Moves to its end stops, by which it knows where it is.
+    /// The way in which a stop acts.
+    pub fn stopping(&self) -> Stopping {
+        self.stopping
+    }
+
+    /// Moves to its end stops, by which it learns where it is, and lifts the finger to the height of travel.
     ///
     /// # Errors
     /// [`StageError`], also of the other steps.
     pub fn home(&mut self) -> Result<(), StageError> {
-        self.order(self.firmware.home(), MOVE)?;
+        let homed = self.try_to_home();
+        self.end_of(homed)?;
         self.lift()
     }
 
-    /// Travels to a position of the surface, above it.
+    /// Travels to a position of the surface, at the height of travel.
+    ///
+    /// # Errors
+    /// [`StageError`].
     pub fn travel(&mut self, position: Position) -> Result<(), StageError> {
+        if self.at_mm.is_some_and(|[_, _, z_mm]| z_mm < self.travel_z_mm() - TOLERANCE_MM) {
+            self.lift()?;
+        }
         let (x_m, y_m) = self.setup.origin_m;
-        let to = format!("X{:.3} Y{:.3}", (x_m + position.x_m) * 1e3, (y_m + position.y_m) * 1e3);
-        self.go(&to, self.setup.travel_m_per_s)
+        let to = [Some((x_m + position.x_m) * 1e3), Some((y_m + position.y_m) * 1e3), None];
+        let gone = self.go(to, self.setup.travel_m_per_s);
+        self.end_of(gone)
     }
 
     /// Presses where it is, to a depth in metres.
+    ///
+    /// # Errors
+    /// [`StageError`].
     pub fn press(&mut self, depth_m: f64) -> Result<(), StageError> {
-        let to = format!("Z{:.3}", (self.setup.touch_z_m - depth_m) * 1e3);
-        self.go(&to, self.setup.press_m_per_s)
+        let z_mm = (self.setup.touch_z_m - depth_m) * 1e3;
+        let gone = self.go([None, None, Some(z_mm)], self.setup.press_m_per_s);
+        self.end_of(gone)
     }
 
     /// Lifts the finger to the height of travel.
+    ///
+    /// # Errors
+    /// [`StageError`].
     pub fn lift(&mut self) -> Result<(), StageError> {
-        let to = format!("Z{:.3}", (self.setup.touch_z_m + self.setup.clearance_m) * 1e3);
-        self.go(&to, self.setup.travel_m_per_s)
+        let gone = self.go([None, None, Some(self.travel_z_mm())], self.setup.travel_m_per_s);
+        self.end_of(gone)
     }
 
-    /// A straight move, and the wait for its end. G-code has mm and mm/min.
-    fn go(&mut self, to: &str, speed_m_per_s: f64) -> Result<(), StageError> {
-        self.order(&format!("G1 {to} F{:.0}", speed_m_per_s * 60e3), ANSWER)?;
-        self.order(self.firmware.wait(), MOVE)
+    /// Reads what came while nothing was asked, as long as a read takes: a greeting, say, of a board that was reset.
+    ///
+    /// # Errors
+    /// [`StageError`] for any line but a report, and where it was stopped.
+    pub fn watch(&mut self) -> Result<(), StageError> {
+        let watched = self.reject_unasked();
+        self.end_of(watched)
     }
 
-    fn identify(&mut self) -> Result<Firmware, StageError> {
-        let mut said = String::new();
-        if let Some(firmware) = self.listen(GREETING, &mut said)? {
-            return Ok(firmware);
+    /// Halts the machine, where that was asked for.
+    ///
+    /// # Errors
+    /// [`StageError::Stopped`] where it was; [`StageError::Line`].
+    pub fn heed_stop(&mut self) -> Result<(), StageError> {
+        let heeded = self.check_stop();
+        self.end_of(heeded)
+    }
+
+    /// The outcome for callers: a doubt stops the machine, and lifts its finger where that is safe.
+    fn end_of<T>(&mut self, outcome: Result<T, Fault>) -> Result<T, StageError> {
+        outcome.map_err(|fault| match fault {
+            Fault::Line(error) => StageError::Line(error),
+            Fault::Stopped => StageError::Stopped,
+            Fault::NotHomed => StageError::NotHomed,
+            Fault::Doubt(doubt) => {
+                let finger = self.retreat(&doubt);
+                StageError::Doubt { doubt, finger }
+            }
+        })
+    }
+
+    pub(super) fn travel_z_mm(&self) -> f64 {
+        (self.setup.touch_z_m + self.setup.clearance_m) * 1e3
+    }
+
+    fn try_to_home(&mut self) -> Result<(), Fault> {
+        (self.at_mm, self.has_moved) = (None, true);
+        self.command(self.firmware.home(), HOMING)?;
+        self.set()?;
+        if self.firmware == Firmware::Grbl {
+            self.learn_work_offset()?;
         }
-        // A board that does not start anew says nothing by itself: `M115` is Marlin's question, `$I` GRBL's.
-        for question in ["M115\n", "$I\n"] {
-            self.link.write_all(question.as_bytes())?;
-            if let Some(firmware) = self.listen(ANSWER.min(GREETING), &mut said)? {
-                return Ok(firmware);
-            }
-        }
-        Err(StageError::Unknown { said })
+        let at_mm = self.position()?;
+        (self.at_mm, self.target_mm) = (Some(at_mm), at_mm);
+        Ok(())
     }
 
-    /// Listens for a name of a firmware.
-    fn listen(&mut self, time: Duration, said: &mut String) -> Result<Option<Firmware>, StageError> {
-        let until = Instant::now() + time;
-        while let Some(line) = self.next_line(until)? {
-            if line.starts_with("Grbl") || line.starts_with("[VER:") {
-                return Ok(Some(Firmware::Grbl));
+    /// Sends the settings that moves rely on.
+    pub(super) fn set(&mut self) -> Result<(), Fault> {
+        for setting in self.firmware.settings() {
+            // A Marlin without inches does not know the command that switches them off.
+            self.ask(setting, ANSWER, |firmware, line| {
+                *setting == "G21" && firmware.does_not_know(setting, line)
+            })?;
+        }
+        Ok(())
+    }
+
+    /// A straight move to the axes that are given, to its end, where the reported position must be the target. G-code has mm and mm/min.
+    pub(super) fn go(&mut self, to_mm: [Option<f64>; 3], speed_m_per_s: f64) -> Result<(), Fault> {
+        self.check_stop()?;
+        let from_mm = self.at_mm.ok_or(Fault::NotHomed)?;
+        self.target_mm = std::array::from_fn(|axis| to_mm[axis].unwrap_or(from_mm[axis]));
+        let target_mm = self.target_mm;
+        let way_mm = from_mm.iter().zip(target_mm).map(|(from, to)| (to - from).powi(2)).sum::<f64>().sqrt();
+        let duration_s = way_mm * 1e-3 / speed_m_per_s;
+        let pieces = match self.stopping {
+            Stopping::BetweenMoves => (duration_s / PIECE.as_secs_f64()).ceil().clamp(1.0, MOST_PIECES),
+            Stopping::AtOnce | Stopping::ByReset => 1.0,
+        };
+        let time = Duration::try_from_secs_f64(2.0 * duration_s / pieces)
+            .map_or(LONGEST_MOVE, |time| (time + MOVE_MARGIN).min(LONGEST_MOVE));
+        for piece in 1..=pieces as u32 {
+            let share = f64::from(piece) / pieces;
+            let mut line = "G1".to_owned();
+            for (axis, name) in
+                ["X", "Y", "Z"].into_iter().enumerate().filter(|(axis, _)| to_mm[*axis].is_some())
+            {
+                let at_mm = from_mm[axis] + share * (target_mm[axis] - from_mm[axis]);
+                line += &format!(" {name}{at_mm:.3}");
             }
-            if line == "start" || line.contains("Marlin") {
-                return Ok(Some(Firmware::Marlin));
+            self.command(&format!("{line} F{:.3}", speed_m_per_s * 60e3), ANSWER)?;
+            self.command(self.firmware.wait(), time)?;
+        }
+        let at_mm = self.position()?;
+        for (axis, name) in ['X', 'Y', 'Z'].into_iter().enumerate() {
+            if (at_mm[axis] - target_mm[axis]).abs() > TOLERANCE_MM {
+                return Err(Fault::Doubt(Doubt::OffPosition {
+                    axis: name,
+                    target_mm: target_mm[axis],
+                    reported_mm: at_mm[axis],
+                }));
             }
-            if said.len() < LONGEST {
-                said.push_str(&line);
-                said.push('\n');
+        }
+        self.at_mm = Some(target_mm);
+        Ok(())
+    }
+
+    /// The position that the machine reports at rest.
+    pub(super) fn position(&mut self) -> Result<[f64; 3], Fault> {
+        if self.firmware == Firmware::Marlin {
+            let mut at_mm = None;
+            self.ask("M114", ANSWER, |_, line| {
+                at_mm = position_mm(line).or(at_mm);
+                false
+            })?;
+            let no_report = Doubt::NoReport { command: "M114".to_owned(), expected: "a position" };
+            return at_mm.ok_or(Fault::Doubt(no_report));
+        }
+        let until = self.link.now() + ANSWER;
+        loop {
+            let report = self.status_report(until)?;
+            if report.state == "Idle" {
+                let expected = "a position";
+                let no_report = Fault::Doubt(Doubt::NoReport { command: "?".to_owned(), expected });
+                return report.work_mm.ok_or(no_report);
+            }
+            if self.link.now() >= until {
+                return Err(Fault::Doubt(Doubt::Answer { command: "?".to_owned(), answer: report.state }));
+            }
+        }
+    }
+
+    /// A status report of GRBL, which answers `?` at any time and without `ok`.
+    pub(super) fn status_report(&mut self, until: Duration) -> Result<StatusReport, Fault> {
+        self.reject_unasked()?;
+        self.link.write_all(b"?")?;
+        self.link.flush()?;
+        let Some(line) = self.next_line(until)? else {
+            return Err(Fault::Doubt(Doubt::Silent { command: "?".to_owned(), seconds: ANSWER.as_secs() }));
+        };
+        let Some(status) = status(&line) else { return Err(self.unexpected("?", line)) };
+        if let Some(offset_mm) = status.offset_mm {
+            self.work_offset_mm = offset_mm;
+        }
+        let from_machine =
+            status.machine_mm.map(|at| std::array::from_fn(|axis| at[axis] - self.work_offset_mm[axis]));
+        Ok(StatusReport {
+            state: status.state.to_owned(),
+            is_held: status.is_held,
+            names_offset: status.offset_mm.is_some() || status.work_mm.is_some(),
+            work_mm: status.work_mm.or(from_machine),
+        })
+    }
+
+    fn learn_work_offset(&mut self) -> Result<(), Fault> {
+        self.work_offset_mm = [0.0; 3];
+        for _ in 0..OFFSET_REPORTS {
+            let until = self.link.now() + ANSWER;
+            if self.status_report(until)?.names_offset {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for a greeting, and asks boards that do not greet; the firmware, or `None` where its words name none.
+    fn identify(&mut self, said: &mut String) -> Result<Option<Firmware>, Fault> {
+        let until = self.link.now() + IDENTIFY;
+        // `M115` is Marlin's question, `$I` GRBL's.
+        let mut questions = ["M115\n", "$I\n"].into_iter().cycle();
+        while self.link.now() < until {
+            let until = self.link.now() + GREETING;
+            while let Some(line) = self.next_line(until)? {
+                if line.starts_with("Grbl") || line.starts_with("[VER:") {
+                    return Ok(Some(Firmware::Grbl));
+                }
+                if line == "start" || line.contains("Marlin") {
+                    return Ok(Some(Firmware::Marlin));
+                }
+                if said.len() < LONGEST {
+                    said.push_str(&line);
+                    said.push('\n');
+                }
+            }
+            if let Some(question) = questions.next() {
+                self.link.write_all(question.as_bytes())?;
+                self.link.flush()?;
             }
         }
         Ok(None)
     }
 
-    /// Sends a line, and waits for its `ok`.
-    fn order(&mut self, line: &str, time: Duration) -> Result<(), StageError> {
-        self.check_stop()?;
-        self.link.write_all(line.as_bytes())?;
-        self.link.write_all(b"\n")?;
-        self.link.flush()?;
-        let until = Instant::now() + time;
-        while let Some(answer) = self.next_line(until)? {
-            if answer == "ok" || answer.starts_with("ok ") {
+    /// Passes over all answers to earlier commands, so that the next `ok` belongs to the next command.
+    pub(super) fn synchronize(&mut self, time: Duration) -> Result<(), Fault> {
+        match self.firmware {
+            Firmware::Marlin => self.await_echo(time),
+            Firmware::Grbl => self.await_version(time),
+        }
+    }
+
+    /// Asks Marlin to echo words that nothing else contains: all before them belongs to earlier commands. A firmware that does not know `M118`
+    /// quotes it.
+    fn await_echo(&mut self, time: Duration) -> Result<(), Fault> {
+        self.echoes += 1;
+        let echo = format!("palpate-{}", self.echoes);
+        let command = format!("M118 {echo}");
+        self.send(&command)?;
+        let until = self.link.now() + time;
+        let (mut is_echoed, mut is_silent) = (false, true);
+        while let Some(line) = self.next_line(until)? {
+            is_silent = false;
+            is_echoed |= line.contains(&echo);
+            if is_echoed && super::firmware::is_ok(&line) {
                 return Ok(());
             }
-            let lower = answer.to_ascii_lowercase();
-            if lower.starts_with("error") || lower.starts_with("alarm") || answer.starts_with("!!") {
-                return Err(StageError::Refused { line: line.to_owned(), answer });
+        }
+        if is_silent {
+            return Err(Fault::Doubt(Doubt::Silent { command, seconds: time.as_secs() }));
+        }
+        // Without an echo the line has been quiet for long enough, and the report of the next query shows whether its `ok` is its own.
+        Ok(())
+    }
+
+    /// Waits for silence, then asks GRBL for its version, which must come before the `ok`.
+    fn await_version(&mut self, time: Duration) -> Result<(), Fault> {
+        const TRIES: usize = 3;
+        for _ in 0..TRIES {
+            let until = self.link.now() + time;
+            loop {
+                let quiet = self.link.now() + QUIET;
+                if self.next_line(quiet)?.is_none() || self.link.now() >= until {
+                    break;
+                }
+            }
+            self.send("$I")?;
+            let until = self.link.now() + time;
+            let mut is_named = false;
+            while let Some(line) = self.next_line(until)? {
+                is_named |= line.starts_with("[VER:");
+                if super::firmware::is_ok(&line) {
+                    break;
+                }
+            }
+            if is_named {
+                return Ok(());
             }
         }
-        Err(StageError::Silent { line: line.to_owned(), seconds: time.as_secs() })
+        Err(Fault::Doubt(Doubt::NoReport { command: "$I".to_owned(), expected: "its version" }))
+    }
+
+    /// Learns whether the firmware reads a stop during a move.
+    fn learn_stopping(&mut self) -> Result<(), Fault> {
+        if self.firmware == Firmware::Grbl {
+            return Ok(());
+        }
+        let (mut is_named, mut is_at_once) = (false, false);
+        self.ask("M115", ANSWER, |_, line| {
+            is_named |= line.contains("FIRMWARE_NAME:") && line.contains("Marlin");
+            is_at_once |= line.trim() == "Cap:EMERGENCY_PARSER:1";
+            // Firmwares describe themselves in words of their own.
+            !line.starts_with("Error") && !line.starts_with("Resend")
+        })?;
+        if !is_named {
+            let expected = "a FIRMWARE_NAME of Marlin";
+            return Err(Fault::Doubt(Doubt::NoReport { command: "M115".to_owned(), expected }));
+        }
+        self.stopping = match (is_at_once, self.setup.dtr_reset) {
+            (true, _) => Stopping::AtOnce,
+            (false, true) => Stopping::ByReset,
+            (false, false) => Stopping::BetweenMoves,
+        };
+        Ok(())
+    }
+
+    pub(super) fn command(&mut self, command: &str, time: Duration) -> Result<(), Fault> {
+        self.ask(command, time, |_, _| false)
+    }
+
+    /// Sends a command, and waits for its `ok`. `takes` is shown every line up to and with that; true for a report that the command asks for.
+    fn ask(
+        &mut self,
+        command: &str,
+        time: Duration,
+        mut takes: impl FnMut(Firmware, &str) -> bool,
+    ) -> Result<(), Fault> {
+        self.reject_unasked()?;
+        self.send(command)?;
+        let until = self.link.now() + time;
+        while let Some(line) = self.next_line(until)? {
+            let is_asked_for = takes(self.firmware, &line);
+            match self.firmware.classify(&line) {
+                Answer::Ok => return Ok(()),
+                Answer::Report => {}
+                Answer::Greeting | Answer::Unexpected if is_asked_for => {}
+                Answer::Greeting | Answer::Unexpected => return Err(self.unexpected(command, line)),
+            }
+        }
+        Err(Fault::Doubt(Doubt::Silent { command: command.to_owned(), seconds: time.as_secs() }))
+    }
+
+    fn unexpected(&self, command: &str, line: String) -> Fault {
+        Fault::Doubt(match self.firmware.classify(&line) {
+            Answer::Greeting => Doubt::Restart { greeting: line },
+            _ => Doubt::Answer { command: command.to_owned(), answer: line },
+        })
+    }
+
+    pub(super) fn send(&mut self, command: &str) -> Result<(), Fault> {
+        self.check_stop()?;
+        self.link.write_all(format!("{command}\n").as_bytes())?;
+        Ok(self.link.flush()?)
+    }
+
+    /// Reads lines that came while nothing was asked; an `ok` among them would be taken for the answer to the next command.
+    fn reject_unasked(&mut self) -> Result<(), Fault> {
+        while let Some(line) = self.next_line(self.link.now())? {
+            match self.firmware.classify(&line) {
+                Answer::Report => {}
+                Answer::Greeting => return Err(Fault::Doubt(Doubt::Restart { greeting: line })),
+                Answer::Ok | Answer::Unexpected => return Err(Fault::Doubt(Doubt::Unasked { line })),
+            }
+        }
+        Ok(())
     }
 
     /// The next line that the machine sends, without its end; `None` when time is up.
-    fn next_line(&mut self, until: Instant) -> Result<Option<String>, StageError> {
+    pub(super) fn next_line(&mut self, until: Duration) -> Result<Option<String>, Fault> {
         loop {
-            self.check_stop()?;
-            let mut byte = [0];
-            match self.link.read(&mut byte) {
-                Ok(0) => return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into()),
-                Ok(_) if byte[0] == b'\n' => {
-                    let line = String::from_utf8_lossy(&self.line).trim().to_owned();
-                    self.line.clear();
-                    if !line.is_empty() {
-                        return Ok(Some(line));
-                    }
+            while let Some(end) = self.received.iter().position(|byte| *byte == b'\n') {
+                let bytes: Vec<u8> = self.received.drain(..=end).take(LONGEST).collect();
+                let line = String::from_utf8_lossy(&bytes).trim().to_owned();
+                if !line.is_empty() {
+                    return Ok(Some(line));
                 }
-                Ok(_) if self.line.len() < LONGEST => self.line.push(byte[0]),
-                Ok(_) => {}
-                Err(error) => match error.kind() {
-                    io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => {}
-                    _ => return Err(error.into()),
-                },
             }
-            if Instant::now() >= until {
+            self.check_stop()?;
+            let is_more = self.read()?;
+            let now = self.link.now();
+            if now >= until && (!is_more || now >= until + UNENDING) {
                 return Ok(None);
             }
         }
     }
 
-    /// Sends the stop, where it was asked for.
-    pub(super) fn check_stop(&mut self) -> Result<(), StageError> {
+    /// Reads what is there, waiting no longer than the link does; false where nothing came.
+    fn read(&mut self) -> io::Result<bool> {
+        let mut bytes = [0; 256];
+        match self.link.read(&mut bytes) {
+            Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
+            Ok(count) => {
+                if self.received.len() < LONGEST {
+                    self.received.extend(&bytes[..count]);
+                } else {
+                    // What remains of a line that is too long: only its end counts.
+                    self.received.extend(bytes[..count].iter().filter(|byte| **byte == b'\n'));
+                }
+                Ok(true)
+            }
+            Err(error) => match error.kind() {
+                io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => Ok(false),
+                _ => Err(error),
+            },
+        }
+    }
+
+    /// Halts the machine, where that was asked for.
+    pub(super) fn check_stop(&mut self) -> Result<(), Fault> {
+        if self.is_halted {
+            return Err(Fault::Stopped);
+        }
         if !self.stop.load(Ordering::Relaxed) {
             return Ok(());
         }
-        self.link.write_all(self.firmware.stop())?;
+        self.halt()?;
+        Err(Fault::Stopped)
+    }
+
+    /// Halts the machine until it is reset.
+    pub(super) fn halt(&mut self) -> io::Result<()> {
+        if std::mem::replace(&mut self.is_halted, true) {
+            return Ok(());
+        }
+        self.at_mm = None;
+        self.link.write_all(self.firmware.halt())?;
         self.link.flush()?;
+        if self.stopping == Stopping::ByReset {
+            self.link.reset_by_dtr()?;
+        }
         self.hear_out();
-        Err(StageError::Stopped)
+        Ok(())
     }
 
     /// Takes what the machine still says after its stop: a connection that is closed with unread bytes is reset, and the stop may be lost with it.
     fn hear_out(&mut self) {
-        let until = Instant::now() + LAST_WORDS;
-        let mut bytes = [0; 256];
-        while Instant::now() < until {
-            match self.link.read(&mut bytes) {
-                Ok(0) => return,
-                Err(error)
-                    if !matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock) =>
-                {
-                    return;
-                }
-                Ok(_) | Err(_) => {}
-            }
+        let until = self.link.now() + LAST_WORDS;
+        while self.link.now() < until && self.read().is_ok() {
+            self.received.clear();
         }
     }
+}
+
+/// A status report of GRBL, its position in work coordinates.
+pub(super) struct StatusReport {
+    pub state: String,
+    pub is_held: bool,
+    names_offset: bool,
+    pub work_mm: Option<[f64; 3]>,
 }

@@ -1,11 +1,23 @@
 //! Machines that press by themselves: 3-D printers and mills with G-code firmware.
+//!
+//! A [`GcodeStage`] speaks to a machine over a [`StageLink`]. Answers belong to the command that was sent last, and the position is compared after
+//! every move; anything else stops the machine and lifts its finger where that is safe. A [`SimulatedMachine`] has the faults of real ones.
 
+mod error;
+mod firmware;
 mod gcode;
+mod link;
+mod retreat;
 mod simulated;
 mod thread;
 mod url;
 
-pub use gcode::{Firmware, GcodeStage, StageError, StageLink};
-pub use simulated::SimulatedMachine;
+pub use error::{Doubt, Finger, StageError};
+pub use firmware::Firmware;
+pub use gcode::{GcodeStage, Stopping};
+pub use link::StageLink;
+pub use simulated::{
+    FaultKind, Greeting, MachineConfig, MachineConfigError, MachineFault, SimulatedLink, SimulatedMachine,
+};
 pub use thread::{Done, Order, StageThread};
 pub use url::{StageUrl, StageUrlError};

@@ -1,52 +1,225 @@
-//! A machine without hardware: lines of G-code in, answers and the contact of its finger out.
+//! A machine without hardware: bytes of G-code in, answers and the contact of its finger out, in time that the caller tells.
 
-use super::gcode::Firmware;
+use super::firmware::Firmware;
+use super::link::StageLink;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_rig::Stage;
+use std::collections::VecDeque;
 use std::io::{self, Read, Write};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::str::FromStr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
-/// A machine over a surface, which answers at once and is where it is sent at once.
-#[derive(Clone, Debug)]
-pub struct SimulatedMachine {
-    shared: Arc<Mutex<State>>,
+/// Greeting of a board whose port is opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Greeting {
+    /// At once.
+    #[default]
+    AtOnce,
+    /// After a time in which the board reads nothing.
+    After(Duration),
+    /// None: the board goes on as it was.
+    None,
 }
 
-#[derive(Debug)]
-struct State {
-    firmware: Firmware,
-    setup: Stage,
-    extent: Extent,
-    /// Force of a press to its greatest depth, in newtons.
-    force_n: f64,
-    received: Vec<u8>,
-    answers: Vec<u8>,
-    /// The finger's x, y and z, in metres; `None` before it is homed.
-    at_m: Option<[f64; 3]>,
-    stopped: bool,
+/// Fault of a machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultKind {
+    /// The line is not understood, and not executed.
+    Unknown,
+    /// The line does not arrive.
+    Lost,
+    /// The machine answers nothing from now on.
+    Silence,
+    /// The line is asked for again, and not executed.
+    Resend,
+    /// The line is not executed, as the machine is not homed any more.
+    HomeFirst,
+    /// The machine halts with an error.
+    Error,
+    /// The machine starts anew in place of executing the line.
+    Reset,
+    /// The machine starts anew in the middle of the move.
+    ResetMoving,
+    /// An end stop ends the move in its middle.
+    Endstop,
+    /// The line is executed, and answered twice.
+    ExtraOk,
+}
+
+/// A fault at the `nth` line, from 1, that begins with `line`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MachineFault {
+    /// The fault.
+    pub kind: FaultKind,
+    /// Beginning of the line.
+    pub line: String,
+    /// Number of such lines, from 1.
+    pub nth: u32,
+}
+
+/// Behaviour of a simulated machine.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MachineConfig {
+    /// Greeting when its port is opened.
+    pub greeting: Greeting,
+    /// Time by which every answer is late.
+    pub delay: Duration,
+    /// True for a Marlin that reads a stop during a move.
+    pub emergency_parser: bool,
+    /// True for moves that take their time; false for moves that end at once.
+    pub is_paced: bool,
+    /// Duration of homing.
+    pub homing: Duration,
+    /// Soft end stops of x, y and z, in metres of the machine.
+    pub soft_limits_m: Option<[(f64, f64); 3]>,
+    /// Faults.
+    pub faults: Vec<MachineFault>,
+}
+
+impl Default for MachineConfig {
+    fn default() -> Self {
+        Self {
+            greeting: Greeting::AtOnce,
+            delay: Duration::ZERO,
+            emergency_parser: true,
+            is_paced: false,
+            homing: Duration::ZERO,
+            soft_limits_m: None,
+            faults: Vec::new(),
+        }
+    }
+}
+
+/// Text that describes no behaviour of a machine.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` describes no machine; parts, separated by commas, are `no-greeting`, `greeting=12s`, `delay=500ms`, `no-emergency-parser`, `paced`, `homing=90s`, `soft-limit-x=200mm` and a fault with its line, as in `unknown@G1 Z:3`: unknown, lost, silence, resend, home-first, error, reset, reset-moving, endstop or extra-ok"
+)]
+pub struct MachineConfigError(String);
+
+impl FromStr for MachineConfig {
+    type Err = MachineConfigError;
+
+    fn from_str(text: &str) -> Result<Self, MachineConfigError> {
+        let mut config = Self::default();
+        for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+            config.take(part).ok_or_else(|| MachineConfigError(part.to_owned()))?;
+        }
+        Ok(config)
+    }
+}
+
+impl MachineConfig {
+    fn take(&mut self, part: &str) -> Option<()> {
+        if let Some((kind, line)) = part.split_once('@') {
+            let (line, nth) = line.rsplit_once(':').unwrap_or((line, "1"));
+            let (kind, nth) = (fault_kind(kind)?, nth.parse().ok().filter(|nth| *nth > 0)?);
+            self.faults.push(MachineFault { kind, line: line.to_owned(), nth });
+            return Some(());
+        }
+        match part.split_once('=').unwrap_or((part, "")) {
+            ("no-greeting", "") => self.greeting = Greeting::None,
+            ("greeting", time) => self.greeting = Greeting::After(duration(time)?),
+            ("delay", time) => self.delay = duration(time)?,
+            ("no-emergency-parser", "") => self.emergency_parser = false,
+            ("paced", "") => self.is_paced = true,
+            ("homing", time) => self.homing = duration(time)?,
+            ("soft-limit-x", length) => {
+                let most_m: f64 = length.strip_suffix("mm")?.parse::<f64>().ok()? * 1e-3;
+                let any = (f64::NEG_INFINITY, f64::INFINITY);
+                self.soft_limits_m = Some([(f64::NEG_INFINITY, most_m), any, any]);
+            }
+            _ => return None,
+        }
+        Some(())
+    }
+}
+
+fn duration(text: &str) -> Option<Duration> {
+    let (number, unit_s) = match text.strip_suffix("ms") {
+        Some(number) => (number, 1e-3),
+        None => (text.strip_suffix('s')?, 1.0),
+    };
+    Duration::try_from_secs_f64(number.parse::<f64>().ok()? * unit_s).ok()
+}
+
+fn fault_kind(name: &str) -> Option<FaultKind> {
+    Some(match name {
+        "unknown" => FaultKind::Unknown,
+        "lost" => FaultKind::Lost,
+        "silence" => FaultKind::Silence,
+        "resend" => FaultKind::Resend,
+        "home-first" => FaultKind::HomeFirst,
+        "error" => FaultKind::Error,
+        "reset" => FaultKind::Reset,
+        "reset-moving" => FaultKind::ResetMoving,
+        "endstop" => FaultKind::Endstop,
+        "extra-ok" => FaultKind::ExtraOk,
+        _ => return None,
+    })
+}
+
+/// A machine over a surface.
+#[derive(Clone, Debug)]
+pub struct SimulatedMachine {
+    state: Arc<Mutex<State>>,
 }
 
 impl SimulatedMachine {
     /// A machine whose finger presses with `force_n` at the greatest depth of `setup`.
     pub fn new(firmware: Firmware, setup: Stage, extent: Extent, force_n: f64) -> Self {
-        let state = State {
+        Self::with_config(firmware, setup, extent, force_n, MachineConfig::default())
+    }
+
+    /// A machine that behaves as `config` says.
+    pub fn with_config(
+        firmware: Firmware,
+        setup: Stage,
+        extent: Extent,
+        force_n: f64,
+        config: MachineConfig,
+    ) -> Self {
+        let seen = vec![0; config.faults.len()];
+        let mut state = State {
             firmware,
             setup,
             extent,
             force_n,
+            config,
+            now: Duration::ZERO,
             received: Vec::new(),
-            answers: greeting(firmware).to_vec(),
-            at_m: None,
-            stopped: false,
+            lines: VecDeque::new(),
+            answers: VecDeque::new(),
+            at_m: [0.0; 3],
+            shift_m: [0.0; 3],
+            motion: None,
+            wait: None,
+            deaf_until: Duration::ZERO,
+            resets_at: None,
+            is_homed: false,
+            mode: Mode::Ready,
+            stopped_at: None,
+            seen,
+            faults_met: 0,
+            doubtful_moves: 0,
         };
-        Self { shared: Arc::new(Mutex::new(state)) }
+        state.open();
+        Self { state: Arc::new(Mutex::new(state)) }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The contact of its finger: the force grows with the depth. `None` while it does not touch.
     pub fn contact(&self) -> Option<Contact> {
-        let state = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
-        let [x_m, y_m, z_m] = state.at_m?;
+        let state = self.state();
+        if !state.is_homed && state.shift_m == [0.0; 3] {
+            return None;
+        }
+        let [x_m, y_m, z_m] = state.place_m();
         let depth_m = state.setup.touch_z_m - z_m;
         let (from_x_m, from_y_m) = state.setup.origin_m;
         let position = Position { x_m: x_m - from_x_m, y_m: y_m - from_y_m };
@@ -56,56 +229,83 @@ impl SimulatedMachine {
             .then(|| Contact { position, force_n: state.force_n * depth_m / state.setup.deepest_m() })
     }
 
-    /// Starts anew, as a board does whose port is opened: it greets, and is not homed.
-    pub fn reset(&self) {
-        let mut state = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
-        state.received.clear();
-        state.answers = greeting(state.firmware).to_vec();
-        (state.at_m, state.stopped) = (None, false);
+    /// Opens its port anew: a board that greets is reset by that.
+    pub fn open(&self) {
+        self.state().open();
     }
 
-    /// True once it was stopped.
+    /// Takes bytes that were sent to it.
+    pub fn receive(&self, bytes: &[u8]) {
+        self.state().receive(bytes);
+    }
+
+    /// Goes on to a time since its start; times before the last one change nothing.
+    pub fn advance_to(&self, now: Duration) {
+        self.state().advance_to(now);
+    }
+
+    /// Answers that are due.
+    pub fn take_answers(&self) -> Vec<u8> {
+        self.state().take_answers()
+    }
+
+    /// True once it was stopped, until its port is opened anew.
     pub fn is_stopped(&self) -> bool {
-        self.shared.lock().unwrap_or_else(PoisonError::into_inner).stopped
+        self.stopped_at().is_some()
+    }
+
+    /// Time at which a stop took effect first, since its port was opened.
+    pub fn stopped_at(&self) -> Option<Duration> {
+        self.state().stopped_at
+    }
+
+    /// True while its finger moves.
+    pub fn is_moving(&self) -> bool {
+        self.state().motion.is_some()
+    }
+
+    /// Faults that came true.
+    pub fn faults_met(&self) -> usize {
+        self.state().faults_met
+    }
+
+    /// Moves after a fault, or of a machine that is not homed, that do more than to lift the finger.
+    pub fn doubtful_moves(&self) -> usize {
+        self.state().doubtful_moves
+    }
+
+    /// A link whose time passes only while somebody waits at it.
+    pub fn link(&self) -> SimulatedLink {
+        SimulatedLink { machine: self.clone(), is_waited_for: Duration::from_millis(10) }
     }
 }
 
-fn greeting(firmware: Firmware) -> &'static [u8] {
-    match firmware {
-        Firmware::Marlin => b"start\necho:Marlin 2.1.2\n",
-        Firmware::Grbl => b"\r\nGrbl 1.1h ['$' for help]\r\n",
-    }
+/// A link to a simulated machine in virtual time: a read without an answer takes 10 ms of it.
+#[derive(Clone, Debug)]
+pub struct SimulatedLink {
+    machine: SimulatedMachine,
+    is_waited_for: Duration,
 }
 
-impl Read for SimulatedMachine {
+impl Read for SimulatedLink {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let mut state = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
-        if state.answers.is_empty() {
+        let mut state = self.machine.state();
+        if !state.has_answers() {
+            let now = state.now + self.is_waited_for;
+            state.advance_to(now);
+        }
+        let answers = state.take_some(buffer.len());
+        if answers.is_empty() {
             return Err(io::ErrorKind::TimedOut.into());
         }
-        let count = buffer.len().min(state.answers.len());
-        buffer[..count].copy_from_slice(&state.answers[..count]);
-        state.answers.drain(..count);
-        Ok(count)
+        buffer[..answers.len()].copy_from_slice(&answers);
+        Ok(answers.len())
     }
 }
 
-impl Write for SimulatedMachine {
+impl Write for SimulatedLink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut state = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
-        for byte in bytes {
-            match byte {
-                0x18 => state.stopped = true,
-                b'!' => {}
-                b'\n' => {
-                    let line =
-                        String::from_utf8_lossy(&std::mem::take(&mut state.received)).trim().to_owned();
-                    let answer = state.answer(&line);
-                    state.answers.extend(answer.bytes().chain(*b"\r\n"));
-                }
-                byte => state.received.push(*byte),
-            }
-        }
+        self.machine.receive(bytes);
         Ok(bytes.len())
     }
 
@@ -114,40 +314,497 @@ impl Write for SimulatedMachine {
     }
 }
 
+impl StageLink for SimulatedLink {
+    fn now(&self) -> Duration {
+        self.machine.state().now
+    }
+
+    fn reset_by_dtr(&mut self) -> io::Result<bool> {
+        let mut state = self.machine.state();
+        state.reset();
+        state.note_stop();
+        Ok(true)
+    }
+
+    fn has_dtr(&self) -> bool {
+        true
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Ready,
+    /// Nothing moves until a reset; GRBL answers with an error.
+    Halted,
+    /// Feed hold of GRBL.
+    Held,
+    /// GRBL's lock after an alarm, or before homing.
+    Alarm,
+    Silent,
+}
+
+/// A move between two places, in the machine's own coordinates.
+#[derive(Clone, Copy, Debug)]
+struct Motion {
+    from_m: [f64; 3],
+    to_m: [f64; 3],
+    start: Duration,
+    end: Duration,
+}
+
+#[derive(Debug)]
+struct State {
+    firmware: Firmware,
+    setup: Stage,
+    extent: Extent,
+    force_n: f64,
+    config: MachineConfig,
+    now: Duration,
+    received: Vec<u8>,
+    /// Lines that were received and not executed.
+    lines: VecDeque<String>,
+    /// Answers with the time at which they are due.
+    answers: VecDeque<(Duration, u8)>,
+    /// Target of the last move in the coordinates of the machine; where it is at rest.
+    at_m: [f64; 3],
+    /// Difference between the finger's place and the machine's coordinates.
+    shift_m: [f64; 3],
+    motion: Option<Motion>,
+    /// End of the command that waits, and its answer.
+    wait: Option<(Duration, String)>,
+    deaf_until: Duration,
+    resets_at: Option<Duration>,
+    is_homed: bool,
+    mode: Mode,
+    stopped_at: Option<Duration>,
+    /// Lines so far that each fault counts.
+    seen: Vec<u32>,
+    faults_met: usize,
+    doubtful_moves: usize,
+}
+
+/// Time between two `busy` of Marlin.
+const BUSY_EVERY: Duration = Duration::from_secs(2);
+
 impl State {
-    fn answer(&mut self, line: &str) -> String {
-        match line {
-            _ if self.stopped => "error:9".to_owned(),
-            "M112" => {
-                self.stopped = true;
-                "Error:Printer halted. kill() called!".to_owned()
-            }
-            "M115" if self.firmware == Firmware::Marlin => "FIRMWARE_NAME:Marlin 2.1.2\nok".to_owned(),
-            "$I" if self.firmware == Firmware::Grbl => "[VER:1.1h.20190825:]\nok".to_owned(),
-            "G28" | "$H" => {
-                self.at_m = Some([0.0, 0.0, self.setup.touch_z_m + 10.0 * self.setup.clearance_m]);
-                "ok".to_owned()
-            }
-            _ if line.starts_with("G1 ") => self.go(line),
-            "G21" | "G90" | "M400" => "ok".to_owned(),
-            _ if line.starts_with("G4 ") => "ok".to_owned(),
-            _ => "error:20".to_owned(),
+    fn open(&mut self) {
+        match self.config.greeting {
+            Greeting::None => {}
+            Greeting::AtOnce => self.restart(Duration::ZERO),
+            Greeting::After(time) => self.restart(time),
+        }
+        self.stopped_at = None;
+    }
+
+    /// Starts anew where the finger is, as a board does; its port may be open.
+    fn reset(&mut self) {
+        self.restart(Duration::ZERO);
+    }
+
+    fn restart(&mut self, boot: Duration) {
+        let place_m = self.place_m();
+        // A board takes the place in which it starts for its origin; one that was never homed has its finger up.
+        if self.is_homed || self.shift_m != [0.0; 3] {
+            self.shift_m = place_m;
+        }
+        (self.at_m, self.motion, self.wait, self.is_homed) = ([0.0; 3], None, None, false);
+        self.lines.clear();
+        self.received.clear();
+        self.answers.clear();
+        self.resets_at = None;
+        self.deaf_until = self.now + boot;
+        self.mode = Mode::Ready;
+        let greeting = match self.firmware {
+            Firmware::Marlin => "start\necho:Marlin 2.1.2\n",
+            Firmware::Grbl => "\r\nGrbl 1.1h ['$' for help]\r\n",
+        };
+        self.answer_at(self.deaf_until, greeting);
+        if self.firmware == Firmware::Grbl {
+            self.mode = Mode::Alarm;
         }
     }
 
-    fn go(&mut self, line: &str) -> String {
-        let Some(at_m) = &mut self.at_m else { return "error:9".to_owned() };
-        for word in line.split_ascii_whitespace().skip(1) {
-            let (axis, number) = word.split_at(1);
-            let Ok(value_mm) = number.parse::<f64>() else { return "error:2".to_owned() };
-            match axis {
-                "X" => at_m[0] = value_mm * 1e-3,
-                "Y" => at_m[1] = value_mm * 1e-3,
-                "Z" => at_m[2] = value_mm * 1e-3,
-                "F" => {}
-                _ => return "error:20".to_owned(),
+    /// The machine's own coordinates now.
+    fn machine_m(&self) -> [f64; 3] {
+        let Some(Motion { from_m, to_m, start, end }) = self.motion else { return self.at_m };
+        let share = if end > start {
+            ((self.now.saturating_sub(start)).as_secs_f64() / (end - start).as_secs_f64()).min(1.0)
+        } else {
+            1.0
+        };
+        std::array::from_fn(|axis| from_m[axis] + share * (to_m[axis] - from_m[axis]))
+    }
+
+    /// The finger's place.
+    fn place_m(&self) -> [f64; 3] {
+        let at_m = self.machine_m();
+        std::array::from_fn(|axis| at_m[axis] + self.shift_m[axis])
+    }
+
+    fn answer(&mut self, text: &str) {
+        self.answer_at(self.now + self.config.delay, text);
+    }
+
+    fn answer_at(&mut self, at: Duration, text: &str) {
+        if self.mode != Mode::Silent {
+            self.answers.extend(text.bytes().map(|byte| (at, byte)));
+        }
+    }
+
+    fn has_answers(&self) -> bool {
+        self.answers.front().is_some_and(|(at, _)| *at <= self.now)
+    }
+
+    fn take_answers(&mut self) -> Vec<u8> {
+        self.take_some(usize::MAX)
+    }
+
+    fn take_some(&mut self, most: usize) -> Vec<u8> {
+        let count = self.answers.iter().take(most).take_while(|(at, _)| *at <= self.now).count();
+        self.answers.drain(..count).map(|(_, byte)| byte).collect()
+    }
+
+    fn receive(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            if self.now < self.deaf_until {
+                continue;
+            }
+            match (self.firmware, byte) {
+                (Firmware::Grbl, b'?') => self.answer_status(),
+                (Firmware::Grbl, b'!') => self.hold(),
+                (Firmware::Grbl, 0x18) => self.soft_reset(),
+                (_, b'\n') => {
+                    let line = String::from_utf8_lossy(&self.received).trim().to_owned();
+                    self.received.clear();
+                    let is_emergency = line == "M112" || line == "M410";
+                    if self.firmware == Firmware::Marlin && self.config.emergency_parser && is_emergency {
+                        self.interrupt(&line);
+                    } else {
+                        self.lines.push_back(line);
+                    }
+                }
+                (_, byte) => self.received.push(*byte),
             }
         }
-        "ok".to_owned()
+        let now = self.now;
+        self.advance_to(now);
+    }
+
+    fn advance_to(&mut self, to: Duration) {
+        let to = to.max(self.now);
+        loop {
+            if let Some(at) = self.resets_at
+                && at <= to
+                && self.wait.as_ref().is_none_or(|(end, _)| at <= *end)
+            {
+                self.now = self.now.max(at);
+                self.reset();
+                continue;
+            }
+            if let Some((end, answer)) = &self.wait {
+                if *end > to {
+                    break;
+                }
+                self.now = self.now.max(*end);
+                let answer = answer.clone();
+                self.wait = None;
+                self.rest_if_done();
+                self.answer(&answer);
+                continue;
+            }
+            self.rest_if_done();
+            let Some(line) = self.lines.pop_front() else { break };
+            self.execute(&line);
+        }
+        self.now = to;
+        self.rest_if_done();
+    }
+
+    fn rest_if_done(&mut self) {
+        if self.motion.is_some_and(|motion| motion.end <= self.now) {
+            self.motion = None;
+        }
+    }
+
+    /// Ends the move where it is.
+    fn freeze(&mut self) {
+        self.at_m = self.machine_m();
+        (self.motion, self.wait) = (None, None);
+        self.lines.clear();
+    }
+
+    /// `M112` or `M410`, read during whatever else.
+    fn interrupt(&mut self, line: &str) {
+        if self.mode == Mode::Silent {
+            // It may still hear.
+            self.freeze();
+            if line == "M112" {
+                self.note_stop();
+            }
+            return;
+        }
+        self.freeze();
+        let now = self.now;
+        self.answers.retain(|(at, _)| *at <= now);
+        if line == "M112" {
+            self.mode = Mode::Halted;
+            self.note_stop();
+            self.answer("Error:Printer halted. kill() called!\n");
+        } else if self.mode == Mode::Ready {
+            self.answer("ok\n");
+        }
+    }
+
+    fn note_stop(&mut self) {
+        self.stopped_at.get_or_insert(self.now);
+    }
+
+    fn hold(&mut self) {
+        if matches!(self.mode, Mode::Ready | Mode::Silent) {
+            self.at_m = self.machine_m();
+            (self.motion, self.wait) = (None, None);
+            if self.mode == Mode::Ready {
+                self.mode = Mode::Held;
+            }
+        }
+    }
+
+    /// A soft reset of GRBL: after a hold the position is kept.
+    fn soft_reset(&mut self) {
+        self.note_stop();
+        if self.mode == Mode::Silent {
+            return;
+        }
+        let is_kept = self.mode == Mode::Held && self.is_homed;
+        self.freeze();
+        self.answers.clear();
+        self.mode = if is_kept { Mode::Ready } else { Mode::Alarm };
+        self.answer("\r\nGrbl 1.1h ['$' for help]\r\n");
+    }
+
+    fn answer_status(&mut self) {
+        let state = match self.mode {
+            Mode::Silent => return,
+            Mode::Alarm | Mode::Halted => "Alarm",
+            Mode::Held => "Hold:0",
+            Mode::Ready if self.motion.is_some() => "Run",
+            Mode::Ready => "Idle",
+        };
+        let [x_mm, y_mm, z_mm] = self.machine_m().map(|at_m| at_m * 1e3);
+        self.answer(&format!(
+            "<{state}|MPos:{x_mm:.3},{y_mm:.3},{z_mm:.3}|FS:0,0|WCO:0.000,0.000,0.000>\r\n"
+        ));
+    }
+
+    fn execute(&mut self, line: &str) {
+        match self.mode {
+            Mode::Halted if self.firmware == Firmware::Marlin => return,
+            // One whose answers are lost goes on.
+            Mode::Silent | Mode::Halted | Mode::Ready | Mode::Held | Mode::Alarm => {}
+        }
+        match self.due_fault(line) {
+            Some(kind) => {
+                self.fail(kind, line);
+                self.faults_met += 1;
+            }
+            None => self.obey(line),
+        }
+    }
+
+    fn due_fault(&mut self, line: &str) -> Option<FaultKind> {
+        let mut due = None;
+        for (fault, seen) in self.config.faults.iter().zip(&mut self.seen) {
+            if line.starts_with(&fault.line) {
+                *seen += 1;
+                if *seen == fault.nth {
+                    due = Some(fault.kind);
+                }
+            }
+        }
+        due
+    }
+
+    fn fail(&mut self, kind: FaultKind, line: &str) {
+        let is_marlin = self.firmware == Firmware::Marlin;
+        match kind {
+            FaultKind::Unknown if is_marlin => {
+                self.answer(&format!("echo:Unknown command: \"{line}\"\nok\n"));
+            }
+            FaultKind::Unknown => self.answer("error:20\r\n"),
+            FaultKind::Lost => {}
+            FaultKind::Silence => {
+                self.obey(line);
+                self.answers.clear();
+                self.mode = Mode::Silent;
+                if let Some((_, answer)) = &mut self.wait {
+                    answer.clear();
+                }
+            }
+            FaultKind::Resend if is_marlin => {
+                self.answer("Error:Line Number is not Last Line Number+1, Last Line: 0\nResend: 1\nok\n");
+            }
+            FaultKind::Resend => self.answer("error:2\r\n"),
+            FaultKind::HomeFirst if is_marlin => self.answer("echo:Home XYZ First\nok\n"),
+            FaultKind::HomeFirst => {
+                (self.mode, self.is_homed) = (Mode::Alarm, false);
+                self.answer("error:9\r\n");
+            }
+            FaultKind::Error if is_marlin => {
+                self.freeze();
+                self.answer("Error:Printer halted. kill() called!\n");
+                self.mode = Mode::Halted;
+            }
+            FaultKind::Error => {
+                self.freeze();
+                self.answer("ALARM:1\r\n[MSG:Reset to continue]\r\n");
+                self.mode = Mode::Alarm;
+            }
+            FaultKind::Reset => self.reset(),
+            FaultKind::ResetMoving => {
+                self.obey(line);
+                let end = self.motion.map_or(self.now, |motion| motion.end);
+                self.resets_at = Some(self.now + (end - self.now) / 2);
+            }
+            FaultKind::Endstop => self.hit_endstop(line),
+            FaultKind::ExtraOk => {
+                self.obey(line);
+                match &mut self.wait {
+                    Some((_, answer)) => answer.push_str("ok\n"),
+                    None => self.answer("ok\n"),
+                }
+            }
+        }
+    }
+
+    /// The finger stops half-way; Marlin takes it to be at its target.
+    fn hit_endstop(&mut self, line: &str) {
+        let from_m = self.at_m;
+        self.obey(line);
+        let missing_m: [f64; 3] = std::array::from_fn(|axis| (self.at_m[axis] - from_m[axis]) / 2.0);
+        for (shift_m, missing_m) in self.shift_m.iter_mut().zip(missing_m) {
+            *shift_m -= missing_m;
+        }
+        match self.firmware {
+            Firmware::Marlin => {
+                let x_mm = (self.at_m[0] - missing_m[0]) * 1e3;
+                self.answer(&format!("echo:endstops hit:  X:{x_mm:.2}\n"));
+            }
+            Firmware::Grbl => {
+                self.freeze();
+                self.answer("ALARM:1\r\n[MSG:Reset to continue]\r\n");
+                self.mode = Mode::Alarm;
+            }
+        }
+    }
+
+    fn obey(&mut self, line: &str) {
+        match self.firmware {
+            Firmware::Marlin => self.obey_as_marlin(line),
+            Firmware::Grbl => self.obey_as_grbl(line),
+        }
+    }
+
+    fn obey_as_marlin(&mut self, line: &str) {
+        match line {
+            "" => {}
+            "M112" => {
+                self.freeze();
+                self.mode = Mode::Halted;
+                self.note_stop();
+                self.answers.extend(b"Error:Printer halted. kill() called!\n".map(|byte| (self.now, byte)));
+            }
+            "M115" => {
+                let parser = u8::from(self.config.emergency_parser);
+                self.answer(&format!(
+                    "FIRMWARE_NAME:Marlin 2.1.2 (simulated) SOURCE_CODE_URL:none PROTOCOL_VERSION:1.0\nCap:EEPROM:1\nCap:EMERGENCY_PARSER:{parser}\nok\n"
+                ));
+            }
+            "M114" => {
+                let [x_mm, y_mm, z_mm] = self.machine_m().map(|at_m| at_m * 1e3);
+                self.answer(&format!("X:{x_mm:.2} Y:{y_mm:.2} Z:{z_mm:.2} E:0.00 Count X:0 Y:0 Z:0\nok\n"));
+            }
+            "G21" | "G90" | "M410" => self.answer("ok\n"),
+            "G28" => self.home(),
+            "M400" => self.wait_for_moves(),
+            _ if line.starts_with("M118 ") => self.answer(&format!("{}\nok\n", &line[5..])),
+            _ if line.starts_with("G1 ") => self.go(line),
+            _ => self.answer(&format!("echo:Unknown command: \"{line}\"\nok\n")),
+        }
+    }
+
+    fn obey_as_grbl(&mut self, line: &str) {
+        let is_locked = matches!(self.mode, Mode::Alarm | Mode::Halted | Mode::Held);
+        match line {
+            "" => self.answer("ok\r\n"),
+            "$I" => self.answer("[VER:1.1h.20190825:]\r\n[OPT:V,15,128]\r\nok\r\n"),
+            "$H" if self.mode != Mode::Held => self.home(),
+            _ if is_locked => self.answer("error:9\r\n"),
+            "G21" | "G90" | "G94" | "G54" => self.answer("ok\r\n"),
+            _ if line.starts_with("G1 ") => self.go(line),
+            _ if line.starts_with("G4 ") => self.wait_for_moves(),
+            _ => self.answer("error:20\r\n"),
+        }
+    }
+
+    fn home(&mut self) {
+        self.at_m = [0.0, 0.0, self.setup.touch_z_m + 10.0 * self.setup.clearance_m];
+        (self.shift_m, self.is_homed, self.motion) = ([0.0; 3], true, None);
+        self.mode = Mode::Ready;
+        self.wait_until(self.now + self.config.homing);
+    }
+
+    fn wait_for_moves(&mut self) {
+        self.wait_until(self.motion.map_or(self.now, |motion| motion.end));
+    }
+
+    fn wait_until(&mut self, end: Duration) {
+        let end = end.max(self.now);
+        if self.firmware == Firmware::Marlin {
+            let mut busy = self.now + BUSY_EVERY;
+            while busy < end {
+                self.answer_at(busy, "echo:busy: processing\n");
+                busy += BUSY_EVERY;
+            }
+        }
+        self.wait = Some((end, "ok\r\n".to_owned()));
+    }
+
+    fn go(&mut self, line: &str) {
+        let (mut to_m, mut speed_m_per_s) = (self.at_m, f64::INFINITY);
+        for word in line.split_ascii_whitespace().skip(1) {
+            let (Some(axis), Ok(value)) = (word.chars().next(), word.get(1..).unwrap_or("").parse::<f64>())
+            else {
+                return self.answer("Error:number\n");
+            };
+            match axis {
+                'X' => to_m[0] = value * 1e-3,
+                'Y' => to_m[1] = value * 1e-3,
+                'Z' => to_m[2] = value * 1e-3,
+                'F' if value > 0.0 => speed_m_per_s = value / 60e3,
+                _ => return self.answer("Error:word\n"),
+            }
+        }
+        if let Some(limits_m) = self.config.soft_limits_m {
+            let within_m: [f64; 3] =
+                std::array::from_fn(|axis| to_m[axis].clamp(limits_m[axis].0, limits_m[axis].1));
+            if self.firmware == Firmware::Grbl && within_m != to_m {
+                self.mode = Mode::Alarm;
+                return self.answer("ALARM:2\r\n[MSG:Reset to continue]\r\n");
+            }
+            to_m = within_m;
+        }
+        let lifts = to_m[..2] == self.at_m[..2] && to_m[2] >= self.at_m[2];
+        if (self.faults_met > 0 || !self.is_homed) && !lifts {
+            self.doubtful_moves += 1;
+        }
+        let from_m = self.machine_m();
+        let start = self.motion.map_or(self.now, |motion| motion.end).max(self.now);
+        let way_m = from_m.iter().zip(to_m).map(|(from, to)| (to - from).powi(2)).sum::<f64>().sqrt();
+        let time = Duration::try_from_secs_f64(way_m / speed_m_per_s).unwrap_or_default();
+        if self.config.is_paced {
+            self.motion = Some(Motion { from_m, to_m, start, end: start + time });
+        }
+        self.at_m = to_m;
+        self.answer("ok\r\n");
     }
 }

@@ -1,20 +1,24 @@
 //! The thread of a machine: orders to it, and the stop that it heeds whatever it does.
 
-use super::gcode::{Firmware, GcodeStage, StageError, StageLink};
+use super::error::StageError;
+use super::firmware::Firmware;
+use super::gcode::{GcodeStage, Stopping};
+use super::link::StageLink;
 use super::url::StageUrl;
 use palpate_mechanics::contact::Position;
 use palpate_rig::Stage;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 /// Work for a machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
     /// To look for its end stops.
     Home,
+    /// To travel to a position at the height of travel.
+    Travel(Position),
     /// To travel to a position, and to press there.
     Press {
         /// The position.
@@ -35,13 +39,11 @@ pub enum Done {
     Down,
 }
 
-/// Longest time in which a stop is not seen while there is nothing to do.
-const LOOK: Duration = Duration::from_millis(10);
-
 /// A machine in a thread of its own, which is stopped when this is dropped while it moves.
 #[derive(Debug)]
 pub struct StageThread {
     firmware: Firmware,
+    stopping: Stopping,
     orders: Option<Sender<Order>>,
     done: Receiver<Result<Done, StageError>>,
     stop: Arc<AtomicBool>,
@@ -55,18 +57,22 @@ impl StageThread {
     /// [`StageError`] where it is not there, or does not answer.
     pub fn open(url: &StageUrl, stage: Stage, stop: Arc<AtomicBool>) -> Result<Self, StageError> {
         let machine = GcodeStage::connect(url.open()?, stage, Arc::clone(&stop))?;
-        let firmware = machine.firmware();
+        let (firmware, stopping) = (machine.firmware(), machine.stopping());
         let (orders, received) = channel();
         let (tell, done) = channel();
-        let heeds = Arc::clone(&stop);
-        let run = move || run(machine, &received, &tell, &heeds);
+        let run = move || run(machine, &received, &tell);
         let thread = std::thread::Builder::new().name("stage".to_owned()).spawn(run)?;
-        Ok(Self { firmware, orders: Some(orders), done, stop, thread: Some(thread) })
+        Ok(Self { firmware, stopping, orders: Some(orders), done, stop, thread: Some(thread) })
     }
 
     /// The machine's firmware.
     pub fn firmware(&self) -> Firmware {
         self.firmware
+    }
+
+    /// The way in which a stop acts on the machine.
+    pub fn stopping(&self) -> Stopping {
+        self.stopping
     }
 
     /// Asks for work; returns at once.
@@ -98,6 +104,11 @@ impl StageThread {
         self.done.try_iter().try_for_each(|done| done.map(drop))
     }
 
+    /// Ends the thread after the work that was asked for, with the machine as that leaves it.
+    pub fn close(&mut self) {
+        self.join();
+    }
+
     fn join(&mut self) {
         drop(self.orders.take());
         if let Some(thread) = self.thread.take() {
@@ -118,22 +129,23 @@ fn run(
     mut machine: GcodeStage<Box<dyn StageLink>>,
     orders: &Receiver<Order>,
     tell: &Sender<Result<Done, StageError>>,
-    stop: &AtomicBool,
 ) {
     loop {
-        let done = match orders.recv_timeout(LOOK) {
+        let done = match orders.try_recv() {
             Ok(Order::Home) => machine.home().map(|()| Done::Up),
+            Ok(Order::Travel(position)) => machine.travel(position).map(|()| Done::Up),
             Ok(Order::Lift) => machine.lift().map(|()| Done::Up),
             Ok(Order::Press { position, depth_m }) => {
                 machine.travel(position).and_then(|()| machine.press(depth_m)).map(|()| Done::Down)
             }
-            Err(RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => {
-                machine.check_stop().map(|()| Done::Up)
-            }
-            Err(RecvTimeoutError::Timeout) => continue,
-            Err(RecvTimeoutError::Disconnected) => {
+            // Waits for a line as long as a read takes, and heeds a stop.
+            Err(TryRecvError::Empty) => match machine.watch() {
+                Ok(()) => continue,
+                Err(error) => Err(error),
+            },
+            Err(TryRecvError::Disconnected) => {
                 // The stop may be what ends it.
-                let _ = machine.check_stop();
+                let _ = machine.heed_stop();
                 return;
             }
         };

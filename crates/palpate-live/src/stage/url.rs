@@ -1,19 +1,9 @@
 //! URLs of machines: `gcode:serial:///dev/ttyUSB0?baud=115200` and `gcode:tcp://host:port`.
 
-use super::gcode::StageLink;
 use crate::source::{Address, SourceUrl};
 use std::fmt;
-use std::io;
-use std::net::{TcpStream, ToSocketAddrs};
 use std::path::PathBuf;
 use std::str::FromStr;
-use std::time::Duration;
-
-/// Longest time that a machine's link waits for a byte, and so until a stop is sent.
-const LOOK: Duration = Duration::from_millis(10);
-/// Longest time for a command to be written, and for a host to take a connection.
-const WRITE: Duration = Duration::from_millis(200);
-const CONNECT: Duration = Duration::from_secs(2);
 
 /// Place of a machine of Marlin or GRBL firmware.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,33 +53,6 @@ impl fmt::Display for StageUrl {
         match self {
             Self::Serial { port, baud } => write!(f, "gcode:serial://{}?baud={baud}", port.display()),
             Self::Tcp(server) => write!(f, "gcode:tcp://{server}"),
-        }
-    }
-}
-
-impl StageUrl {
-    /// Opens the link.
-    pub(super) fn open(&self) -> io::Result<Box<dyn StageLink>> {
-        match self {
-            Self::Serial { port, baud } => {
-                let port = serialport::new(port.to_string_lossy(), *baud).timeout(LOOK).open()?;
-                Ok(Box::new(port))
-            }
-            Self::Tcp(server) => {
-                let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
-                for address in (server.host.as_str(), server.port).to_socket_addrs()? {
-                    match TcpStream::connect_timeout(&address, CONNECT) {
-                        Ok(stream) => {
-                            stream.set_nodelay(true)?;
-                            stream.set_read_timeout(Some(LOOK))?;
-                            stream.set_write_timeout(Some(WRITE))?;
-                            return Ok(Box::new(stream));
-                        }
-                        Err(error) => last = error,
-                    }
-                }
-                Err(last)
-            }
         }
     }
 }

@@ -3,10 +3,10 @@
 use crate::client::{get, post};
 use palpate_live::server::{Access, CalibrationPlan, Live, Server};
 use palpate_live::simulated_board::{BoardConfig, Finger, Link, LoadCell, SimulatedBoard};
-use palpate_live::stage::{Firmware, SimulatedMachine};
+use palpate_live::stage::{Firmware, MachineConfig, SimulatedMachine};
 use palpate_rig::Rig;
 use serde_json::{Value, json};
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -34,31 +34,34 @@ struct Bench {
 
 impl Bench {
     fn start() -> Self {
+        Self::with(MachineConfig::default())
+    }
+
+    fn with(config: MachineConfig) -> Self {
         let open = || Link::open(&"tcp://:0".parse().unwrap()).unwrap();
         let (mut to, mut way) = (open(), open());
         let at = |link: &Link| link.name().rsplit(' ').next().unwrap().to_owned();
         let (from, stage) = (at(&to), format!("gcode:{}", at(&way)));
         let rig = rig();
         let setup = rig.stage.clone().unwrap();
-        let machine = SimulatedMachine::new(Firmware::Marlin, setup, rig.setup.surface().extent(), 1.0);
+        let extent = rig.setup.surface().extent();
+        let machine = SimulatedMachine::with_config(Firmware::Marlin, setup, extent, 1.0, config);
         let ends = Arc::new(AtomicBool::new(false));
         let (moved, over) = (machine.clone(), Arc::clone(&ends));
         let thread = std::thread::spawn(move || {
             let load_cell = Some(LoadCell { name: "F".to_owned(), noise_n: 2e-3 });
             let config = BoardConfig { rate_hz: 200.0, seed: 1, load_cell, ..BoardConfig::default() };
             let mut board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, 1)).unwrap();
-            let (start, mut machine, mut was_there) = (Instant::now(), moved, false);
+            let (start, machine, mut was_there) = (Instant::now(), moved, false);
             while !over.load(Ordering::Relaxed) {
+                machine.advance_to(start.elapsed());
                 match way.bytes().unwrap() {
                     Some(bytes) => {
                         if !std::mem::replace(&mut was_there, true) {
-                            machine.reset();
+                            machine.open();
                         }
-                        machine.write_all(&bytes).unwrap();
-                        let mut answers = [0; 512];
-                        while let Ok(count) = machine.read(&mut answers) {
-                            way.send(&answers[..count]).unwrap();
-                        }
+                        machine.receive(&bytes);
+                        way.send(&machine.take_answers()).unwrap();
                     }
                     None => was_there = false,
                 }
@@ -214,13 +217,15 @@ fn stuck_machine() -> (String, Receiver<(Instant, String)>) {
     let (tell, told) = channel();
     std::thread::spawn(move || {
         let (mut stream, _) = listener.accept().unwrap();
-        stream.write_all(b"start\n").unwrap();
-        let mut presses = false;
+        let (setup, extent) = (rig().stage.unwrap(), rig().setup.surface().extent());
+        // The third wait is that of the first press.
+        let config = "lost@M400:3".parse().unwrap();
+        let machine = SimulatedMachine::with_config(Firmware::Marlin, setup, extent, 1.0, config);
+        stream.write_all(&machine.take_answers()).unwrap();
         for line in BufReader::new(stream.try_clone().unwrap()).lines().map_while(Result::ok) {
-            presses |= line.starts_with("G1 Z21");
-            let is_answered = !(presses && line == "M400");
+            machine.receive(format!("{line}\n").as_bytes());
             if tell.send((Instant::now(), line)).is_err()
-                || (is_answered && stream.write_all(b"ok\n").is_err())
+                || stream.write_all(&machine.take_answers()).is_err()
             {
                 return;
             }
@@ -248,6 +253,34 @@ fn a_stop_reaches_a_machine_that_is_in_the_middle_of_a_press() {
     assert!(took < Duration::from_millis(250), "{took:?}");
     waited(&server, |state| state["phase"] == "ready");
     live.end();
+}
+
+/// Faults in the middle of a run, from the browser: the page quotes the line, and no row is of a press that did not happen.
+#[test]
+fn fault_of_a_machine_ends_the_run_with_its_words() {
+    // The first `G1 Z` is the lift after homing, the second the first press, the fourth the second press.
+    for (config, words, presses) in [
+        ("unknown@G1 X:2", "the machine answered `echo:Unknown command: \"G1 X", 1),
+        ("no-greeting,unknown@G1 Z:2", "to `G1 Z21.000 F120.000`; it was stopped with its finger up", 0),
+        (
+            "lost@G1 Z:3",
+            "did not answer `G1 Z27.000 F3000.000` within 5 s; it was stopped, and its finger is lifted",
+            1,
+        ),
+        ("reset@G1 Z:4", "the machine was reset: it sent `start`", 1),
+        ("soft-limit-x=60mm", "the machine reports X 60.00 mm", 0),
+    ] {
+        let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::with(config.parse().unwrap()));
+        let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
+        assert_eq!(step(&server, "begin").0, 200);
+        let ended = waited(&server, |state| state["problem"].is_string());
+        let problem = ended["problem"].as_str().unwrap();
+        assert!(problem.contains("it was stopped") && problem.contains("reset it"), "{config}: {problem}");
+        assert!(problem.contains(words), "{config}: {problem}");
+        assert_eq!(ended["taken"], presses, "{config}: {ended}");
+        assert!(bench.machine.is_stopped() && bench.machine.doubtful_moves() == 0, "{config}: {problem}");
+        live.end();
+    }
 }
 
 #[test]

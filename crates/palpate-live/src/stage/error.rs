@@ -1,0 +1,149 @@
+//! Errors of machines, and the words for them.
+
+use palpate_numerics::OutOfRange;
+use std::fmt;
+use std::io;
+
+/// Failure of a machine.
+#[derive(Debug, thiserror::Error)]
+pub enum StageError {
+    /// The line is broken: nothing can be sent any more.
+    #[error("the line to the machine is broken: {0}")]
+    Line(#[from] io::Error),
+    /// The firmware is unknown.
+    #[error(
+        "the machine says neither that it is Marlin nor that it is GRBL; it said: {}. Is the baud rate right?",
+        quoted(said)
+    )]
+    Unknown {
+        /// Its words.
+        said: String,
+    },
+    /// An answer or a position is not the expected one, so that the machine was stopped.
+    #[error("{doubt}; {finger}")]
+    Doubt {
+        /// The reason.
+        doubt: Doubt,
+        /// The finger after the stop.
+        finger: Finger,
+    },
+    /// A move was asked for before homing.
+    #[error("the machine is not homed")]
+    NotHomed,
+    /// Somebody, or a limit, stopped it.
+    #[error("the machine was stopped; it needs a reset before it moves again")]
+    Stopped,
+    /// A link has no reset line, which the setup asks to use.
+    #[error("`dtr_reset` needs a serial port: this link has no reset line")]
+    NoResetLine,
+    /// A number of its setup is not in its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+}
+
+/// Reason to trust neither the machine's answers nor its position.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Doubt {
+    /// A line that is no answer to the command.
+    #[error("the machine answered {} to `{command}`", quoted(answer))]
+    Answer {
+        /// The command.
+        command: String,
+        /// The line.
+        answer: String,
+    },
+    /// An `ok` without the report that the command asks for.
+    #[error("the machine answered `{command}` without {expected}")]
+    NoReport {
+        /// The command.
+        command: String,
+        /// The report.
+        expected: &'static str,
+    },
+    /// A line while nothing was asked.
+    #[error("the machine sent {} while no command was under way", quoted(line))]
+    Unasked {
+        /// The line.
+        line: String,
+    },
+    /// No answer in time.
+    #[error("the machine did not answer `{command}` within {seconds} s")]
+    Silent {
+        /// The command.
+        command: String,
+        /// Seconds of waiting.
+        seconds: u64,
+    },
+    /// The machine started anew.
+    #[error("the machine was reset: it sent {}", quoted(greeting))]
+    Restart {
+        /// The line.
+        greeting: String,
+    },
+    /// The machine is not where it was sent.
+    #[error("the machine reports {axis} {reported_mm:.2} mm and was sent to {axis} {target_mm:.2} mm")]
+    OffPosition {
+        /// `X`, `Y` or `Z`.
+        axis: char,
+        /// The target, in mm.
+        target_mm: f64,
+        /// The reported position, in mm.
+        reported_mm: f64,
+    },
+}
+
+/// The finger after a machine was stopped for a doubt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Finger {
+    /// Nothing was moved yet.
+    Unmoved,
+    /// It was lifted to the height of travel, and the machine halted.
+    Lifted,
+    /// It was at the height of travel or above, where the machine was halted.
+    Up,
+    /// It could not be lifted: the machine was halted, and the finger may still press.
+    Unknown,
+}
+
+impl fmt::Display for Finger {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Unmoved => "nothing was moved",
+            Self::Lifted => "it was stopped, and its finger is lifted",
+            Self::Up => "it was stopped with its finger up",
+            Self::Unknown => {
+                "it was stopped, and its finger could not be lifted: it may still press, so lift it by hand"
+            }
+        })
+    }
+}
+
+/// Most characters of a quoted line.
+const QUOTED: usize = 80;
+
+/// A machine's line between backticks: control characters and quotes escaped, at most 80 characters.
+pub(super) fn quoted(line: &str) -> String {
+    let escaped: String = line
+        .chars()
+        .flat_map(|c| if c == '"' || c == '\'' { vec![c] } else { c.escape_default().collect() })
+        .collect();
+    let mut kept: String = escaped.chars().take(QUOTED).collect();
+    if kept.len() < escaped.len() {
+        kept.truncate(QUOTED - 3);
+        kept.push_str("...");
+    }
+    format!("`{kept}`")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quotes_at_most_80_printable_characters() {
+        assert_eq!(quoted("echo:Unknown command: \"G1\""), "`echo:Unknown command: \"G1\"`");
+        assert_eq!(quoted("\u{1b}[31m\u{fffd}"), "`\\u{1b}[31m\\u{fffd}`");
+        let long = quoted(&"é\n".repeat(500));
+        assert!(long.len() <= QUOTED + 2 && long.is_ascii(), "{long}");
+    }
+}

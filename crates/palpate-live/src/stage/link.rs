@@ -1,0 +1,145 @@
+//! The line to a machine: bytes both ways, a clock, and the reset line of a serial port.
+
+use super::url::StageUrl;
+use std::io::{self, Read, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::{Duration, Instant};
+
+/// Link to a machine, whose reads end after some 10 ms at most.
+pub trait StageLink: Read + Write + Send {
+    /// Time since some instant.
+    fn now(&self) -> Duration;
+
+    /// Resets the board by its DTR line; false for links without one.
+    ///
+    /// # Errors
+    /// Those of the port.
+    fn reset_by_dtr(&mut self) -> io::Result<bool>;
+
+    /// True for links with a DTR line.
+    fn has_dtr(&self) -> bool;
+}
+
+impl<L: StageLink + ?Sized> StageLink for Box<L> {
+    fn now(&self) -> Duration {
+        (**self).now()
+    }
+
+    fn reset_by_dtr(&mut self) -> io::Result<bool> {
+        (**self).reset_by_dtr()
+    }
+
+    fn has_dtr(&self) -> bool {
+        (**self).has_dtr()
+    }
+}
+
+/// Longest time that a link waits for a byte, and so until a stop is sent.
+const READ: Duration = Duration::from_millis(10);
+/// Longest time for a command to be written, and for a host to take a connection.
+const WRITE: Duration = Duration::from_millis(200);
+const CONNECT: Duration = Duration::from_secs(2);
+/// Time for which DTR is dropped: the capacitor of an Arduino's reset line needs some 10 ms.
+const DTR: Duration = Duration::from_millis(20);
+
+impl StageUrl {
+    /// Opens the link.
+    pub(super) fn open(&self) -> io::Result<Box<dyn StageLink>> {
+        let start = Instant::now();
+        match self {
+            Self::Serial { port, baud } => {
+                let port = serialport::new(port.to_string_lossy(), *baud).timeout(READ).open()?;
+                Ok(Box::new(SerialLink { port, start }))
+            }
+            Self::Tcp(server) => {
+                let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
+                for address in (server.host.as_str(), server.port).to_socket_addrs()? {
+                    match TcpStream::connect_timeout(&address, CONNECT) {
+                        Ok(stream) => {
+                            stream.set_nodelay(true)?;
+                            stream.set_read_timeout(Some(READ))?;
+                            stream.set_write_timeout(Some(WRITE))?;
+                            return Ok(Box::new(TcpLink { stream, start }));
+                        }
+                        Err(error) => last = error,
+                    }
+                }
+                Err(last)
+            }
+        }
+    }
+}
+
+struct SerialLink {
+    port: Box<dyn serialport::SerialPort>,
+    start: Instant,
+}
+
+impl Read for SerialLink {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.port.read(buffer)
+    }
+}
+
+impl Write for SerialLink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.port.write(bytes)
+    }
+
+    /// Does nothing: the port has no buffer of its own, and waiting for the wire would hold up a stop.
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl StageLink for SerialLink {
+    fn now(&self) -> Duration {
+        self.start.elapsed()
+    }
+
+    fn reset_by_dtr(&mut self) -> io::Result<bool> {
+        self.port.write_data_terminal_ready(false)?;
+        std::thread::sleep(DTR);
+        self.port.write_data_terminal_ready(true)?;
+        Ok(true)
+    }
+
+    fn has_dtr(&self) -> bool {
+        true
+    }
+}
+
+struct TcpLink {
+    stream: TcpStream,
+    start: Instant,
+}
+
+impl Read for TcpLink {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.stream.read(buffer)
+    }
+}
+
+impl Write for TcpLink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.stream.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+impl StageLink for TcpLink {
+    fn now(&self) -> Duration {
+        self.start.elapsed()
+    }
+
+    fn reset_by_dtr(&mut self) -> io::Result<bool> {
+        Ok(false)
+    }
+
+    fn has_dtr(&self) -> bool {
+        false
+    }
+}

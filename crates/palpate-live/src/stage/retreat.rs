@@ -1,0 +1,101 @@
+//! The way out of a doubt: the machine is stopped, its finger lifted where that is safe, and then it is halted until somebody resets it.
+//!
+//! A lift is safe where the machine still answers, and reports a position on the way of its last move: it was not reset, and its own z grows.
+
+use super::error::{Doubt, Finger};
+use super::firmware::Firmware;
+use super::gcode::{Fault, GcodeStage, TOLERANCE_MM};
+use super::link::StageLink;
+use std::time::Duration;
+
+/// Time for the answer of a machine that is still there.
+const LIFE: Duration = Duration::from_secs(2);
+/// Time for a feed hold to come to rest, and for the greeting after a reset.
+const HOLD: Duration = Duration::from_secs(2);
+
+impl<L: StageLink> GcodeStage<L> {
+    /// Stops the machine for a doubt, lifts its finger where that is safe, and halts it.
+    pub(super) fn retreat(&mut self, doubt: &Doubt) -> Finger {
+        if !self.has_moved {
+            return Finger::Unmoved;
+        }
+        let was_up = self.at_mm.is_some_and(|at_mm| self.is_up(at_mm[2]) && self.is_up(self.target_mm[2]));
+        let is_lost = self.at_mm.is_none() || matches!(doubt, Doubt::Restart { .. });
+        let lifted = if is_lost { Finger::Unknown } else { self.try_to_lift().unwrap_or(Finger::Unknown) };
+        let finger = if was_up { Finger::Up } else { lifted };
+        // Where even this cannot be sent, the finger is where it is.
+        match self.halt() {
+            Ok(()) => finger,
+            Err(_) => Finger::Unknown,
+        }
+    }
+
+    fn is_up(&self, z_mm: f64) -> bool {
+        z_mm >= self.travel_z_mm() - TOLERANCE_MM
+    }
+
+    fn try_to_lift(&mut self) -> Result<Finger, Fault> {
+        match self.firmware {
+            Firmware::Marlin => {
+                // Drops all moves; the position stays known.
+                self.send("M410")?;
+                self.synchronize(LIFE)?;
+            }
+            Firmware::Grbl => self.hold()?,
+        }
+        let at_mm = self.position()?;
+        if !self.is_on_way(at_mm) {
+            return Ok(Finger::Unknown);
+        }
+        if self.is_up(at_mm[2]) {
+            return Ok(Finger::Up);
+        }
+        self.at_mm = Some(at_mm);
+        self.go([None, None, Some(self.travel_z_mm())], self.setup.travel_m_per_s)?;
+        Ok(Finger::Lifted)
+    }
+
+    /// Stops the moves of GRBL. A reset drops them after a hold, at rest, which keeps the position.
+    fn hold(&mut self) -> Result<(), Fault> {
+        self.pass_over(LIFE)?;
+        let until = self.link.now() + LIFE;
+        let state = self.status_report(until)?.state;
+        match state.as_str() {
+            "Idle" => return self.synchronize(LIFE),
+            "Run" | "Hold" => {}
+            // After an alarm the position may be lost.
+            _ => return Err(Fault::Doubt(Doubt::Answer { command: "?".to_owned(), answer: state })),
+        }
+        self.link.write_all(b"!")?;
+        let until = self.link.now() + HOLD;
+        loop {
+            let report = self.status_report(until)?;
+            if report.is_held {
+                break;
+            }
+            if self.link.now() >= until {
+                return Err(Fault::Doubt(Doubt::Silent { command: "!".to_owned(), seconds: HOLD.as_secs() }));
+            }
+        }
+        self.link.write_all(b"\x18")?;
+        self.pass_over(HOLD)?;
+        self.synchronize(LIFE)?;
+        self.set()
+    }
+
+    /// Reads what comes until the line is quiet for the time of a read, at most for `most`.
+    fn pass_over(&mut self, most: Duration) -> Result<(), Fault> {
+        let until = self.link.now() + most;
+        while self.next_line(self.link.now())?.is_some() && self.link.now() < until {}
+        Ok(())
+    }
+
+    /// True for a position between those before and after the last move.
+    fn is_on_way(&self, at_mm: [f64; 3]) -> bool {
+        let Some(from_mm) = self.at_mm else { return false };
+        let is_between = |at: f64, from: f64, to: f64| {
+            (from.min(to) - TOLERANCE_MM..=from.max(to) + TOLERANCE_MM).contains(&at)
+        };
+        (0..3).all(|axis| is_between(at_mm[axis], from_mm[axis], self.target_mm[axis]))
+    }
+}
