@@ -681,10 +681,10 @@ impl Recording {
         positions_array(py, &self.inner.distinct_positions(), self.setup.surface().extent())
     }
 
-    /// Warnings of what looks wrong: dead or saturated channels, repeats that disagree, drift.
+    /// Warnings of dead or saturated channels, of repeats that disagree, of drift and of repeated readings.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.inner.warnings().iter().map(ToString::to_string).collect()
+        self.inner.warning_lines()
     }
 
     /// Name of the file that it was read from, or "simulation", "arrays" or "frame".

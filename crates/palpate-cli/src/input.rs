@@ -122,7 +122,7 @@ pub fn read_recording_as(setup: &Setup, path: &Path, columns: &Columns) -> Resul
 fn with_warnings(recording: Result<Recording, CsvError>, name: &str) -> Result<Recording, Failure> {
     let recording = recording.map_err(|error| csv_complaint(&error))?;
     say_dialects(&recording);
-    recording.warnings().iter().for_each(|warning| remark!("warning: {name}: {warning}"));
+    recording.warning_lines().iter().for_each(|warning| remark!("warning: {name}: {warning}"));
     Ok(recording)
 }
 

@@ -495,7 +495,7 @@ mod tests {
             reading: vec![*value],
         });
         let provenance =
-            Provenance { source: "test".into(), rows: 0, digests: vec![], dialects: vec![], seed: None };
+            Provenance { source: "test".into(), rows: 0, digests: vec![], dialects: vec![], repeats: None, seed: None };
         let kinds = vec![SensorKind::Deflection];
         Recording { channels: vec!["d".into()], kinds, rows: rows.collect(), provenance }
     }

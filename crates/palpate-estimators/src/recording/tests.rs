@@ -36,6 +36,7 @@ fn foreign() -> Columns {
         untouched_times: Vec::new(),
         separator: None,
         decimal: None,
+        repeated_readings: RepeatedReadings::Auto,
     }
 }
 
@@ -347,6 +348,7 @@ fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
         rows: 50,
         digests: Vec::new(),
         dialects: Vec::new(),
+        repeats: None,
         seed: None,
     };
     Recording {
