@@ -3,8 +3,8 @@
 use serde::Deserialize;
 
 use palpate_estimators::recording::{
-    Column, Columns, Decimal, ForceColumn, Frame, Header, Need, PositionColumns, RepeatedReadings,
-    Separator, TimeSpan, ValueColumn,
+    Column, Columns, Decimal, ForceColumn, Frame, Header, Need, PositionColumns, RepeatedReadings, Separator,
+    TimeSpan, ValueColumn,
 };
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};

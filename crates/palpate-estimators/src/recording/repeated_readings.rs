@@ -55,7 +55,8 @@ impl Recording {
         let any_contact = cause == Some(RepeatCause::SampleAndHold);
         if cause.is_some() {
             self.rows.dedup_by(|row, before| {
-                is_same_reading(&row.reading, &before.reading) && (any_contact || is_same_contact(row, before))
+                is_same_reading(&row.reading, &before.reading)
+                    && (any_contact || is_same_contact(row, before))
             });
         }
         let left_out = of - self.rows.len();

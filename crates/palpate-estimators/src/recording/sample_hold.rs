@@ -143,7 +143,8 @@ impl RepeatCounts {
     pub fn set_range(&mut self, channel: usize, values: impl IntoIterator<Item = f64>) {
         let mut values: Vec<f64> = values.into_iter().collect();
         values.sort_by(f64::total_cmp);
-        let steps = values.windows(2).filter(|pair| !is_equal(pair[0], pair[1])).map(|pair| pair[1] - pair[0]);
+        let steps =
+            values.windows(2).filter(|pair| !is_equal(pair[0], pair[1])).map(|pair| pair[1] - pair[0]);
         if let Some(changes) = self.channels.get_mut(channel) {
             changes.step = steps.reduce(f64::min).unwrap_or_default();
             changes.range = values.first().zip(values.last()).map(|(low, high)| [*low, *high]);

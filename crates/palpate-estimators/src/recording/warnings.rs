@@ -139,7 +139,8 @@ impl Recording {
     /// Warnings of rows and channels that repeat their values.
     fn repeat_warnings(&self) -> Vec<Warning> {
         let Some(repeats) = &self.provenance.repeats else {
-            let counted = self.counted_repeats().map(|rows| Warning::RepeatsCounted { rows, of: self.rows.len() });
+            let counted =
+                self.counted_repeats().map(|rows| Warning::RepeatsCounted { rows, of: self.rows.len() });
             return counted.into_iter().collect();
         };
         let left_out = (repeats.left_out > 0).then(|| Warning::RepeatsLeftOut(repeats.clone()));
@@ -200,10 +201,10 @@ impl<'a> Channel<'a> {
 
     fn repeats_disagree(&self, repeats: &[Vec<usize>]) -> Option<Warning> {
         let values = self.without_drift(repeats);
-        let pairs = repeats.iter().flat_map(|rows| rows.windows(2));
-        let steps = pairs.map(|pair| (values[pair[1]] - values[pair[0]]).abs());
         // Equal repeats of a slow or coarse channel do not tell the scatter.
-        let steps = steps.filter(|step| *step > 0.0).collect();
+        let pairs = repeats.iter().flat_map(|rows| rows.windows(2));
+        let pairs = pairs.filter(|pair| self.values[pair[1]] != self.values[pair[0]]);
+        let steps = pairs.map(|pair| (values[pair[1]] - values[pair[0]]).abs()).collect();
         let spread = 1.4826 / std::f64::consts::SQRT_2 * median(steps)?;
         let bound = (FAR_OUT_DEVIATIONS * spread).max(FAR_OUT_SPAN * (self.highest - self.lowest));
         let mut rows = 0;
@@ -269,7 +270,11 @@ impl<'a> Channel<'a> {
         })
     }
 
-    fn drift_of<'g>(&self, repeats: impl Iterator<Item = &'g Vec<usize>>, rows: DriftRows) -> Option<Warning> {
+    fn drift_of<'g>(
+        &self,
+        repeats: impl Iterator<Item = &'g Vec<usize>>,
+        rows: DriftRows,
+    ) -> Option<Warning> {
         let mut changes = Vec::new();
         for rows in repeats {
             let (earlier, later) = (&rows[..rows.len() / 2], &rows[rows.len().div_ceil(2)..]);

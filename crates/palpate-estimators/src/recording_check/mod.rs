@@ -174,10 +174,7 @@ fn coverage(setup: &Setup, recording: &Recording) -> Vec<Mismatch> {
     let extent = setup.surface().extent();
     let positions = recording.distinct_positions();
     let unit = setup.recording_columns().position_unit;
-    let sides = [
-        (Axis::Along, Some(extent.length_m())),
-        (Axis::Across, extent.width_m()),
-    ];
+    let sides = [(Axis::Along, Some(extent.length_m())), (Axis::Across, extent.width_m())];
     let sides = sides.into_iter().filter_map(|(axis, of_m)| Some((axis, of_m?)));
     sides
         .filter_map(|(axis, of_m)| {
@@ -218,8 +215,7 @@ fn forces(setup: &Setup, recording: &Recording) -> Option<Mismatch> {
     let setup_n = setup.greatest_force_n()?;
     let unit = ForceUnit::explaining(greatest_n / setup_n, file_unit_n);
     let is_beyond = greatest_n > setup_n * (1.0 + 1e-9);
-    let mismatch =
-        Mismatch::Forces { recorded_n: greatest_n, setup_n, key: ForceKey::Greatest, unit };
+    let mismatch = Mismatch::Forces { recorded_n: greatest_n, setup_n, key: ForceKey::Greatest, unit };
     (is_beyond || unit.is_some()).then_some(mismatch)
 }
 
@@ -250,11 +246,17 @@ impl ForceUnit {
 impl fmt::Display for Coordinates {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let remedy = match self {
-            Self::MirroredAlong => "x → length − x: measure positions from the other end, or reverse `channels`",
+            Self::MirroredAlong => {
+                "x → length − x: measure positions from the other end, or reverse `channels`"
+            }
             Self::MirroredAcross => "y → width − y: measure `y` from the other side, or reorder `channels`",
-            Self::Turned => "x → length − x and y → width − y: turn the coordinates by 180°, or reverse `channels`",
+            Self::Turned => {
+                "x → length − x and y → width − y: turn the coordinates by 180°, or reverse `channels`"
+            }
             Self::Exchanged => "x and y exchanged: exchange the columns `x` and `y` in [recording]",
-            Self::Unit(unit) => return write!(f, "positions in {unit}: set `position_unit = \"{unit}\"` in [recording]"),
+            Self::Unit(unit) => {
+                return write!(f, "positions in {unit}: set `position_unit = \"{unit}\"` in [recording]");
+            }
         };
         f.write_str(remedy)
     }

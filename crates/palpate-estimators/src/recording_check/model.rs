@@ -71,7 +71,8 @@ impl MeanReadings {
     /// `None` for fewer contacts than decide anything: an offset and a gain are estimated of each channel.
     fn new(setup: &Setup, recording: &Recording) -> Option<Self> {
         let force_n = |i: usize| recording.rows[i].force_n.or(setup.force_n());
-        let touched: Vec<usize> = (0..recording.rows.len()).filter(|i| recording.rows[*i].touches()).collect();
+        let touched: Vec<usize> =
+            (0..recording.rows.len()).filter(|i| recording.rows[*i].touches()).collect();
         let has_forces = touched.iter().all(|i| force_n(*i).is_some());
         let contact = |i: &usize| Contact {
             position: recording.rows[*i].position,
@@ -82,7 +83,8 @@ impl MeanReadings {
         order.sort_by(|a, b| key(&a.0).partial_cmp(&key(&b.0)).unwrap_or(std::cmp::Ordering::Equal));
         let groups: Vec<&[(Contact, usize)]> = order.chunk_by(|a, b| key(&a.0) == key(&b.0)).collect();
         let of_channel = |c: usize| {
-            let reading = |group: &&[(Contact, usize)]| mean(group.iter().map(|(_, i)| recording.rows[*i].reading[c]));
+            let reading =
+                |group: &&[(Contact, usize)]| mean(group.iter().map(|(_, i)| recording.rows[*i].reading[c]));
             groups.iter().map(reading).collect()
         };
         (groups.len() > 2).then(|| Self {
@@ -132,7 +134,12 @@ impl MeanReadings {
     }
 
     /// Other coordinates by which the readings fit the model decisively better; the best of them.
-    fn better_coordinates(&self, setup: &Setup, model: &CleanSensors, fits: &[ChannelFit]) -> Option<Coordinates> {
+    fn better_coordinates(
+        &self,
+        setup: &Setup,
+        model: &CleanSensors,
+        fits: &[ChannelFit],
+    ) -> Option<Coordinates> {
         let extent = setup.surface().extent();
         let unit = setup.recording_columns().position_unit;
         let mut candidates = match extent {
@@ -167,7 +174,8 @@ impl MeanReadings {
         let is_alike = |a: usize, b: usize| sensors[a].kind == sensors[b].kind;
         let closest = |fit: &ChannelFit| {
             let others = fits.iter().filter(|other| is_alike(fit.channel, other.channel));
-            let fitted = others.filter_map(|other| Some((other.channel, self.fit(fit.channel, &modelled[other.channel])?)));
+            let fitted = others
+                .filter_map(|other| Some((other.channel, self.fit(fit.channel, &modelled[other.channel])?)));
             fitted.min_by(|a, b| a.1.unexplained.total_cmp(&b.1.unexplained))
         };
         let places: Vec<(usize, ChannelFit)> = fits.iter().map(closest).collect::<Option<_>>()?;
@@ -206,7 +214,8 @@ impl Coordinates {
 
 /// Mismatches of sign and gain of the channels that the model explains.
 fn gains(setup: &Setup, fits: &[ChannelFit]) -> Vec<Mismatch> {
-    let explained: Vec<ChannelFit> = fits.iter().copied().filter(|fit| fit.unexplained <= UNEXPLAINED).collect();
+    let explained: Vec<ChannelFit> =
+        fits.iter().copied().filter(|fit| fit.unexplained <= UNEXPLAINED).collect();
     let names = |fits: &[ChannelFit]| -> Vec<String> {
         fits.iter().map(|fit| setup.layout().sensors()[fit.channel].name.clone()).collect()
     };

@@ -45,7 +45,10 @@ fn a_recording_of_the_setup_has_no_mismatch() {
         // A stiffness that is known roughly, and gains of the channels.
         let soft = changed(&recording, |row| row.reading.iter_mut().for_each(|value| *value *= 1.4));
         let mismatches = check_recording(&setup, &soft);
-        assert!(mismatches.iter().all(|mismatch| matches!(mismatch, Mismatch::Noise { .. })), "{mismatches:?}");
+        assert!(
+            mismatches.iter().all(|mismatch| matches!(mismatch, Mismatch::Noise { .. })),
+            "{mismatches:?}"
+        );
     }
 }
 
@@ -54,7 +57,8 @@ fn every_mismatch_is_one_line_with_a_remedy() {
     let (paper, presses) = paper();
     let (lopsided, others) = lopsided();
     let scaled = |factor: f64| changed(&presses, |row| row.position.x_m *= factor);
-    let weighed = |factor: f64| changed(&presses, |row| row.force_n = row.force_n.map(|force_n| force_n * factor));
+    let weighed =
+        |factor: f64| changed(&presses, |row| row.force_n = row.force_n.map(|force_n| force_n * factor));
     let channel = |c: usize, factor: f64| changed(&presses, |row| row.reading[c] *= factor);
     let mirrored = |x_m: f64| Position::along(mm(400.0) - x_m);
     let cases = [
@@ -67,18 +71,30 @@ fn every_mismatch_is_one_line_with_a_remedy() {
         ("grams, unknown force", lines(&paper.clone().unknown_force(), &weighed(1e3 / GRAVITY))),
         (
             "grams, greatest force",
-            lines(&lopsided.clone().with_greatest_force(Some(5.0)).unwrap(), &changed(&others, |row| {
-                row.force_n = row.force_n.map(|force_n| force_n * 102.0);
-            })),
+            lines(
+                &lopsided.clone().with_greatest_force(Some(5.0)).unwrap(),
+                &changed(&others, |row| {
+                    row.force_n = row.force_n.map(|force_n| force_n * 102.0);
+                }),
+            ),
         ),
         ("mirrored", lines(&paper, &changed(&presses, |row| row.position = mirrored(row.position.x_m)))),
-        ("mirrored, lopsided", lines(&lopsided, &changed(&others, |row| row.position = mirrored(row.position.x_m)))),
+        (
+            "mirrored, lopsided",
+            lines(&lopsided, &changed(&others, |row| row.position = mirrored(row.position.x_m))),
+        ),
         ("channels swapped", lines(&paper, &changed(&presses, |row| row.reading.swap(1, 4)))),
         ("channels rotated", lines(&lopsided, &changed(&others, |row| row.reading.rotate_left(1)))),
         ("one sign", lines(&paper, &channel(2, -1.0))),
-        ("all signs", lines(&paper, &changed(&presses, |row| row.reading.iter_mut().for_each(|value| *value *= -1.0)))),
+        (
+            "all signs",
+            lines(&paper, &changed(&presses, |row| row.reading.iter_mut().for_each(|value| *value *= -1.0))),
+        ),
         ("one in µm", lines(&paper, &channel(5, 1e3))),
-        ("all in µm", lines(&paper, &changed(&presses, |row| row.reading.iter_mut().for_each(|value| *value *= 1e3)))),
+        (
+            "all in µm",
+            lines(&paper, &changed(&presses, |row| row.reading.iter_mut().for_each(|value| *value *= 1e3))),
+        ),
     ];
     let text = cases.iter().map(|(case, lines)| format!("{case}:\n  {}", lines.join("\n  ")));
     insta::assert_snapshot!(text.collect::<Vec<_>>().join("\n"));
@@ -88,7 +104,8 @@ fn every_mismatch_is_one_line_with_a_remedy() {
 fn repeats_are_held_against_the_noise_by_a_chi_squared_test() {
     let (setup, _) = paper();
     let noisy = |noise_m: f64, repeats: usize, seed: u64| {
-        let bench = setup.clone().with_noise(Quantity { value: noise_m, dimension: Dimension::Length }).unwrap();
+        let bench =
+            setup.clone().with_noise(Quantity { value: noise_m, dimension: Dimension::Length }).unwrap();
         let recording = bench.simulate(&Training::even(5).repeated(repeats), seed).unwrap();
         check_recording(&setup, &recording)
     };

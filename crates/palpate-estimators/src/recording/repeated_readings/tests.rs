@@ -20,8 +20,7 @@ struct Logger {
     rows_per_contact: usize,
 }
 
-const FINE: Logger =
-    Logger { step: 1e-3, noise: 0.5, runs: [[1, 1]; 4], contacts: 16, rows_per_contact: 12 };
+const FINE: Logger = Logger { step: 1e-3, noise: 0.5, runs: [[1, 1]; 4], contacts: 16, rows_per_contact: 12 };
 
 impl Logger {
     /// Contacts 5 mm apart, untouched at every fourth; channels that differ in sensitivity.
@@ -84,8 +83,7 @@ fn sample_and_hold_counts_each_reading_once() {
 #[test]
 fn coarse_sample_and_hold_is_found_by_coincidence() {
     // A converter of 10 Hz with 2 counts of noise, read at 80 Hz.
-    let held =
-        Logger { step: 1.0, noise: 0.8, runs: [[8, 8]; 4], rows_per_contact: 160, contacts: 8 };
+    let held = Logger { step: 1.0, noise: 0.8, runs: [[8, 8]; 4], rows_per_contact: 160, contacts: 8 };
     for seed in 0..20 {
         let repeats = held.treated(seed).provenance.repeats;
         assert!(repeats.is_some_and(|repeats| repeats.sample_and_hold), "seed {seed}");
@@ -101,7 +99,11 @@ fn coarse_converters_keep_their_rows() {
                 let recording = coarse.record(seed);
                 let treated = recording.clone().treat_repeated_readings(RepeatedReadings::Auto);
                 let kept = (&treated.rows, treated.provenance.repeats.clone());
-                assert_eq!(kept, (&recording.rows, None), "noise {noise} {contacts} × {rows_per_contact} seed {seed}");
+                assert_eq!(
+                    kept,
+                    (&recording.rows, None),
+                    "noise {noise} {contacts} × {rows_per_contact} seed {seed}"
+                );
             }
         }
     }
@@ -161,7 +163,10 @@ fn clipped_channels_repeat_truly() {
     recording.rows.iter_mut().flat_map(|row| &mut row.reading).for_each(|value| *value -= 5.0);
     for row in &mut recording.rows {
         // Taxels that read 0 until they are pressed.
-        row.reading.iter_mut().enumerate().for_each(|(c, value)| *value = (*value - 100.0 * c as f64).max(0.0));
+        row.reading
+            .iter_mut()
+            .enumerate()
+            .for_each(|(c, value)| *value = (*value - 100.0 * c as f64).max(0.0));
     }
     let treated = recording.clone().treat_repeated_readings(RepeatedReadings::Auto);
     assert_eq!((treated.rows.len(), treated.provenance.repeats), (recording.rows.len(), None));
@@ -172,8 +177,15 @@ fn the_key_decides() {
     let held = Logger { runs: [[3, 3]; 4], ..FINE }.record(0);
     let kept = held.clone().treat_repeated_readings(RepeatedReadings::Keep);
     assert_eq!((kept.rows.len(), kept.warnings()), (held.rows.len(), vec![]));
-    assert!(matches!(held.warnings()[..], [Warning::RepeatsCounted { rows: 120..=128, of: 192 }]), "{:?}", held.warnings());
+    assert!(
+        matches!(held.warnings()[..], [Warning::RepeatsCounted { rows: 120..=128, of: 192 }]),
+        "{:?}",
+        held.warnings()
+    );
     let coarse = Logger { step: 4.0, noise: 0.5, ..FINE }.record(0);
     let collapsed = coarse.treat_repeated_readings(RepeatedReadings::Collapse);
-    assert!(collapsed.rows.len() < 192 && collapsed.rows.windows(2).all(|pair| pair[0].reading != pair[1].reading));
+    assert!(
+        collapsed.rows.len() < 192
+            && collapsed.rows.windows(2).all(|pair| pair[0].reading != pair[1].reading)
+    );
 }
