@@ -166,7 +166,10 @@ pub fn check_recording(setup: &Setup, recording: &Recording) -> Vec<Mismatch> {
     if found.is_empty() {
         found.extend(model::compare(setup, recording));
     }
-    found.extend(noise::compare(setup, recording));
+    // Readings in another unit scatter in another unit.
+    if !found.iter().any(|mismatch| matches!(mismatch, Mismatch::Gain { .. })) {
+        found.extend(noise::compare(setup, recording));
+    }
     found
 }
 
@@ -213,10 +216,10 @@ fn forces(setup: &Setup, recording: &Recording) -> Option<Mismatch> {
         return is_other.then_some(Mismatch::Forces { recorded_n, setup_n, key: ForceKey::Known, unit });
     }
     let setup_n = setup.greatest_force_n()?;
-    let unit = ForceUnit::explaining(greatest_n / setup_n, file_unit_n);
+    let unit = ForceUnit::below(greatest_n / setup_n, file_unit_n);
     let is_beyond = greatest_n > setup_n * (1.0 + 1e-9);
     let mismatch = Mismatch::Forces { recorded_n: greatest_n, setup_n, key: ForceKey::Greatest, unit };
-    (is_beyond || unit.is_some()).then_some(mismatch)
+    is_beyond.then_some(mismatch)
 }
 
 /// Newtons of the unit of the recording's forces.
@@ -231,6 +234,13 @@ impl ForceUnit {
         let remainder = |unit: &Self| (factor * unit.newtons / read_n).ln().abs();
         let best = FORCE_UNITS.into_iter().min_by(|a, b| remainder(a).total_cmp(&remainder(b)))?;
         (factor.ln().abs() >= ROUGHLY.ln() && remainder(&best) <= UNIT_REMAINDER.ln()).then_some(best)
+    }
+
+    /// The largest unit by which forces that exceed a bound this many times lie between a tenth of it and all of it.
+    fn below(factor: f64, read_n: f64) -> Option<Self> {
+        let share = |unit: &Self| factor * unit.newtons / read_n;
+        let is_off = factor >= ROUGHLY;
+        FORCE_UNITS.into_iter().rev().find(|unit| is_off && (0.1..=1.0).contains(&share(unit)))
     }
 
     fn remedy(self) -> String {
