@@ -161,6 +161,8 @@ class Columns(Section):
         The file's coordinates of the surface's left end or lower left corner.
     round : float or str, optional
         Positions are rounded to whole multiples of this.
+    repeated_readings : {"auto", "collapse", "keep"}, optional
+        Treatment of rows that repeat the reading before them in every channel.
     """
 
     position: str | int | None = key()
@@ -182,6 +184,7 @@ class Columns(Section):
     decimal: str | None = key()
     origin: Sequence[Quantity] | None = key(LENGTH)
     round: Quantity | None = key(LENGTH)
+    repeated_readings: str | None = key()
 
 
 def setup_toml(

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use palpate::estimators::fit::ReadingError;
 use palpate::estimators::recording::{self, Row};
+use palpate::estimators::recording_check::check_recording;
 use palpate::estimators::setup;
 use palpate::estimators::simulate::{CleanSensors, SimulateError, simulate_contacts_watched};
 use palpate::mechanics::contact::{Contact, OffSurface, Position};
@@ -681,10 +682,13 @@ impl Recording {
         positions_array(py, &self.inner.distinct_positions(), self.setup.surface().extent())
     }
 
-    /// Warnings of what looks wrong: dead or saturated channels, repeats that disagree, drift.
+    /// Warnings of dead or saturated channels, repeats that disagree, drift and repeated readings, and of what contradicts the setup: units,
+    /// mirrored positions, the order, sign and gain of channels, noise.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.inner.warnings().iter().map(ToString::to_string).collect()
+        let mismatches = check_recording(&self.setup, &self.inner);
+        let mismatches = mismatches.iter().map(ToString::to_string);
+        self.inner.warning_lines().into_iter().chain(mismatches).collect()
     }
 
     /// Name of the file that it was read from, or "simulation", "arrays" or "frame".

@@ -5,6 +5,7 @@ use crate::failure::{Complaint, Failure};
 use crate::remark::remark;
 use palpate_estimators::estimator::{Locator, LocatorFileError};
 use palpate_estimators::recording::{self, Columns, CsvError, Recording};
+use palpate_estimators::recording_check::check_recording;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::units::{Dimension, Quantity};
 use palpate_rig::{Rig, RigError};
@@ -104,7 +105,7 @@ impl RecordingFiles {
         let names = [data, contacts].map(|path| path.display().to_string());
         let recording =
             setup.read_recording_pair((&names[0], readings.as_slice()), (&names[1], pressed.as_slice()));
-        with_warnings(recording, &names[0]).map(Some)
+        with_warnings(setup, recording, &names[0]).map(Some)
     }
 }
 
@@ -116,13 +117,20 @@ pub fn read_recording(setup: &Setup, path: &Path) -> Result<Recording, Failure> 
 /// The same of a file with these columns.
 pub fn read_recording_as(setup: &Setup, path: &Path, columns: &Columns) -> Result<Recording, Failure> {
     let (bytes, name) = (read_bytes(path)?, path.display().to_string());
-    with_warnings(recording::read(&name, bytes.as_slice(), &setup.schema(columns)), &name)
+    with_warnings(setup, recording::read(&name, bytes.as_slice(), &setup.schema(columns)), &name)
 }
 
-fn with_warnings(recording: Result<Recording, CsvError>, name: &str) -> Result<Recording, Failure> {
+/// The recording, after its dialect, its warnings and its mismatches with the setup were written to stderr.
+fn with_warnings(
+    setup: &Setup,
+    recording: Result<Recording, CsvError>,
+    name: &str,
+) -> Result<Recording, Failure> {
     let recording = recording.map_err(|error| csv_complaint(&error))?;
     say_dialects(&recording);
-    recording.warnings().iter().for_each(|warning| remark!("warning: {name}: {warning}"));
+    recording.warning_lines().iter().for_each(|warning| remark!("warning: {name}: {warning}"));
+    let mismatches = check_recording(setup, &recording);
+    mismatches.iter().for_each(|mismatch| remark!("warning: {name}: {mismatch}"));
     Ok(recording)
 }
 

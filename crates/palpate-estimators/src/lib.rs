@@ -46,6 +46,7 @@ pub mod network;
 pub mod offset_course;
 pub mod reading_check;
 pub mod recording;
+pub mod recording_check;
 pub mod setup;
 pub mod simulate;
 mod spread;

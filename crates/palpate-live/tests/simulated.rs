@@ -71,6 +71,32 @@ fn a_finger_is_followed_from_touch_down_to_lift_off() {
     assert_eq!(board.next_at(), Duration::from_secs(40));
 }
 
+#[test]
+fn a_board_that_repeats_its_readings_is_named_once_and_its_noise_learnt_from_each_reading() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let locator = locator(&rig);
+    let config = BoardConfig { rate_hz: 100.0, seed: 3, ..BoardConfig::default() };
+    let mut board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, 3)).unwrap();
+    let mut session = Session::new(&locator, &SessionConfig::default()).unwrap();
+    let (mut out, mut named) = (Vec::new(), 0);
+    for _ in 0..2000 {
+        let taken = board.next_at();
+        let bytes = board.send_until(taken);
+        for repeat in 0..4_u64 {
+            let elapsed = taken + Duration::from_micros(2500 * repeat);
+            let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
+            session.receive(&Arrived { at, arrival: Arrival::Bytes(bytes.clone()) }, &mut out);
+        }
+        let is_named = |output: &Output| matches!(output, Output::Event(event) if matches!(&event.event, Event::Trouble { text } if text.contains("repeats readings")));
+        named += out.drain(..).filter(is_named).count();
+    }
+    assert_eq!((named, session.counters().readings), (1, 8000));
+    // 5 µm; counted as independent, three repeats of four would make it 2.5 µm.
+    for channel in session.health() {
+        assert!((4e-6..6e-6).contains(&channel.noise_sd), "{channel:?}");
+    }
+}
+
 /// A board whose clock is fast, and frames that arrive up to 5 ms late: times are the host's.
 #[test]
 fn binary_frames_keep_the_hosts_time_whatever_the_boards_clock_does() {

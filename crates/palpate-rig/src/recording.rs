@@ -3,8 +3,8 @@
 use serde::Deserialize;
 
 use palpate_estimators::recording::{
-    Column, Columns, Decimal, ForceColumn, Frame, Header, Need, PositionColumns, Separator, TimeSpan,
-    ValueColumn,
+    Column, Columns, Decimal, ForceColumn, Frame, Header, Need, PositionColumns, RepeatedReadings, Separator,
+    TimeSpan, ValueColumn,
 };
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -60,6 +60,9 @@ pub(crate) struct RecordingKeys {
     pub origin: Option<At<Vec<Quantity<Length>>>>,
     /// Positions are rounded to whole multiples of this.
     pub round: Option<Positive<Length>>,
+    /// Treatment of rows that repeat the reading before them in every channel.
+    #[serde(default)]
+    pub repeated_readings: RepeatedReadings,
 }
 
 fn yes() -> bool {
@@ -133,6 +136,7 @@ impl At<RecordingKeys> {
             time: self.value("time", &self.time, &self.time_unit, time_unit)?,
             untouched: self.untouched.as_ref().map(|column| column.column()),
             untouched_times: self.untouched_times.iter().flatten().map(|span| span.0).collect(),
+            repeated_readings: self.repeated_readings,
         })
     }
 

@@ -356,6 +356,7 @@ fn every_key_can_be_said() {
         [recording]
         untouched = 8
         untouched_times = ["0 s..10 s", "95 s.."]
+        repeated_readings = "collapse"
         header = false
         position = 1
         position_unit = "m"

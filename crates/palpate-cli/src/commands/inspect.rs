@@ -6,6 +6,7 @@ use crate::json::object;
 use crate::{input, output};
 use palpate_estimators::description;
 use palpate_estimators::recording::{Header, Table};
+use palpate_rig::{FirstRig, Hints, Rig};
 use std::path::{Path, PathBuf};
 
 /// Say in words what a file holds: a rig, a study, a locator, a recording or a study's networks.
@@ -68,8 +69,17 @@ fn table(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
         }
         Header::Absent => format!("{} columns without names", columns.len()),
     });
+    lines.extend(repeats(&path.display().to_string(), text));
     lines.push(
         "--rig RIG reads it as a recording of that rig; palpate init writes a first rig for it".to_owned(),
     );
     Ok(lines)
+}
+
+/// Rows that repeat the reading before them, where the table is a recording by its headings.
+fn repeats(name: &str, text: &str) -> Option<String> {
+    let first = FirstRig::guess(name, text.as_bytes(), &Hints::default()).ok()?;
+    let rig = Rig::from_toml(&first.to_toml(name)).ok()?;
+    let recording = rig.setup.read_recording(name, text.as_bytes()).ok()?;
+    recording.provenance.repeats.filter(|repeats| repeats.left_out > 0).map(|repeats| repeats.to_string())
 }

@@ -20,6 +20,7 @@ mod outputs;
 mod plane;
 mod positions;
 mod profile;
+mod recording_check;
 mod recordings;
 mod report_page;
 mod shards;

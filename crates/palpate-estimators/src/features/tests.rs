@@ -32,6 +32,7 @@ fn recording_of(rows: Vec<Row>) -> Recording {
             rows: rows.len(),
             digests: vec![],
             dialects: vec![],
+            repeats: None,
             seed: None,
         },
         rows,

@@ -5,6 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::marks::{Decimal, Separator};
+use super::repeated_readings::RepeatedReadings;
 use super::untouched::TimeSpan;
 
 use palpate_mechanics::contact::Position;
@@ -50,6 +51,9 @@ pub struct Columns {
     /// Decimal mark; `None` for what the first number tells.
     #[serde(default)]
     pub decimal: Option<Decimal>,
+    /// Treatment of rows that repeat the reading before them.
+    #[serde(default, skip_serializing_if = "RepeatedReadings::is_auto")]
+    pub repeated_readings: RepeatedReadings,
 }
 
 /// Conversion of a file's coordinates to positions on the surface: rounded, then less the origin.
@@ -206,6 +210,7 @@ impl Columns {
             untouched_times: Vec::new(),
             separator: None,
             decimal: None,
+            repeated_readings: RepeatedReadings::Auto,
         }
     }
 
@@ -278,6 +283,7 @@ impl Columns {
             untouched_times: Vec::new(),
             separator: None,
             decimal: None,
+            repeated_readings: RepeatedReadings::Auto,
         }
     }
 }

@@ -123,7 +123,7 @@ impl Schema<'_> {
         let mut recording = Recording::new(self.layout, source, rows);
         recording.provenance.digests = digests;
         recording.provenance.dialects = dialects.into_iter().filter(|dialect| !dialect.is_plain()).collect();
-        recording
+        recording.treat_repeated_readings(self.columns.repeated_readings)
     }
 }
 

@@ -8,6 +8,9 @@ mod csv_out;
 mod dialect;
 mod heading;
 mod marks;
+mod repeat_watch;
+mod repeated_readings;
+mod sample_hold;
 mod table;
 mod timestamp;
 mod untouched;
@@ -23,9 +26,13 @@ pub use csv_out::{csv_row, write, write_as, write_timed};
 pub use dialect::Dialect;
 pub use heading::Heading;
 pub use marks::{Decimal, Separator};
+pub use repeat_watch::RepeatWatch;
+pub use repeated_readings::{RepeatedReadings, Repeats};
+pub use sample_hold::{FALSE_ALARM, RepeatCause, RepeatCounts};
 pub use table::{Content, Table, TableColumn};
 pub use untouched::{TimeSpan, TimeSpanError};
-pub use warnings::Warning;
+pub(crate) use warnings::channel_list;
+pub use warnings::{DriftRows, Warning};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -97,6 +104,9 @@ pub struct Provenance {
     /// Dialect of each file, where it is not plain CSV.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub dialects: Vec<Dialect>,
+    /// Rows that repeated the reading before them, and slow channels, where there are some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repeats: Option<Repeats>,
     /// The seed of a simulation.
     pub seed: Option<u64>,
 }
@@ -128,6 +138,7 @@ impl Recording {
             rows: rows.len(),
             digests: Vec::new(),
             dialects: Vec::new(),
+            repeats: None,
             seed: None,
         };
         Self { channels: layout.names(), kinds: layout.kinds(), rows, provenance }

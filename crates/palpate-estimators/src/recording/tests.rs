@@ -36,6 +36,7 @@ fn foreign() -> Columns {
         untouched_times: Vec::new(),
         separator: None,
         decimal: None,
+        repeated_readings: RepeatedReadings::Auto,
     }
 }
 
@@ -347,6 +348,7 @@ fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
         rows: 50,
         digests: Vec::new(),
         dialects: Vec::new(),
+        repeats: None,
         seed: None,
     };
     Recording {
@@ -464,4 +466,25 @@ fn rows_without_contact_are_no_presses() {
     for fold in recording.folds(2).unwrap() {
         assert!(fold.training.contains(&50) && !fold.held_out.contains(&50));
     }
+}
+
+#[test]
+fn drift_of_untouched_rows_is_named_and_channels_share_a_line() {
+    let count = 11;
+    let layout = Layout::even(SensorKind::Raw, count, 0.1);
+    let row = |i: usize, touched: bool| Row {
+        position: Position::along(if touched { 0.01 * (i % 10) as f64 } else { 0.0 }),
+        force_n: Some(if touched { 1.0 } else { 0.0 }),
+        nuisances: Vec::new(),
+        time_s: None,
+        reading: (0..count)
+            .map(|c| {
+                let ripple = 0.01 * ((i * 31 + c * 17) % 7) as f64;
+                ripple + if touched { (i % 10 + c) as f64 } else { 0.05 * i as f64 }
+            })
+            .collect(),
+    };
+    let rows = (0..100).map(|i| row(i, false)).chain((0..50).map(|i| row(i, true)));
+    let recording = Recording::new(&layout, "drifting", rows.collect());
+    insta::assert_snapshot!(recording.warning_lines().join("\n"));
 }

@@ -1,14 +1,29 @@
 //! Warnings about a recording that can still be used.
 
 use std::fmt;
+use std::mem::discriminant;
 
-use super::{Recording, Row};
+use super::{Recording, Repeats, Row};
 use palpate_mechanics::units::Quantity;
 use palpate_numerics::median;
 
-/// Something about a channel that the bench's owner should look at.
+/// A defect of a recording that its owner should examine.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
+    /// Rows repeat the reading before them in every channel, and were left out.
+    RepeatsLeftOut(Repeats),
+    /// Rows repeat the reading before them in every channel, and count as independent repeats.
+    RepeatsCounted {
+        /// Number of such rows.
+        rows: u64,
+        /// Rows of the recording.
+        of: usize,
+    },
+    /// Channels repeat their value while others change: their sensors are slower than the logger.
+    SlowChannels {
+        /// Names of the channels.
+        channels: Vec<String>,
+    },
     /// The channel has the same value in every row.
     Dead {
         /// The channel's name.
@@ -32,7 +47,7 @@ pub enum Warning {
     /// channel's span, after a slow drift is taken off.
     ///
     /// Repeats are rows with the same position and force. The standard deviation is 1.4826/√2 times the median magnitude of
-    /// the difference between one repeat and the next, so that a few bad rows do not hide themselves. The drift is a polyline through
+    /// the difference between one repeat and the next, equal ones aside, so that a few bad rows do not hide themselves. The drift is a polyline through
     /// the medians of up to 20 blocks of 5 rows or more, fitted in turns with the medians of the repeats.
     RepeatsDisagree {
         /// The channel's name.
@@ -56,6 +71,8 @@ pub enum Warning {
     Drift {
         /// The channel's name.
         channel: String,
+        /// Rows in which it shows.
+        rows: DriftRows,
         /// Median change from the earlier to the later repeat.
         change: Quantity,
         /// Pairs that changed in that direction.
@@ -65,6 +82,19 @@ pub enum Warning {
     },
 }
 
+/// Rows in which a drift shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriftRows {
+    /// Repeats of contacts.
+    Contacts,
+    /// Untouched rows.
+    Untouched,
+    /// Both together, neither alone.
+    All,
+}
+
+/// Channels that a warning names, at most; it counts the others.
+const NAMED_CHANNELS: usize = 4;
 const SATURATED_SHARE: f64 = 0.1;
 const SATURATED_POSITIONS: usize = 3;
 const FAR_OUT_DEVIATIONS: f64 = 8.0;
@@ -82,11 +112,45 @@ impl Recording {
     pub fn warnings(&self) -> Vec<Warning> {
         let repeats = self.repeats();
         let channels = (0..self.channels.len()).filter_map(|index| Channel::new(self, index));
-        channels.flat_map(|channel| channel.warnings(&repeats)).collect()
+        let of_channels = channels.flat_map(|channel| channel.warnings(&repeats));
+        self.repeat_warnings().into_iter().chain(of_channels).collect()
+    }
+
+    /// The warnings as lines of text, one for all channels with the same defect.
+    pub fn warning_lines(&self) -> Vec<String> {
+        let warnings = self.warnings();
+        let mut lines = Vec::new();
+        for (i, first) in warnings.iter().enumerate() {
+            let alike = |warning: &&Warning| discriminant(*warning) == discriminant(first);
+            if warnings[..i].iter().any(|warning| alike(&warning)) {
+                continue;
+            }
+            let group: Vec<&Warning> = warnings[i..].iter().filter(alike).collect();
+            let mut line = group_line(&group);
+            let numbers_rows = matches!(first, Warning::RepeatsDisagree { .. });
+            if numbers_rows && self.provenance.repeats.as_ref().is_some_and(|repeats| repeats.left_out > 0) {
+                line += " (row numbers without the repeated rows)";
+            }
+            lines.push(line);
+        }
+        lines
+    }
+
+    /// Warnings of rows and channels that repeat their values.
+    fn repeat_warnings(&self) -> Vec<Warning> {
+        let Some(repeats) = &self.provenance.repeats else {
+            let counted =
+                self.counted_repeats().map(|rows| Warning::RepeatsCounted { rows, of: self.rows.len() });
+            return counted.into_iter().collect();
+        };
+        let left_out = (repeats.left_out > 0).then(|| Warning::RepeatsLeftOut(repeats.clone()));
+        let channels = repeats.slow_channels.clone();
+        let slow = (!channels.is_empty()).then_some(Warning::SlowChannels { channels });
+        left_out.into_iter().chain(slow).collect()
     }
 
     /// Row indices in groups of two or more with the same position and force, each in the order of recording.
-    fn repeats(&self) -> Vec<Vec<usize>> {
+    pub(crate) fn repeats(&self) -> Vec<Vec<usize>> {
         let key = |i: &usize| {
             let row: &Row = &self.rows[*i];
             [row.position.x_m, row.position.y_m, row.force_n.unwrap_or(f64::NEG_INFINITY)]
@@ -137,7 +201,9 @@ impl<'a> Channel<'a> {
 
     fn repeats_disagree(&self, repeats: &[Vec<usize>]) -> Option<Warning> {
         let values = self.without_drift(repeats);
+        // Equal repeats of a slow or coarse channel do not tell the scatter.
         let pairs = repeats.iter().flat_map(|rows| rows.windows(2));
+        let pairs = pairs.filter(|pair| self.values[pair[1]] != self.values[pair[0]]);
         let steps = pairs.map(|pair| (values[pair[1]] - values[pair[0]]).abs()).collect();
         let spread = 1.4826 / std::f64::consts::SQRT_2 * median(steps)?;
         let bound = (FAR_OUT_DEVIATIONS * spread).max(FAR_OUT_SPAN * (self.highest - self.lowest));
@@ -190,7 +256,25 @@ impl<'a> Channel<'a> {
         values
     }
 
+    /// The drift of contacts, else of untouched rows, else of both together.
     fn drift(&self, repeats: &[Vec<usize>]) -> Option<Warning> {
+        let rows = &self.recording.rows;
+        let is_of = |group: &Vec<usize>, kind: DriftRows| match kind {
+            DriftRows::Contacts => rows[group[0]].touches(),
+            DriftRows::Untouched => !rows[group[0]].touches(),
+            DriftRows::All => true,
+        };
+        [DriftRows::Contacts, DriftRows::Untouched, DriftRows::All].into_iter().find_map(|kind| {
+            let groups = repeats.iter().filter(|group| is_of(group, kind));
+            self.drift_of(groups, kind)
+        })
+    }
+
+    fn drift_of<'g>(
+        &self,
+        repeats: impl Iterator<Item = &'g Vec<usize>>,
+        rows: DriftRows,
+    ) -> Option<Warning> {
         let mut changes = Vec::new();
         for rows in repeats {
             let (earlier, later) = (&rows[..rows.len() / 2], &rows[rows.len().div_ceil(2)..]);
@@ -205,6 +289,7 @@ impl<'a> Channel<'a> {
         let change = self.quantity(median(changes)?);
         is_drift.then(|| Warning::Drift {
             channel: self.name(),
+            rows,
             change,
             agreeing: rising.max(falling),
             pairs,
@@ -237,9 +322,81 @@ fn on_polyline(knots: &[(f64, f64)], at: f64) -> f64 {
     y0 + (y1 - y0) * (at - x0) / (x1 - x0)
 }
 
+impl Warning {
+    /// The channel of a warning about one channel.
+    fn channel(&self) -> Option<&str> {
+        match self {
+            Self::Dead { channel, .. }
+            | Self::Saturated { channel, .. }
+            | Self::RepeatsDisagree { channel, .. }
+            | Self::Drift { channel, .. } => Some(channel),
+            Self::RepeatsLeftOut(_) | Self::RepeatsCounted { .. } | Self::SlowChannels { .. } => None,
+        }
+    }
+
+    /// Number of rows or pairs that show the defect.
+    fn extent(&self) -> usize {
+        match self {
+            Self::Saturated { rows, .. } | Self::RepeatsDisagree { rows, .. } => *rows,
+            Self::Drift { agreeing, .. } => *agreeing,
+            _ => 0,
+        }
+    }
+}
+
+/// One line for warnings of one kind: that of the most rows, and the other channels by name.
+fn group_line(group: &[&Warning]) -> String {
+    // Of several alike the first.
+    let Some(worst) = group.iter().rev().max_by_key(|warning| warning.extent()) else { return String::new() };
+    let others = group.iter().filter_map(|warning| warning.channel());
+    let others: Vec<&str> = others.filter(|channel| Some(*channel) != worst.channel()).collect();
+    match others.len() {
+        0 => worst.to_string(),
+        1 => format!("{worst}; channel {} too", channel_list(&others)),
+        count => format!("{worst}; {count} more channels too: {}", channel_list(&others)),
+    }
+}
+
+/// The first few channels by name, and the number of the others.
+pub(crate) fn channel_list(channels: &[impl AsRef<str>]) -> String {
+    let named = channels.iter().take(NAMED_CHANNELS).map(|channel| format!("`{}`", channel.as_ref()));
+    let named = named.collect::<Vec<_>>().join(", ");
+    match channels.len().saturating_sub(NAMED_CHANNELS) {
+        0 => named,
+        more => format!("{named} and {more} more"),
+    }
+}
+
+impl fmt::Display for Repeats {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { left_out, of, sample_and_hold, .. } = self;
+        let cause = if *sample_and_hold {
+            "the logger is faster than its sensors"
+        } else {
+            "no repeat differs from the row before it"
+        };
+        write!(
+            f,
+            "{left_out} of {of} rows repeat the row before them in every channel: {cause}; each reading counts once \
+             (`repeated_readings = \"keep\"` in [recording] counts all)"
+        )
+    }
+}
+
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::RepeatsLeftOut(repeats) => repeats.fmt(f),
+            Self::RepeatsCounted { rows, of } => write!(
+                f,
+                "{rows} of {of} rows repeat the row before them in every channel, and count as independent repeats; \
+                 `repeated_readings = \"collapse\"` in [recording] counts each reading once"
+            ),
+            Self::SlowChannels { channels } => write!(
+                f,
+                "channels that repeat their value while others change: {}; are their sensors slower than the logger? Record at their rate",
+                channel_list(channels)
+            ),
             Self::Dead { channel, value } => {
                 write!(f, "channel `{channel}` reads {value} in every row: is it connected?")
             }
@@ -254,11 +411,17 @@ impl fmt::Display for Warning {
                 "channel `{channel}` disagrees with its repeats in {rows} of {of} rows, most in row {worst_row}, by {deviation} where \
                  {spread} is usual"
             ),
-            Self::Drift { channel, change, agreeing, pairs } => write!(
-                f,
-                "channel `{channel}` drifts: {agreeing} of {pairs} later repeats lie on the same side of the earlier ones, by \
-                 {change} in the median"
-            ),
+            Self::Drift { channel, rows, change, agreeing, pairs } => {
+                let rows = match rows {
+                    DriftRows::Contacts | DriftRows::All => "later repeats",
+                    DriftRows::Untouched => "later untouched rows",
+                };
+                write!(
+                    f,
+                    "channel `{channel}` drifts: {agreeing} of {pairs} {rows} lie on the same side of the earlier ones, by \
+                     {change} in the median"
+                )
+            }
         }
     }
 }

@@ -22,6 +22,7 @@ use contact::ContactWatch;
 use estimation::EstimationState;
 use palpate_core::Status;
 use palpate_estimators::estimator::Locator;
+use palpate_estimators::recording::RepeatWatch;
 use palpate_mechanics::surface::Extent;
 use std::collections::BTreeMap;
 use taring::Taring;
@@ -79,6 +80,7 @@ pub struct Session<'a> {
     estimation: EstimationState,
     contact: ContactWatch,
     health: HealthWatch,
+    repeats: RepeatWatch,
     counters: Counters,
     /// Cause of the last frame that was no reading, and number of such frames since the last reading or the opening.
     last_cause: Option<BadFrame>,
@@ -104,6 +106,7 @@ impl<'a> Session<'a> {
             estimation: EstimationState::new(&config.estimation, locator)?,
             contact: ContactWatch::new(extent),
             health: HealthWatch::new(locator.setup.layout()),
+            repeats: RepeatWatch::new(channels.len()),
             counters: Counters::default(),
             last_cause: None,
             bad_in_a_row: 0,
@@ -247,14 +250,20 @@ impl<'a> Session<'a> {
         }
         let time_s = unix_ns as f64 * 1e-9;
         self.health.add(&frame.reading, |event| out.push(Output::Event(EventRecord { time_s, event })));
+        let is_repeat = self.watch_repeats(time_s, &frame.reading, out);
         let mut tared = frame.reading.clone();
         // The baseline follows single readings, whatever becomes of them afterwards: a filtered reading would be late to show a contact.
-        let located =
-            self.taring.locate(self.locator, &frame.reading, &mut tared).and_then(|(single, tares)| {
-                let state = &mut self.estimation;
-                let estimate = state.estimate(self.locator, unix_ns, &frame.reading, &mut tared, single)?;
-                Some((estimate, tares, single.status == Status::NoContact))
-            });
+        let single = if is_repeat {
+            let single = self.taring.locate_repeat(self.locator, &frame.reading, &mut tared);
+            single.map(|single| (single, false))
+        } else {
+            self.taring.locate(self.locator, &frame.reading, &mut tared)
+        };
+        let located = single.and_then(|(single, tares)| {
+            let state = &mut self.estimation;
+            let estimate = state.estimate(self.locator, unix_ns, &frame.reading, &mut tared, single)?;
+            Some((estimate, tares, single.status == Status::NoContact))
+        });
         let Some((estimate, tares, is_untouched)) = located else {
             // Immense values whose difference is no number.
             *self.counters.bad_frames.entry(BadFrame::NotANumber).or_default() += 1;
@@ -265,7 +274,7 @@ impl<'a> Session<'a> {
         }
         self.contact
             .add(at.elapsed, &estimate, |event| out.push(Output::Event(EventRecord { time_s, event })));
-        if is_untouched && self.was_untouched {
+        if is_untouched && self.was_untouched && !is_repeat {
             self.health.learn_noise();
         }
         self.was_untouched = is_untouched;
@@ -280,6 +289,18 @@ impl<'a> Session<'a> {
             tared,
             estimate,
         })));
+    }
+
+    /// True for a reading that a board repeats because it sends faster than it measures; says so once.
+    fn watch_repeats(&mut self, time_s: f64, reading: &[f64], out: &mut Vec<Output>) -> bool {
+        let before = self.repeats.is_sample_and_hold();
+        let is_repeat = self.repeats.add(reading, self.was_untouched);
+        if self.repeats.is_sample_and_hold() && !before {
+            let text = "the board repeats readings: it sends faster than its sensors measure; repeats do not \
+                        count for noise and tare";
+            out.push(Output::Event(EventRecord { time_s, event: Event::Trouble { text: text.to_owned() } }));
+        }
+        is_repeat
     }
 
     fn tell(&self, at: Stamp, event: Event, out: &mut Vec<Output>) {

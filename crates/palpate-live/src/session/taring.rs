@@ -60,6 +60,17 @@ impl Taring {
         Some((locator.locate(tared).ok()?, tares))
     }
 
+    /// The estimate of a repeat of the reading before, which changes no baseline.
+    pub fn locate_repeat(&self, locator: &Locator, reading: &[f64], tared: &mut [f64]) -> Option<Estimate> {
+        match &self.tare {
+            Some(tare) => {
+                tare.apply(reading, tared).ok()?;
+                locator.locate(tared).ok()
+            }
+            None => locator.locate(reading).ok(),
+        }
+    }
+
     /// Adds a reading to a baseline that is being taken; true when that is complete, and the one that holds.
     fn take(&mut self, reading: &[f64]) -> bool {
         let Some((tare, left)) = &mut self.taken else { return false };

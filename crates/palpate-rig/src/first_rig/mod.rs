@@ -481,7 +481,7 @@ impl FirstRig {
             }
         };
         let mut warnings: Vec<String> = self.roles.left.iter().filter_map(left).collect();
-        warnings.extend(recording.warnings().iter().map(ToString::to_string));
+        warnings.extend(recording.warning_lines());
         let positions = recording.distinct_positions().len();
         let enough = if self.sides.len() == 1 { 5 } else { 9 };
         if positions < enough {

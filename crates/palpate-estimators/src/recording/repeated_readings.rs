@@ -1,0 +1,168 @@
+//! Treatment of readings that repeat the reading before them in every channel.
+
+use serde::{Deserialize, Serialize};
+
+use super::sample_hold::{RepeatCause, RepeatCounts, is_same_reading};
+use super::{Recording, Row};
+use palpate_numerics::median;
+
+/// Treatment of rows that repeat the reading before them in every channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RepeatedReadings {
+    /// Each run of them counts once where chance does not explain the repeats.
+    #[default]
+    Auto,
+    /// Each run of them counts once, whatever its cause.
+    Collapse,
+    /// Each row counts.
+    Keep,
+}
+
+impl RepeatedReadings {
+    /// True for the treatment that is meant where none is named.
+    pub fn is_auto(&self) -> bool {
+        *self == Self::Auto
+    }
+}
+
+/// Repeats in a recording, as its file has them.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Repeats {
+    /// Rows that were left out, each a repeat of the row before it.
+    pub left_out: usize,
+    /// Rows of the file.
+    pub of: usize,
+    /// True where the logger is faster than its sensors.
+    pub sample_and_hold: bool,
+    /// Channels that repeat their value while others change, slower than the logger.
+    pub slow_channels: Vec<String>,
+}
+
+impl Recording {
+    /// The same recording with its repeated readings treated, and named in the provenance.
+    ///
+    /// The first row of a run stays. Under sample and hold and under [`RepeatedReadings::Collapse`] a run goes on through changes of the contact:
+    /// its later rows have a reading that is out of date.
+    #[must_use]
+    pub fn treat_repeated_readings(mut self, treatment: RepeatedReadings) -> Self {
+        let of = self.rows.len();
+        let cause = match treatment {
+            RepeatedReadings::Keep => None,
+            RepeatedReadings::Collapse => Some(RepeatCause::SampleAndHold),
+            RepeatedReadings::Auto => self.repeat_counts().cause(),
+        };
+        let any_contact = cause == Some(RepeatCause::SampleAndHold);
+        if cause.is_some() {
+            self.rows.dedup_by(|row, before| {
+                is_same_reading(&row.reading, &before.reading)
+                    && (any_contact || is_same_contact(row, before))
+            });
+        }
+        let left_out = of - self.rows.len();
+        let slow_channels = if treatment.is_auto() { self.slow_channels() } else { Vec::new() };
+        self.provenance.rows = self.rows.len();
+        if left_out > 0 || !slow_channels.is_empty() || treatment == RepeatedReadings::Keep {
+            self.provenance.repeats =
+                Some(Repeats { left_out, of, sample_and_hold: any_contact, slow_channels });
+        }
+        self
+    }
+
+    /// Number of the rows that repeat the one before them under sample and hold; `None` where chance explains them.
+    pub(super) fn counted_repeats(&self) -> Option<u64> {
+        let counts = self.repeat_counts();
+        (counts.cause() == Some(RepeatCause::SampleAndHold)).then(|| counts.repeats())
+    }
+
+    /// Channels that repeat their value more often than their noise explains.
+    fn slow_channels(&self) -> Vec<String> {
+        let counts = self.repeat_counts();
+        let slow = self.channels.iter().enumerate().filter(|(c, _)| counts.is_slow(*c));
+        slow.map(|(_, channel)| channel.clone()).collect()
+    }
+
+    /// Counts over the pairs of consecutive rows of one contact.
+    fn repeat_counts(&self) -> RepeatCounts {
+        let channels = self.channels.len();
+        let mut counts = RepeatCounts::new(channels);
+        if self.rows.iter().any(|row| row.reading.len() != channels) {
+            return counts;
+        }
+        for c in 0..channels {
+            let values = self.rows.iter().map(|row| row.reading[c]);
+            // Without a repeat there is nothing to explain.
+            if self.rows.windows(2).any(|pair| pair[0].reading[c] == pair[1].reading[c]) {
+                counts.set_range(c, values);
+            }
+        }
+        let stretches = Stretches::new(&self.rows);
+        for pair in self.rows.windows(2) {
+            if stretches.hold_pair(&pair[0], &pair[1]) {
+                counts.add(&pair[0].reading, &pair[1].reading);
+            } else {
+                counts.end_stretch();
+            }
+        }
+        counts
+    }
+}
+
+fn is_same_contact(a: &Row, b: &Row) -> bool {
+    let place = |row: &Row| row.touches().then_some(row.position);
+    place(a) == place(b) && a.force_n == b.force_n && a.nuisances == b.nuisances
+}
+
+/// Rule by which two consecutive rows belong to one stretch: one place, and a force and nuisance coordinates that change no more than usual.
+///
+/// The bound is the median change of consecutive rows of one place. It is 0 for rows with nominal forces and the scatter of measured ones.
+struct Stretches {
+    /// False where no two consecutive rows have one place, as of a sliding contact: all rows are one stretch.
+    by_place: bool,
+    force_n: f64,
+    nuisances: Vec<f64>,
+}
+
+impl Stretches {
+    fn new(rows: &[Row]) -> Self {
+        let pairs = || rows.windows(2).map(|pair| (&pair[0], &pair[1])).filter(|(a, b)| is_one_place(a, b));
+        let usual = |change: &dyn Fn(&Row, &Row) -> f64| {
+            median(pairs().map(|(a, b)| change(a, b)).collect()).unwrap_or_default()
+        };
+        let nuisances = rows.iter().map(|row| row.nuisances.len()).max().unwrap_or_default();
+        Self {
+            by_place: pairs().next().is_some(),
+            force_n: usual(&force_change),
+            nuisances: (0..nuisances).map(|i| usual(&|a, b| nuisance_change(a, b, i))).collect(),
+        }
+    }
+
+    fn hold_pair(&self, a: &Row, b: &Row) -> bool {
+        let usual = |(i, bound): (usize, &f64)| nuisance_change(a, b, i) <= *bound;
+        !self.by_place
+            || is_one_place(a, b)
+                && force_change(a, b) <= self.force_n
+                && self.nuisances.iter().enumerate().all(usual)
+    }
+}
+
+fn is_one_place(a: &Row, b: &Row) -> bool {
+    a.touches() == b.touches() && (!a.touches() || a.position == b.position)
+}
+
+fn force_change(a: &Row, b: &Row) -> f64 {
+    match (a.force_n, b.force_n) {
+        (Some(a), Some(b)) => (a - b).abs(),
+        _ => 0.0,
+    }
+}
+
+fn nuisance_change(a: &Row, b: &Row, index: usize) -> f64 {
+    match (a.nuisances.get(index), b.nuisances.get(index)) {
+        (Some(a), Some(b)) => (a - b).abs(),
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests;

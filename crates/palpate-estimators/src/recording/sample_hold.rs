@@ -1,0 +1,309 @@
+//! Detection of readings that a logger repeats because it is faster than its sensors (sample and hold).
+//!
+//! A sample-and-hold logger repeats all channels together; a coarse converter repeats each channel by chance. Three tests over pairs of
+//! consecutive readings of one contact tell them apart, each with the false-alarm rate [`FALSE_ALARM`].
+//!
+//! 1. *Size of changes.* Rounded Gaussian noise that often changes by 3 resolution steps or more rarely repeats a value. A likelihood-ratio
+//!    test compares the counts of repeats, of changes below and of changes from 2.5 steps on with the best rounded Gaussian distribution.
+//! 2. *Coincidence of changes.* Of n pairs channel c changes in d_c, some channel in u. With independent channels
+//!    P(U ≤ u) ≤ C(n, u) · Π_c C(u, d_c) / C(n, d_c), the union bound over the sets of u pairs. Fisher's method combines the stretches.
+//!    Repeats by chance follow from the pairs that change, as the unseen follow in capture–recapture with independent captures.
+//! 3. *No change at all.* Noise of half a resolution step or more repeats a value with a probability of at most 0.52. Repeats that
+//!    never differ say that the noise is less; they add no information, whatever causes them.
+
+use palpate_numerics::{bisect, chi_squared_critical_value, chi_squared_survival, normal_cdf};
+
+/// Probability, by stated policy, that a recording of independent channels is taken for sample and hold.
+pub const FALSE_ALARM: f64 = 1e-6;
+
+/// Changes of each channel whose sizes are kept.
+const SIZES: usize = 256;
+/// Two values that differ by less than this share of their size differ by the rounding of their arithmetic only.
+const ROUNDING: f64 = 1e-12;
+/// Changes from this many resolution steps on are large: between 2 and 3 steps.
+const LARGE_STEPS: f64 = 2.5;
+/// Repeats by chance may make up this share of all repeats, by policy: with more the channels are coarse.
+const CHANCE_SHARE: f64 = 0.5;
+
+/// Cause of repeated readings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RepeatCause {
+    /// The logger is faster than its sensors.
+    SampleAndHold,
+    /// No repeat differs from the reading before it: the noise is less than the resolution, or the logger is faster than its sensors.
+    NoChange,
+}
+
+/// Counts of repeated values over pairs of consecutive readings, from which the cause of repeats follows.
+///
+/// Pairs come in stretches: the readings of one contact, or of the untouched surface.
+///
+/// ```
+/// use palpate_estimators::recording::{RepeatCause, RepeatCounts};
+///
+/// let mut counts = RepeatCounts::new(2);
+/// let values = [[1.03, 7.31], [1.41, 7.02], [0.87, 7.66], [1.22, 7.19], [0.65, 7.48], [1.07, 6.91], [1.36, 7.27], [0.93, 7.09]];
+/// let logged: Vec<[f64; 2]> = values.iter().flat_map(|value| [*value; 5]).collect();
+/// logged.windows(2).for_each(|pair| counts.add(&pair[0], &pair[1]));
+/// assert_eq!((counts.repeats(), counts.cause()), (32, Some(RepeatCause::SampleAndHold)));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct RepeatCounts {
+    channels: Vec<Changes>,
+    stretch: Stretch,
+    /// Sum over the finished stretches.
+    finished: Coincidence,
+    pairs: u64,
+    repeats: u64,
+}
+
+/// Changes of one channel.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Changes {
+    count: u64,
+    /// Pairs in which it stays at the end of its range, where it may be clipped.
+    clipped: u64,
+    /// Least and greatest value, where they are known.
+    range: Option<[f64; 2]>,
+    /// Sizes of the first changes.
+    sizes: Vec<f64>,
+    /// Smallest difference of two values that are not equal; 0 before the first.
+    step: f64,
+}
+
+/// Counts of the pairs of one stretch.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Stretch {
+    pairs: u64,
+    /// Pairs in which some channel changes.
+    changed: u64,
+    /// Pairs in which each channel changes.
+    changes: Vec<u64>,
+}
+
+/// Evidence of stretches that changes of channels coincide.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Coincidence {
+    /// Stretches in which something changes.
+    stretches: usize,
+    /// Sum of ln of their bounds of P(U ≤ u).
+    ln_probability: f64,
+    /// Pairs in which nothing changes.
+    repeats: f64,
+    /// Pairs in which nothing changes by chance, estimated.
+    chance: f64,
+}
+
+impl RepeatCounts {
+    /// Counts of so many channels, without any pair.
+    pub fn new(channels: usize) -> Self {
+        Self {
+            channels: vec![Changes::default(); channels],
+            stretch: Stretch::new(channels),
+            finished: Coincidence::default(),
+            pairs: 0,
+            repeats: 0,
+        }
+    }
+
+    /// Adds a pair of consecutive readings of one stretch; values beyond the number of channels are ignored.
+    pub fn add(&mut self, before: &[f64], after: &[f64]) {
+        let mut repeats = true;
+        let mut is_clipped = true;
+        for (c, (a, b)) in before.iter().zip(after).enumerate().take(self.channels.len()) {
+            if is_equal(*a, *b) {
+                let at_end = self.channels[c].is_at_end(*b);
+                self.channels[c].clipped += u64::from(at_end);
+                is_clipped &= at_end;
+            } else {
+                (repeats, is_clipped) = (false, false);
+                self.stretch.changes[c] += 1;
+                self.channels[c].add((a - b).abs());
+            }
+        }
+        self.pairs += 1;
+        if is_clipped {
+            return;
+        }
+        self.repeats += u64::from(repeats);
+        self.stretch.pairs += 1;
+        self.stretch.changed += u64::from(!repeats);
+    }
+
+    /// Ends a stretch: the next pair belongs to another contact.
+    pub fn end_stretch(&mut self) {
+        let channels = self.channels.len();
+        let stretch = std::mem::replace(&mut self.stretch, Stretch::new(channels));
+        self.finished = self.finished.plus(&stretch);
+    }
+
+    /// Sets the range and the resolution step of a channel from all its values, before the first pair.
+    ///
+    /// Repeats at the ends of the range are no evidence then: the channel may be clipped there.
+    pub fn set_range(&mut self, channel: usize, values: impl IntoIterator<Item = f64>) {
+        let mut values: Vec<f64> = values.into_iter().collect();
+        values.sort_by(f64::total_cmp);
+        let steps =
+            values.windows(2).filter(|pair| !is_equal(pair[0], pair[1])).map(|pair| pair[1] - pair[0]);
+        if let Some(changes) = self.channels.get_mut(channel) {
+            changes.step = steps.reduce(f64::min).unwrap_or_default();
+            changes.range = values.first().zip(values.last()).map(|(low, high)| [*low, *high]);
+        }
+    }
+
+    /// Number of pairs.
+    pub fn pairs(&self) -> u64 {
+        self.pairs
+    }
+
+    /// Number of pairs in which every channel repeats its value, some of them within their range.
+    pub fn repeats(&self) -> u64 {
+        self.repeats
+    }
+
+    /// Number of pairs in which this channel repeats its value within its range.
+    fn channel_repeats(&self, channel: usize) -> u64 {
+        self.pairs - self.channels.get(channel).map_or(0, |changes| changes.count + changes.clipped)
+    }
+
+    /// Cause of the repeated readings; `None` without repeats, and where chance explains them.
+    pub fn cause(&self) -> Option<RepeatCause> {
+        if self.repeats == 0 {
+            return None;
+        }
+        let varying = || (0..self.channels.len()).filter(|c| self.channels[*c].count > 0);
+        if varying().next().is_none() {
+            // 0.52^(pairs · channels) < false-alarm rate; a channel without any other value says nothing.
+            let live = self.channels.iter().filter(|changes| changes.step > 0.0).count();
+            let most = noisy_repeat_probability().ln() * self.repeats as f64 * live as f64;
+            return (most < FALSE_ALARM.ln()).then_some(RepeatCause::NoChange);
+        }
+        let held = varying().all(|c| self.is_slow(c)) || self.finished.plus(&self.stretch).is_certain();
+        held.then_some(RepeatCause::SampleAndHold)
+    }
+
+    /// True for a channel that repeats its value more often than rounded Gaussian noise with changes of its sizes does.
+    pub fn is_slow(&self, channel: usize) -> bool {
+        let Some(changes) = self.channels.get(channel) else { return false };
+        changes.exceed_rounding(self.channel_repeats(channel))
+    }
+}
+
+/// Probability that rounded Gaussian noise of half a step repeats a value, at most: differences of √2/2 steps.
+fn noisy_repeat_probability() -> f64 {
+    within_steps(0.5, std::f64::consts::FRAC_1_SQRT_2)
+}
+
+/// Probability that a Gaussian difference of this standard deviation in steps is less than `steps` in size.
+fn within_steps(steps: f64, sd: f64) -> f64 {
+    1.0 - 2.0 * normal_cdf(-steps / sd)
+}
+
+/// True for two readings of the same values in every channel.
+pub(super) fn is_same_reading(a: &[f64], b: &[f64]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| is_equal(*a, *b))
+}
+
+fn is_equal(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
+}
+
+impl Changes {
+    fn is_at_end(&self, value: f64) -> bool {
+        self.range.is_some_and(|ends| ends.iter().any(|end| is_equal(*end, value)))
+    }
+
+    fn add(&mut self, size: f64) {
+        self.count += 1;
+        self.step = if self.step > 0.0 { self.step.min(size) } else { size };
+        if self.sizes.len() < SIZES {
+            self.sizes.push(size);
+        }
+    }
+
+    /// The test of the size of changes.
+    fn exceed_rounding(&self, repeats: u64) -> bool {
+        if self.sizes.is_empty() || repeats == 0 {
+            return false;
+        }
+        let large = self.sizes.iter().filter(|size| **size > LARGE_STEPS * self.step).count();
+        let large_share = large as f64 / self.sizes.len() as f64;
+        // Fine noise: most changes are large.
+        if large_share <= 0.5 {
+            return false;
+        }
+        let changes = self.count as f64;
+        let counts = [repeats as f64, changes * (1.0 - large_share), changes * large_share];
+        let total: f64 = counts.iter().sum();
+        let ln_likelihood = |shares: [f64; 3]| -> f64 {
+            let terms = counts.iter().zip(shares).filter(|(count, _)| **count > 0.0);
+            terms.map(|(count, share)| count * share.max(f64::MIN_POSITIVE).ln()).sum()
+        };
+        let rounded = |sd: f64| {
+            let (same, small) = (within_steps(0.5, sd), within_steps(LARGE_STEPS, sd));
+            [same, small - same, 2.0 * normal_cdf(-LARGE_STEPS / sd)]
+        };
+        // Standard deviations of differences from 0.05 to 20,000 steps, 5 % apart.
+        let best = (0..265).map(|i| ln_likelihood(rounded(0.05 * 1.05_f64.powi(i)))).fold(f64::MIN, f64::max);
+        let ratio = 2.0 * (ln_likelihood(counts.map(|count| count / total)) - best);
+        // Chance, by the sizes of the changes alone.
+        let share_of = |sd: f64| rounded(sd)[2] / (1.0 - rounded(sd)[0]);
+        let sd = bisect((0.05, 2e4), 60, |sd| share_of(sd) < large_share);
+        let same = rounded(sd)[0];
+        let chance = changes * same / (1.0 - same);
+        ratio > chi_squared_critical_value(FALSE_ALARM, 1) && chance < CHANCE_SHARE * repeats as f64
+    }
+}
+
+impl Stretch {
+    fn new(channels: usize) -> Self {
+        Self { pairs: 0, changed: 0, changes: vec![0; channels] }
+    }
+
+    /// ln of the bound of P(U ≤ u), at most 0.
+    fn ln_probability(&self) -> f64 {
+        let (n, u) = (self.pairs as f64, self.changed as f64);
+        let channels = self.changes.iter().map(|d| ln_choose(u, *d as f64) - ln_choose(n, *d as f64));
+        (ln_choose(n, u) + channels.sum::<f64>()).min(0.0)
+    }
+
+    /// Pairs without a change that independent channels make, from the pairs with one: u (1 − Z) / Z, where Z is the probability that
+    /// some channel changes and Π_c (1 − Z d_c / u) = 1 − Z; infinite where no two channels change together.
+    fn chance_repeats(&self) -> f64 {
+        let u = self.changed as f64;
+        let shares: Vec<f64> = self.changes.iter().map(|d| *d as f64 / u).collect();
+        let unchanged = |z: f64| shares.iter().map(|share| 1.0 - share * z).product::<f64>();
+        if shares.iter().sum::<f64>() <= 1.0 {
+            return f64::INFINITY;
+        }
+        let z = bisect((0.0, 1.0), 60, |z| z == 0.0 || unchanged(z) < 1.0 - z);
+        u * (1.0 - z) / z
+    }
+}
+
+impl Coincidence {
+    fn plus(self, stretch: &Stretch) -> Self {
+        if stretch.changed == 0 {
+            return self;
+        }
+        let repeats = (stretch.pairs - stretch.changed) as f64;
+        Self {
+            stretches: self.stretches + 1,
+            ln_probability: self.ln_probability + stretch.ln_probability(),
+            repeats: self.repeats + repeats,
+            chance: self.chance + stretch.chance_repeats().min(repeats),
+        }
+    }
+
+    /// Fisher's method over the stretches, and few repeats by chance.
+    fn is_certain(&self) -> bool {
+        self.stretches > 0
+            && self.chance < CHANCE_SHARE * self.repeats
+            && chi_squared_survival(-2.0 * self.ln_probability, 2 * self.stretches) < FALSE_ALARM
+    }
+}
+
+/// ln of the number of ways to choose k of n.
+fn ln_choose(n: f64, k: f64) -> f64 {
+    libm::lgamma(n + 1.0) - libm::lgamma(k + 1.0) - libm::lgamma(n - k + 1.0)
+}
