@@ -44,6 +44,9 @@ pub struct Columns {
     /// Times in which nothing touched.
     #[serde(default)]
     pub untouched_times: Vec<TimeSpan>,
+    /// Greatest force, either way, of a row in which nothing touches, in newtons; `None` to find it from the rows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_zero_n: Option<f64>,
     /// Separator of the fields; `None` for what the first line tells.
     #[serde(default)]
     pub separator: Option<Separator>,
@@ -204,6 +207,7 @@ impl Columns {
             time: None,
             untouched: None,
             untouched_times: Vec::new(),
+            force_zero_n: None,
             separator: None,
             decimal: None,
         }
@@ -276,6 +280,7 @@ impl Columns {
             time: None,
             untouched: None,
             untouched_times: Vec::new(),
+            force_zero_n: None,
             separator: None,
             decimal: None,
         }

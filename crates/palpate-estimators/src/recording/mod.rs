@@ -6,26 +6,33 @@ mod csv_error;
 mod csv_in;
 mod csv_out;
 mod dialect;
+mod grouping;
 mod heading;
+mod lines;
 mod marks;
+mod notes;
 mod table;
+mod text;
 mod timestamp;
 mod untouched;
 mod warnings;
+mod zero_force;
 
 pub use columns::{Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn};
 pub use csv_error::{CsvError, CsvProblem, Place};
 pub use csv_in::{
-    LineParser, LineProgress, ReadingParser, Schema, TimedParser, TimedReading, TimedRecording, read,
-    read_pair,
+    LineParser, ReadingParser, Schema, TimedParser, TimedReading, TimedRecording, read, read_pair,
 };
 pub use csv_out::{csv_row, write, write_as, write_timed};
-pub use dialect::Dialect;
+pub use dialect::{Dialect, Notes, Preamble};
 pub use heading::Heading;
+pub use lines::LineProgress;
 pub use marks::{Decimal, Separator};
 pub use table::{Content, Table, TableColumn};
+pub use text::TextDecoder;
 pub use untouched::{TimeSpan, TimeSpanError};
 pub use warnings::Warning;
+pub use zero_force::ZeroForce;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -256,5 +263,7 @@ impl Recording {
     }
 }
 
+#[cfg(test)]
+mod file_tests;
 #[cfg(test)]
 mod tests;

@@ -3,10 +3,11 @@
 use std::fmt;
 
 use super::{Recording, Row};
-use palpate_mechanics::units::Quantity;
+use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::units::{Dimension, Quantity};
 use palpate_numerics::median;
 
-/// Something about a channel that the bench's owner should look at.
+/// Something about a channel or the forces that the bench's owner should look at.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
     /// The channel has the same value in every row.
@@ -63,6 +64,20 @@ pub enum Warning {
         /// All the pairs.
         pairs: usize,
     },
+    /// No force is positive, although the rows have forces.
+    NoPositiveForce {
+        /// The least force, in newtons.
+        least_n: f64,
+    },
+    /// Some forces are negative and others positive.
+    NegativeForces {
+        /// Rows of a negative force.
+        rows: usize,
+        /// Rows in which something touches.
+        of: usize,
+        /// The least force, in newtons.
+        least_n: f64,
+    },
 }
 
 const SATURATED_SHARE: f64 = 0.1;
@@ -82,7 +97,21 @@ impl Recording {
     pub fn warnings(&self) -> Vec<Warning> {
         let repeats = self.repeats();
         let channels = (0..self.channels.len()).filter_map(|index| Channel::new(self, index));
-        channels.flat_map(|channel| channel.warnings(&repeats)).collect()
+        channels.flat_map(|channel| channel.warnings(&repeats)).chain(self.force_warning()).collect()
+    }
+
+    /// The warning of forces of which some or all have the wrong sign.
+    fn force_warning(&self) -> Option<Warning> {
+        let forces_n: Option<Vec<f64>> = self.rows.iter().map(|row| row.force_n).collect();
+        let forces_n = forces_n.filter(|forces_n| !forces_n.is_empty())?;
+        let least_n = forces_n.iter().copied().fold(f64::INFINITY, f64::min);
+        let rows = forces_n.iter().filter(|force_n| **force_n < 0.0).count();
+        let of = forces_n.iter().filter(|force_n| **force_n != 0.0).count();
+        match (rows, forces_n.iter().any(|force_n| *force_n > 0.0)) {
+            (_, false) => Some(Warning::NoPositiveForce { least_n }),
+            (0, true) => None,
+            (rows, true) => Some(Warning::NegativeForces { rows, of, least_n }),
+        }
     }
 
     /// Row indices in groups of two or more with the same position and force, each in the order of recording.
@@ -216,11 +245,7 @@ impl<'a> Channel<'a> {
     }
 
     fn quantity(&self, value: f64) -> Quantity {
-        let dimension = self
-            .recording
-            .kinds
-            .get(self.index)
-            .map_or(palpate_mechanics::units::Dimension::None, |k| k.dimension());
+        let dimension = self.recording.kinds.get(self.index).map_or(Dimension::None, |kind| kind.dimension());
         Quantity { value, dimension }
     }
 }
@@ -241,9 +266,11 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Dead { channel, value } => {
+                let value = value.in_full();
                 write!(f, "channel `{channel}` reads {value} in every row: is it connected?")
             }
             Self::Saturated { channel, at, rows, of } => {
+                let at = at.in_full();
                 write!(
                     f,
                     "channel `{channel}` is at {at}, its extreme, in {rows} of {of} rows: does it saturate?"
@@ -253,6 +280,21 @@ impl fmt::Display for Warning {
                 f,
                 "channel `{channel}` disagrees with its repeats in {rows} of {of} rows, most in row {worst_row}, by {deviation} where \
                  {spread} is usual"
+            ),
+            Self::NoPositiveForce { least_n: 0.0 } => f.write_str(
+                "the force is 0 in every row, so nothing touches: name another column as `force`, or none where no force was measured",
+            ),
+            Self::NoPositiveForce { least_n } => write!(
+                f,
+                "no force is greater than 0, and the least is {} N; a push is positive: change the sign of the column, or name \
+                 another one as `force`",
+                SensorKind::Reaction.unit().format_si(*least_n)
+            ),
+            Self::NegativeForces { rows, of, least_n } => write!(
+                f,
+                "the force is negative in {rows} of {of} presses, down to {} N; a push is positive: check sign and zero of the \
+                 force column",
+                SensorKind::Reaction.unit().format_si(*least_n)
             ),
             Self::Drift { channel, change, agreeing, pairs } => write!(
                 f,
