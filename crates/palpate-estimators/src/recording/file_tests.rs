@@ -2,6 +2,7 @@
 
 use super::*;
 use palpate_mechanics::surface::Extent;
+use proptest::prelude::*;
 
 /// Presses of a strip with four channels; the other files have the same numbers.
 const BASE: &str = include_str!("../../tests/data/field/base.csv");
@@ -295,4 +296,42 @@ fn tables_of_loggers_are_the_plain_table() {
     assert_eq!(heading(b"Versuch;A;B\nOrt;S1;S2\nmm;mV;mV\n1;2;3\n4;5;6\n"), "Ort [mm]");
     assert_eq!(heading(b"Ort  S1  S2\n1 2 3\n4 5 6\n"), "Ort");
     assert_eq!(heading(b"Ort|S1|S2\n1,5|2|3\n4|5|6\n"), "Ort");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn no_file_of_a_logger_panics(
+        text in "(Position,Force,S1,S2,S3,S4\n)?(X|S1|mm|\\[N\\]|Total|NaN|1\\.003|503|-0,01|0\\.5|5|3|;|\\||\t| |,|,|,|\n|\n|\"){0,80}"
+    ) {
+        let numbered = columns(1, 2, [3, 4, 1, 2]);
+        let headless = Columns { header: Header::Absent, ..numbered.clone() };
+        for columns in [titled(), numbered, headless] {
+            if let Ok((recording, _)) = read_as(&columns, text.as_bytes()) {
+                let _ = recording.warnings();
+            }
+            let mut parser = ReadingParser::new("stdin", &columns);
+            let lines = text.split_inclusive('\n').map(|line| parser.parse_line(line.as_bytes()));
+            let _ = lines.count();
+            let _ = parser.progress().unfound();
+        }
+        let _ = Table::read("press.csv", text.as_bytes(), None, None);
+    }
+
+    #[test]
+    fn forces_of_any_size_are_no_fault(forces in proptest::collection::vec((any::<bool>(), -300..300_i32, 0..9_u8), 1..40)) {
+        let row = |(i, (is_placed, exponent, place)): (usize, &(bool, i32, u8))| {
+            let place = if *is_placed { (10 * place).to_string() } else { String::new() };
+            let sign = if i % 3 == 0 { "-" } else { "" };
+            format!("{place},{sign}1e{exponent},{i},2,{},4\n", exponent * i as i32)
+        };
+        let rows: String = forces.iter().enumerate().map(row).collect();
+        let text = format!("position_mm,force_n,S1,S2,S3,S4\n{rows}");
+        if let Ok((recording, _)) = read_as(&own(), text.as_bytes()) {
+            let zero = recording.provenance.dialects.iter().find_map(|dialect| dialect.zero_force);
+            let untouched = recording.rows.iter().filter(|row| !row.touches()).count();
+            prop_assert_eq!(untouched, zero.map_or(0, |zero| zero.rows));
+        }
+    }
 }

@@ -59,13 +59,17 @@ impl Groupings {
 
     /// Takes the number `text` of a column into account.
     pub fn insert(&mut self, column: usize, text: &str, place: impl FnOnce() -> Place) {
-        let magnitude = text.replace(',', ".").trim_start_matches(['+', '-']).parse::<f64>().unwrap_or(0.0);
-        let is_whole = text.trim_start_matches(['+', '-']).bytes().all(|byte| byte.is_ascii_digit());
+        let digits = text.trim_start_matches(['+', '-']);
         let is_grouped = looks_grouped(text);
         // Whoever separates thousands separates all of them.
-        if !(is_grouped || is_whole && magnitude < 1000.0) {
-            self.is_decided = true;
-        }
+        self.is_decided |=
+            !is_grouped && (digits.len() > 3 || !digits.bytes().all(|byte| byte.is_ascii_digit()));
+        let mark = if is_grouped { 1000.0 } else { 1.0 };
+        let whole = digits
+            .bytes()
+            .filter(u8::is_ascii_digit)
+            .fold(0.0, |value, digit| 10.0 * value + f64::from(digit - b'0'));
+        let magnitude = whole / mark;
         if self.is_decided || magnitude == 0.0 {
             return;
         }

@@ -80,7 +80,8 @@ pub(super) fn kind_of(
     let values = filled.iter().filter(|i| is_value(texts[**i])).count();
     let is_missing = |i: &usize| texts[*i].starts_with("#") || among(texts[*i], &MISSING);
     let is_total = |i: &usize| !had_words(*i) && among(texts[*i].trim_end_matches([':', '.']), &TOTALS);
-    if words.is_some() && filled.iter().any(is_total) {
+    // Remarks on the right of a row may have the same words.
+    if words.is_some() && filled.first().is_some_and(is_total) {
         return LineKind::Note;
     }
     if filled.iter().any(is_missing) {

@@ -159,6 +159,9 @@ impl Table {
     }
 }
 
+/// Lines that show the shape of a file, several times as many as a preamble has.
+const MOST_LINES: usize = 1000;
+
 /// Shape of a file: its separator, whether it has a header, and the line of its heading, or of its first row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Shape {
@@ -173,6 +176,9 @@ impl Shape {
         let mut texts = Texts::default();
         for (i, bytes) in file.lines().enumerate() {
             texts.push(i + 1, bytes, file.source)?;
+            if texts.lines.len() == MOST_LINES {
+                break;
+            }
         }
         let Some((first_line, first)) = texts.lines.first() else {
             return Err(CsvProblem::Empty.in_file(file.source));

@@ -37,7 +37,7 @@ impl fmt::Display for ZeroForce {
         let newton = |force_n: f64| SensorKind::Reaction.unit().format_si(force_n);
         write!(
             f,
-            "{} rows of {} to {} N taken as untouched: the channels read no contact (`force_zero = \"{} N\"` in [recording] decides)",
+            "{} rows of {} to {} N taken as untouched, as their forces are noise (`force_zero = \"{} N\"` in [recording] decides)",
             self.rows,
             newton(self.low_n),
             newton(self.high_n),

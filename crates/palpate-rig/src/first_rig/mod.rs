@@ -439,6 +439,9 @@ impl FirstRig {
                 "if it is a channel, add it to them; if readings depend on it, say it as `nuisance`"
                     .to_owned()
             }
+            Left::OneOfForces => {
+                format!("it may be the force, as others may: say force = {}", self.key(column))
+            }
             Left::Second => "another column has the role that its name says".to_owned(),
             Left::Unit(unit) => format!("palpate does not read it in `{unit}`; convert it"),
         };

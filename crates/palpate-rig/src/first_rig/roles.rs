@@ -200,6 +200,8 @@ pub(super) enum Left {
     Single,
     /// Another column has the role that its name suggests.
     Second,
+    /// Other columns may be the force as well.
+    OneOfForces,
     /// Of a unit in which the role that its name suggests is not read.
     Unit(String),
 }
@@ -246,7 +248,11 @@ impl Roles {
         // Separators at the ends of lines make columns that are no columns.
         let blank = |i: &usize| names[*i].words.is_empty() && table.columns[*i].content == Content::Empty;
         let left = (0..names.len()).filter(|i| !roles.contains(i) && !blank(i));
-        let left = left.map(|i| (i, guess.reason(i, force.is_some()))).collect();
+        let reason = |i: usize| match forces.contains(&i) {
+            true if force.is_none() => Left::OneOfForces,
+            _ => guess.reason(i, force.is_some()),
+        };
+        let left = left.map(|i| (i, reason(i))).collect();
         let many_forces = if forces.len() > 1 { forces } else { Vec::new() };
         Ok(Self { position, force, many_forces, time, nuisance: told.nuisance, untouched, channels, left })
     }
