@@ -163,7 +163,9 @@ fn a_stream_finds_its_heading_and_loses_no_line_in_silence() {
     let lines = LABVIEW.split_inclusive(|byte| *byte == b'\n');
     let readings = lines.filter_map(|line| parser.parse_line(line).unwrap()).count();
     assert_eq!(readings, 69);
-    assert!(parser.parse_line(b"boot").is_err());
+    for line in ["boot", "V", "Run\t2", "\t\t\t\t\t\tboot"] {
+        assert!(parser.parse_line(line.as_bytes()).is_err(), "{line}");
+    }
 
     let mut parser = ReadingParser::new("stdin", &titled());
     assert_eq!(parser.parse_line(b"S1,S2,S3,S5").unwrap(), None);
@@ -241,6 +243,14 @@ fn light_presses_are_no_untouched_rows() {
     }
     let (recording, said) = read_as(&own(), text.as_bytes()).unwrap();
     assert!(recording.rows.iter().all(Row::touches) && said.is_empty(), "{said}");
+}
+
+#[test]
+fn rows_without_a_header_are_all_rows() {
+    let numbered = Columns { header: Header::Absent, ..columns(1, 2, [3, 4, 5, 6]) };
+    let recording = read_as(&numbered, b"10,1,1,2,3,4,left\n10,1,1,2,3,4,left\n").unwrap().0;
+    assert_eq!(recording.rows.len(), 2);
+    assert!(read_as(&numbered, b"10,1,1,2,3,4\nTotal,1,1,2,3,4\n").is_err());
 }
 
 #[test]

@@ -316,9 +316,9 @@ impl<F> Body<F> {
         }
         let texts: Vec<&str> = cells.texts().collect();
         let is_below_heading = reading.header == Header::Present && self.words.is_none();
-        let kind = match (&self.words, reading.header) {
-            (None, Header::Absent) => LineKind::Row,
-            (words, _) => notes::kind_of(&texts, &self.heading, words.as_deref(), reading.origin),
+        let kind = match reading.header {
+            Header::Absent => LineKind::Row,
+            Header::Present => notes::kind_of(&texts, &self.heading, self.words.as_deref(), reading.origin),
         };
         match kind {
             LineKind::Units if is_below_heading && self.units.is_none() => {

@@ -87,7 +87,7 @@ pub(super) fn kind_of(
     if filled.iter().any(is_missing) {
         return LineKind::Row;
     }
-    if values == 0 && filled.iter().all(|i| is_unit(texts[*i])) {
+    if values == 0 && texts.len() >= heading.len() && filled.iter().all(|i| is_unit(texts[*i])) {
         return LineKind::Units;
     }
     let is_note = match (words, origin) {

@@ -524,6 +524,7 @@ impl FirstRig {
         };
         let mut warnings: Vec<String> = self.roles.left.iter().filter_map(left).collect();
         warnings.extend(self.warnings_of_headings());
+        warnings.extend(self.zero_force.map(|zero| zero.to_string()));
         warnings.extend(recording.warnings().iter().map(ToString::to_string));
         let positions = recording.distinct_positions().len();
         let enough = if self.sides.len() == 1 { 5 } else { 9 };
@@ -557,7 +558,16 @@ impl FirstRig {
         alike.sort_by_key(|columns| columns[0].1);
         let mut warnings: Vec<String> =
             alike.into_iter().map(|columns| self.warning_of_alike(columns)).collect();
-        if let [.., _] = self.roles.many_forces.as_slice() {
+        let is_unnamed = |column: &&usize| self.table.columns[**column].heading.is_empty();
+        let unnamed: Vec<String> =
+            self.roles.channels.iter().filter(is_unnamed).map(|column| (column + 1).to_string()).collect();
+        if !unnamed.is_empty() {
+            warnings.push(format!(
+                "columns without a heading are taken as channels by their numbers: {}",
+                unnamed.join(", ")
+            ));
+        }
+        if !self.roles.many_forces.is_empty() {
             let forces: Vec<String> = self.roles.many_forces.iter().map(|column| self.key(*column)).collect();
             warnings.push(format!(
                 "columns {} may all be the force, and none was taken; say which with --force",
@@ -574,7 +584,7 @@ impl FirstRig {
         let numbers = numbers.join(", ");
         let first = heading(&indices[0]);
         if indices.iter().all(|column| heading(column) == first) {
-            format!("columns {numbers} are all named `{first}`; the rig names them by their numbers")
+            format!("columns {numbers} share the heading `{first}`; the rig names them by their numbers")
         } else {
             let names: Vec<String> = indices.iter().map(|column| format!("`{}`", heading(column))).collect();
             format!("columns {numbers} are named alike but for case or blanks: {}", names.join(", "))

@@ -553,6 +553,10 @@ impl Guess<'_> {
     fn channels(&self, taken: &[usize]) -> Vec<usize> {
         let mut columns = self.columns(taken, |name| !is_no_channel(name));
         columns.retain(|i| self.varies(*i) && !self.counts(*i));
+        if columns.is_empty() {
+            let unnamed = (0..self.names.len()).filter(|i| !taken.contains(i) && !self.names[*i].has_heading);
+            return unnamed.filter(|i| self.varies(*i) && !self.counts(*i)).collect();
+        }
         let families: Vec<usize> =
             columns.iter().copied().filter(|i| self.in_family(&self.names[*i])).collect();
         if families.is_empty() {
