@@ -181,7 +181,7 @@ impl<'a> Cells<'a> {
     /// The finite number in field `index`, in SI units.
     pub fn number(&mut self, index: usize, unit: Unit) -> Result<f64, CsvError> {
         let value = self.read(index, |text, dialect| dialect.number(text, unit))?;
-        if !self.groupings.is_decided() {
+        if !self.groupings.is_decided(index) {
             let (line, text) = (self.line, self.text);
             let Field { value, span } = &self.fields[index];
             let place = || Place { line, column: index + 1, text: text.to_owned(), span: span.clone() };

@@ -149,6 +149,9 @@ fn marks_that_may_be_of_thousands_are_refused_with_both_readings() {
         of(',', &["0", "1.003", "1.998"]),
     ];
     insta::assert_snapshot!(cases.join("\n"));
+    // A decimal mark in another column does not settle it.
+    let beside = said(&titled(), &format!("{HEADING}\n10.5,1,503,1,1,1\n10.5,1,1.003,1,1,1\n"));
+    assert!(beside.contains("may be 1003 or 1.003"), "{beside}");
     let point = Columns { decimal: Some(Decimal::Point), ..titled() };
     let text = format!("{HEADING}\n10,1,503,1,1,1\n10,1,1.003,1,1,1\n");
     assert_eq!(read_as(&point, text.as_bytes()).unwrap().0.rows[1].reading[0], 1.003);

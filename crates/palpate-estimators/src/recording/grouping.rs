@@ -19,17 +19,19 @@ pub(super) fn looks_grouped(number: &str) -> bool {
 
 /// The numbers of a file's columns, as far as their marks may separate thousands.
 ///
-/// One number that can only have a decimal mark, such as `0.5`, decides for the file. While there is none, the marks of a column are in
+/// One number that can only have a decimal mark, such as `0.5`, decides for its column. While there is none, the marks of a column are in
 /// doubt where numbers with a mark stand beside whole ones below 1000, and all of them span no more decades as thousands than as decimals.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Groupings {
-    is_decided: bool,
+    /// Whether the decimal mark is said, so that nothing is in doubt.
+    is_said: bool,
     columns: Vec<Grouping>,
 }
 
 /// The numbers of one column.
 #[derive(Clone, Debug, Default)]
 struct Grouping {
+    is_decided: bool,
     /// Whole numbers without a mark, other than 0: the least and the greatest magnitude, and the text of one.
     whole: Option<(f64, f64, String)>,
     /// The same of numbers that look grouped, with the place of the first.
@@ -49,34 +51,30 @@ pub(super) struct Place {
 impl Groupings {
     /// Those of a file; without a doubt where its decimal mark is said.
     pub fn new(decimal: Option<Decimal>) -> Self {
-        Self { is_decided: decimal.is_some(), columns: Vec::new() }
+        Self { is_said: decimal.is_some(), columns: Vec::new() }
     }
 
-    /// Whether no number can be in doubt any more.
-    pub fn is_decided(&self) -> bool {
-        self.is_decided
+    /// Whether no number of a column can be in doubt any more.
+    pub fn is_decided(&self, column: usize) -> bool {
+        self.is_said || self.columns.get(column).is_some_and(|column| column.is_decided)
     }
 
     /// Takes the number `text` of a column into account.
     pub fn insert(&mut self, column: usize, text: &str, place: impl FnOnce() -> Place) {
-        let digits = text.trim_start_matches(['+', '-']);
-        let is_grouped = looks_grouped(text);
-        // Whoever separates thousands separates all of them.
-        self.is_decided |=
-            !is_grouped && (digits.len() > 3 || !digits.bytes().all(|byte| byte.is_ascii_digit()));
-        let mark = if is_grouped { 1000.0 } else { 1.0 };
-        let whole = digits
-            .bytes()
-            .filter(u8::is_ascii_digit)
-            .fold(0.0, |value, digit| 10.0 * value + f64::from(digit - b'0'));
-        let magnitude = whole / mark;
-        if self.is_decided || magnitude == 0.0 {
-            return;
-        }
         if self.columns.len() <= column {
             self.columns.resize(column + 1, Grouping::default());
         }
-        let Grouping { whole, grouped } = &mut self.columns[column];
+        let Grouping { is_decided, whole, grouped } = &mut self.columns[column];
+        let digits = text.trim_start_matches(['+', '-']);
+        let is_grouped = looks_grouped(text);
+        // Whoever separates thousands separates all of them.
+        *is_decided |= !is_grouped && (digits.len() > 3 || !digits.bytes().all(|byte| byte.is_ascii_digit()));
+        let value = |value, digit| 10.0 * value + f64::from(digit - b'0');
+        let number = digits.bytes().filter(u8::is_ascii_digit).fold(0.0, value);
+        let magnitude = if is_grouped { number / 1000.0 } else { number };
+        if *is_decided || magnitude == 0.0 {
+            return;
+        }
         if is_grouped {
             let (low, high, _) = grouped.get_or_insert_with(|| (magnitude, magnitude, place()));
             (*low, *high) = (low.min(magnitude), high.max(magnitude));
@@ -91,7 +89,7 @@ impl Groupings {
 
     /// The error of the first column in doubt.
     pub fn doubt(&self, source: &str) -> Option<CsvError> {
-        if self.is_decided {
+        if self.is_said {
             return None;
         }
         self.columns.iter().find_map(|column| column.doubt(source))
@@ -99,12 +97,15 @@ impl Groupings {
 
     /// The error of this column, where it is in doubt.
     pub fn doubt_in(&self, column: usize, source: &str) -> Option<CsvError> {
-        self.columns.get(column).filter(|_| !self.is_decided)?.doubt(source)
+        self.columns.get(column).filter(|_| !self.is_said)?.doubt(source)
     }
 }
 
 impl Grouping {
     fn doubt(&self, source: &str) -> Option<CsvError> {
+        if self.is_decided {
+            return None;
+        }
         let ((low, high, beside), (least, greatest, place)) = (self.whole.as_ref()?, self.grouped.as_ref()?);
         let ratio = |factor: f64| high.max(greatest * factor) / low.min(least * factor);
         if ratio(1000.0) > ratio(1.0) {
