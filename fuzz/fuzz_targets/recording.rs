@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use palpate_estimators::recording::{LineParser, ReadingParser};
+use palpate_estimators::recording::{Columns, Header, LineParser, ReadingParser, TextDecoder, read};
 use palpate_rig::Rig;
 use std::sync::LazyLock;
 
@@ -20,4 +20,19 @@ fuzz_target!(|bytes: &[u8]| {
     for line in bytes.split_inclusive(|byte| *byte == b'\n') {
         let _ = parser.parse_line(line);
     }
+    let _ = parser.progress().unfound();
+    // Columns by their numbers below a heading, with forces: preambles, units, totals, forces that are 0 but for noise.
+    let channels = 3..3 + RIG.setup.layout().len();
+    let columns = Columns { header: Header::Present, ..Columns::along(1, channels).force(2) };
+    let _ = read("fuzz", bytes, &RIG.setup.schema(&columns));
+    // UTF-16 in any chunks is that in one.
+    let whole = decoded(bytes, bytes.len().max(1));
+    assert_eq!(decoded(bytes, 3), whole);
 });
+
+fn decoded(bytes: &[u8], length: usize) -> Vec<u8> {
+    let mut decoder = TextDecoder::default();
+    let mut text: Vec<u8> = bytes.chunks(length).flat_map(|chunk| decoder.decode(chunk)).collect();
+    text.extend(decoder.finish());
+    text
+}

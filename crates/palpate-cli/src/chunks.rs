@@ -68,11 +68,13 @@ impl Chunks {
         }
     }
 
-    /// All bytes of a text up to its end. No text that palpate reads has a zero byte, and a device that never ends has.
+    /// All bytes of a text up to its end. No text but UTF-16 with a byte-order mark has a zero byte, and a device that never ends has.
     pub fn read_to_end(mut self) -> Result<Vec<u8>, Failure> {
         let mut bytes = Vec::new();
         while let Some(chunk) = self.next()? {
-            if let Some(at) = chunk.iter().position(|byte| *byte == 0) {
+            let begins: &[u8] = if bytes.is_empty() { &chunk } else { &bytes };
+            let is_utf16 = begins.starts_with(b"\xff\xfe") || begins.starts_with(b"\xfe\xff");
+            if let Some(at) = chunk.iter().position(|byte| *byte == 0).filter(|_| !is_utf16) {
                 let complaint = format!("{} is no text: byte {} is 0", self.name, bytes.len() + at + 1);
                 return Err(Complaint::new(complaint).help("save it as UTF-8").into());
             }

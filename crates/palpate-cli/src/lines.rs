@@ -6,7 +6,9 @@ use crate::input;
 use crate::json::object;
 use crate::output;
 use crate::remark::remark;
-use palpate_estimators::recording::{Column, Columns, CsvError, Dialect, Header, LineParser, ReadingParser};
+use palpate_estimators::recording::{
+    Column, Columns, CsvError, Dialect, Header, LineParser, ReadingParser, TextDecoder,
+};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::units::format_count;
 use std::error::Error;
@@ -17,6 +19,7 @@ pub struct Lines {
     /// Number of lines read so far.
     pub count: u64,
     source: Chunks,
+    decoder: TextDecoder,
     /// The last chunk, and how much of it has been taken.
     chunk: (Vec<u8>, usize),
     line: Vec<u8>,
@@ -53,6 +56,7 @@ impl Lines {
         Ok(Self {
             count: 0,
             source,
+            decoder: TextDecoder::default(),
             chunk: (Vec::new(), 0),
             line: Vec::new(),
             after_cr: false,
@@ -79,7 +83,7 @@ impl Lines {
             if *taken == chunk.len() {
                 let next = self.source.next().map_err(|failure| stopped_after(failure, self.count))?;
                 let Some(next) = next else { break };
-                self.chunk = (next, 0);
+                self.chunk = (self.decoder.decode(&next), 0);
                 continue;
             }
             if std::mem::take(&mut self.after_cr) && chunk[*taken] == b'\n' {
@@ -182,7 +186,10 @@ impl<P: LineParser> Parsing<P> {
 
     /// The values of the next line, `Some(None)` of one that gives nothing; `None` after the last line.
     pub fn next(&mut self, lines: &mut Lines) -> Result<Option<Option<P::Parsed>>, Failure> {
-        let Some(line) = lines.next()? else { return Ok(None) };
+        let Some(line) = lines.next()? else {
+            let unfound = self.parser.progress().unfound();
+            return unfound.map_or(Ok(None), |error| Err(input::csv_complaint(&error).into()));
+        };
         match line.map(|line| self.parser.parse_line(line)) {
             Ok(Ok(parsed)) => {
                 if parsed.is_some() {

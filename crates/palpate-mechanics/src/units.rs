@@ -258,12 +258,35 @@ fn rounded(value: f64, decimals: usize) -> String {
 }
 
 impl fmt::Display for Quantity {
-    /// Six significant digits in the largest unit that keeps the number at 1 or above.
+    /// Six significant digits in the largest unit that keeps the number at 1 or above; of a plain number all digits before the point.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rounded: f64 = format!("{:.5e}", self.value).parse().unwrap_or(self.value);
+        let whole = self.value.abs() >= 1e5 && self.value.abs() < 1e15 && self.dimension == Dimension::None;
+        let rounded = if whole {
+            self.value.round()
+        } else {
+            format!("{:.5e}", self.value).parse().unwrap_or(self.value)
+        };
+        f.write_str(&self.in_readable_unit(rounded))
+    }
+}
+
+impl Quantity {
+    /// All digits in the largest unit that keeps the number at 1 or above, for values that a file says.
+    ///
+    /// ```
+    /// use palpate_mechanics::units::{Dimension, Quantity};
+    ///
+    /// let saturated = Quantity { value: 8388607.0, dimension: Dimension::None };
+    /// assert_eq!(saturated.in_full(), "8388607");
+    /// ```
+    pub fn in_full(&self) -> String {
+        self.in_readable_unit(self.value)
+    }
+
+    fn in_readable_unit(&self, value: f64) -> String {
         match readable_unit(*self) {
-            Some(unit) => write!(f, "{} {unit}", unit.format_si(rounded)),
-            None => f.write_str(&Unit::NONE.format_si(rounded)),
+            Some(unit) => format!("{} {unit}", unit.format_si(value)),
+            None => Unit::NONE.format_si(value),
         }
     }
 }

@@ -13,7 +13,7 @@ use palpate_mechanics::units::{Dimension, Unit, UnitError};
 
 use crate::document::At;
 use crate::error::{Place, RigError, RigProblem};
-use crate::values::{Count, Length, Positive, Quantity};
+use crate::values::{Count, Force, Length, NotNegative, Positive, Quantity};
 
 /// Columns of a CSV file by their roles; what is not said is as in the recordings that palpate itself writes.
 #[derive(Clone, Debug, Deserialize)]
@@ -42,6 +42,9 @@ pub(crate) struct RecordingKeys {
     pub force: Option<At<ColumnKey>>,
     /// The unit of forces; N unless said otherwise.
     pub force_unit: Option<At<String>>,
+    /// Greatest force, either way, of a row in which nothing touches, as load cells never read exactly 0; found from the rows unless said
+    /// otherwise.
+    pub force_zero: Option<NotNegative<Force>>,
     /// Column of a coordinate that readings depend on, is known here, and is unknown in use, or a list of several; the first is looked for
     /// with the position.
     pub nuisance: Option<At<NuisanceKeys>>,
@@ -135,6 +138,7 @@ impl At<RecordingKeys> {
             decimal: self.decimal,
             time: self.value("time", &self.time, &self.time_unit, time_unit)?,
             untouched: self.untouched.as_ref().map(|column| column.column()),
+            force_zero_n: self.force_zero.map(|force| force.si),
             untouched_times: self.untouched_times.iter().flatten().map(|span| span.0).collect(),
             repeated_readings: self.repeated_readings,
         })

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 /// Look at a recording and write a first rig for it, its guesses as comments.
 ///
-/// A column is named by its heading, with or without the unit behind it, or by its number where the file has no header.
+/// A column is named by its heading, with or without the unit behind it, or by its number from 1 where no heading is that number.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The recording: positions, channels, and forces where they were measured
@@ -46,10 +46,10 @@ pub struct Arguments {
     /// Column of a channel; may be repeated
     #[arg(long, value_name = "NAME")]
     channel: Vec<String>,
-    /// Separator of the fields: comma, semicolon or tab [default: what the file tells]
+    /// Separator of the fields: comma, semicolon, tab, pipe or blanks [default: that of the file]
     #[arg(long, value_name = "WORD", value_parser = separator)]
     separator: Option<Separator>,
-    /// Decimal mark: point or comma [default: what the file tells]
+    /// Decimal mark: point or comma [default: that of the file]
     #[arg(long, value_name = "WORD", value_parser = decimal)]
     decimal: Option<Decimal>,
 }

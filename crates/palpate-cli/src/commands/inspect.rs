@@ -24,15 +24,17 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.file;
-    let text = input::read_text(path)?;
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let extension = extension.to_ascii_lowercase();
     let mut fitted = None;
-    let lines = match extension.to_ascii_lowercase().as_str() {
+    let is_table = ["csv", "txt", "tsv", "dat", "lvm"].contains(&extension.as_str());
+    let text = if is_table { String::new() } else { input::read_text(path)? };
+    let lines = match extension.as_str() {
+        _ if is_table => csv(path, &input::read_bytes(path)?, arguments.rig.as_deref())?,
         "toml" if text.lines().any(|line| line.trim_start().starts_with("[[arm]]")) => {
             input::parse_study(&path.display().to_string(), &text)?.in_words()
         }
         "toml" => input::read_rig(path)?.in_words(),
-        "csv" => csv(path, &text, arguments.rig.as_deref())?,
         _ => description::locator(fitted.insert(input::parse_locator(path, &text)?)),
     };
     if !arguments.json {
@@ -48,18 +50,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Description of a CSV file: with a rig as its recording, otherwise as a table.
-fn csv(path: &Path, text: &str, rig: Option<&Path>) -> Result<Vec<String>, Failure> {
-    let Some(rig) = rig else { return table(path, text) };
+fn csv(path: &Path, bytes: &[u8], rig: Option<&Path>) -> Result<Vec<String>, Failure> {
+    let Some(rig) = rig else { return table(path, bytes) };
     let setup = input::read_rig(rig)?.setup;
     let recording = input::read_recording(&setup, path)?;
     Ok(description::recording(&recording, &setup))
 }
 
-fn table(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
+fn table(path: &Path, bytes: &[u8]) -> Result<Vec<String>, Failure> {
+    let text = String::from_utf8_lossy(bytes);
     let comments = text.lines().take_while(|line| line.starts_with('#'));
     let mut lines: Vec<String> =
         comments.map(|line| line.trim_start_matches(['#', ' ']).to_owned()).collect();
-    let table = Table::read(&path.display().to_string(), text.as_bytes(), None, None);
+    let table = Table::read(&path.display().to_string(), bytes, None, None);
     let Table { header, columns, rows } = table.map_err(|error| input::csv_complaint(&error))?;
     lines.push(format!("a table of {rows} rows"));
     lines.push(match header {
@@ -69,7 +72,7 @@ fn table(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
         }
         Header::Absent => format!("{} columns without names", columns.len()),
     });
-    lines.extend(repeats(&path.display().to_string(), text));
+    lines.extend(repeats(&path.display().to_string(), bytes));
     lines.push(
         "--rig RIG reads it as a recording of that rig; palpate init writes a first rig for it".to_owned(),
     );
@@ -77,9 +80,9 @@ fn table(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
 }
 
 /// Rows that repeat the reading before them, where the table is a recording by its headings.
-fn repeats(name: &str, text: &str) -> Option<String> {
-    let first = FirstRig::guess(name, text.as_bytes(), &Hints::default()).ok()?;
+fn repeats(name: &str, bytes: &[u8]) -> Option<String> {
+    let first = FirstRig::guess(name, bytes, &Hints::default()).ok()?;
     let rig = Rig::from_toml(&first.to_toml(name)).ok()?;
-    let recording = rig.setup.read_recording(name, text.as_bytes()).ok()?;
+    let recording = rig.setup.read_recording(name, bytes).ok()?;
     recording.provenance.repeats.filter(|repeats| repeats.left_out > 0).map(|repeats| repeats.to_string())
 }

@@ -229,3 +229,51 @@ fn inspect_reads_a_spreadsheet_export_as_init_does() {
         "{told}"
     );
 }
+
+/// Presses of a strip as loggers and spreadsheets write them.
+fn field_file(name: &str) -> Vec<u8> {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../palpate-estimators/tests/data/field");
+    fs::read(data.join(name)).unwrap()
+}
+
+#[test]
+fn init_and_fit_say_alike_what_they_skip_and_doubt() {
+    let names = ["dup.csv", "units-row.csv", "press.lvm", "utf16.txt", "zero-noise.csv", "negforce.csv"];
+    let said_of = |name: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        fs::write(folder.join(name), field_file(name)).unwrap();
+        let of_init = stderr(folder, &["init", name, "-o", "rig.toml"]);
+        let rig = fs::read_to_string(folder.join("rig.toml")).unwrap();
+        let keys = rig.lines().filter(|line| line.starts_with("force_zero") || line.starts_with("channels"));
+        let keys: Vec<&str> = keys.map(|line| line.split('#').next().unwrap_or_default().trim()).collect();
+        let of_fit = stderr(folder, &["inspect", name, "--rig", "rig.toml"]);
+        format!("{name}: {}\n{of_init}then\n{of_fit}", keys.join(", "))
+    };
+    insta::assert_snapshot!(names.map(said_of).join("\n"));
+}
+
+#[test]
+fn a_locator_of_one_file_locates_its_other_forms() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for name in ["press.lvm", "utf16.txt", "units-row.csv"] {
+        fs::write(folder.join(name), field_file(name)).unwrap();
+    }
+    said(&run(folder, &["init", "press.lvm", "-o", "rig.toml"]));
+    said(&run(folder, &["fit", "rig.toml", "--data", "press.lvm", "-o", "locator.json"]));
+    let located = |name: &str| {
+        let text = said(&run(folder, &["locate", "locator.json", name]));
+        // The number of the line is another one below a preamble.
+        let rows: Vec<String> =
+            text.lines().skip(1).map(|line| line.split_once(',').unwrap().1.to_owned()).collect();
+        assert_eq!(rows.len(), 69, "{text}");
+        rows
+    };
+    assert_eq!(located("press.lvm"), located("utf16.txt"));
+    assert_eq!(located("press.lvm"), located("units-row.csv"));
+
+    fs::write(folder.join("no-heading.csv"), "S1,S2\nbeside,others\n").unwrap();
+    let complaint = complained(&run(folder, &["locate", "locator.json", "no-heading.csv"]), 2);
+    assert!(complaint.contains("there is no column `S3`; there are `S1`, `S2`"), "{complaint}");
+}

@@ -3,6 +3,7 @@
 use super::columns::{Column, Header, ValueColumn};
 use super::csv_error::{CsvError, CsvProblem};
 use super::dialect::Dialect;
+use super::grouping::{Groupings, Place};
 use super::heading::Heading;
 use super::marks::Separator;
 use super::timestamp::Clock;
@@ -17,15 +18,47 @@ pub(super) struct Cells<'a> {
     text: &'a str,
     fields: Vec<Field<'a>>,
     dialect: &'a mut Dialect,
+    groupings: &'a mut Groupings,
 }
 
 impl<'a> Cells<'a> {
     /// Cuts line number `line` of a file of this dialect.
-    pub fn parse(line: usize, text: &'a str, dialect: &'a mut Dialect) -> Result<Self, CsvError> {
+    pub fn parse(
+        line: usize,
+        text: &'a str,
+        dialect: &'a mut Dialect,
+        groupings: &'a mut Groupings,
+    ) -> Result<Self, CsvError> {
         match split(text, dialect.separator) {
-            Ok(fields) => Ok(Self { line, text, fields, dialect }),
+            Ok(fields) => Ok(Self { line, text, fields, dialect, groupings }),
             Err(open) => Err(CsvProblem::OpenQuote.in_line(&dialect.source, line, text.to_owned(), open)),
         }
+    }
+
+    /// Fields of these texts, which no line has.
+    pub fn of_texts(texts: &'a [String], dialect: &'a mut Dialect, groupings: &'a mut Groupings) -> Self {
+        let field = |text: &'a String| Field { value: Cow::Borrowed(text), span: 0..0 };
+        Self { line: 0, text: "", fields: texts.iter().map(field).collect(), dialect, groupings }
+    }
+
+    /// Dialect of the file so far.
+    pub fn dialect(&self) -> &Dialect {
+        self.dialect
+    }
+
+    /// Takes note that this line has the units of the columns.
+    pub fn note_units(&mut self) {
+        self.dialect.units_line = Some(self.line);
+    }
+
+    /// Takes note that this line is no row.
+    pub fn note_line(&mut self) {
+        self.dialect.note_line(self.line, self.text);
+    }
+
+    /// The error of a number of this line whose mark may be one of thousands.
+    pub fn check_grouping(&self, index: usize) -> Result<(), CsvError> {
+        self.groupings.doubt_in(index, &self.dialect.source).map_or(Ok(()), Err)
     }
 
     /// Number of fields.
@@ -51,6 +84,9 @@ impl<'a> Cells<'a> {
             _ if beyond.is_some_and(|beyond| beyond.iter().all(|field| field.value.is_empty())) => Ok(()),
             found if beyond.is_some() && self.looks_cut_at_decimals() => {
                 Err(self.line_error(CsvProblem::CutDecimals { found, expected }))
+            }
+            found if self.dialect.separator == Separator::Blanks => {
+                Err(self.line_error(CsvProblem::RowLengthBetweenBlanks { found, expected }))
             }
             found => Err(self.line_error(CsvProblem::RowLength { found, expected })),
         }
@@ -144,7 +180,14 @@ impl<'a> Cells<'a> {
 
     /// The finite number in field `index`, in SI units.
     pub fn number(&mut self, index: usize, unit: Unit) -> Result<f64, CsvError> {
-        self.read(index, |text, dialect| dialect.number(text, unit))
+        let value = self.read(index, |text, dialect| dialect.number(text, unit))?;
+        if !self.groupings.is_decided(index) {
+            let (line, text) = (self.line, self.text);
+            let Field { value, span } = &self.fields[index];
+            let place = || Place { line, column: index + 1, text: text.to_owned(), span: span.clone() };
+            self.groupings.insert(index, value, place);
+        }
+        Ok(value)
     }
 
     /// Whether nothing is in field `index`.
@@ -207,6 +250,9 @@ pub(super) struct Field<'a> {
 /// Cuts `line` at its separators, except within double quotes; a doubled quote within quotes is a quote (RFC 4180, but
 /// a field ends with its line, so that every row has one line number). The error is what follows a quote that stays open.
 pub(super) fn split(line: &str, separator: Separator) -> Result<Vec<Field<'_>>, Range<usize>> {
+    if separator == Separator::Blanks {
+        return split_at_blanks(line);
+    }
     let (bytes, separator) = (line.as_bytes(), separator.byte());
     let is_space = |b: &&u8| matches!(b, b' ' | b'\t') && **b != separator;
     let mut fields = Vec::new();
@@ -214,9 +260,11 @@ pub(super) fn split(line: &str, separator: Separator) -> Result<Vec<Field<'_>>, 
     loop {
         let opening = start + bytes[start..].iter().take_while(is_space).count();
         let end = if bytes.get(opening) == Some(&b'"') {
-            end_of_field(bytes, closing_quote(bytes, opening).ok_or(opening..bytes.len())?, separator)
+            end_of_field(bytes, closing_quote(bytes, opening).ok_or(opening..bytes.len())?, |b| {
+                b == separator
+            })
         } else {
-            end_of_field(bytes, opening, separator)
+            end_of_field(bytes, opening, |b| b == separator)
         };
         fields.push(field(line, start..end));
         if end == bytes.len() {
@@ -226,8 +274,41 @@ pub(super) fn split(line: &str, separator: Separator) -> Result<Vec<Field<'_>>, 
     }
 }
 
-fn end_of_field(bytes: &[u8], from: usize, separator: u8) -> usize {
-    from + bytes[from..].iter().take_while(|b| **b != separator).count()
+/// Cuts `line` at its runs of blanks, except within double quotes. A unit in brackets belongs to the name before it: `Force [N]` is one
+/// field, `[mm] [N]` are two.
+fn split_at_blanks(line: &str) -> Result<Vec<Field<'_>>, Range<usize>> {
+    let bytes = line.as_bytes();
+    let is_blank = |b: u8| matches!(b, b' ' | b'\t');
+    let is_unit = |text: &str| text.starts_with(['[', '(']) && text.ends_with([']', ')']);
+    let mut fields: Vec<Field<'_>> = Vec::new();
+    let mut start = 0;
+    loop {
+        start += bytes[start..].iter().take_while(|b| is_blank(**b)).count();
+        if start == bytes.len() {
+            break;
+        }
+        let from = match bytes[start] {
+            b'"' => closing_quote(bytes, start).ok_or(start..bytes.len())?,
+            _ => start,
+        };
+        let end = end_of_field(bytes, from, is_blank);
+        let next = field(line, start..end);
+        match fields.last_mut() {
+            Some(name) if is_unit(&next.value) && !name.value.ends_with([']', ')']) => {
+                *name = field(line, name.span.start..end);
+            }
+            _ => fields.push(next),
+        }
+        start = end;
+    }
+    if fields.is_empty() {
+        fields.push(field(line, 0..0));
+    }
+    Ok(fields)
+}
+
+fn end_of_field(bytes: &[u8], from: usize, is_separator: impl Fn(u8) -> bool) -> usize {
+    from + bytes[from..].iter().take_while(|b| !is_separator(**b)).count()
 }
 
 /// The first byte after the quoted text that begins at `opening`.

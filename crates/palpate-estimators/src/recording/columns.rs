@@ -45,6 +45,9 @@ pub struct Columns {
     /// Times in which nothing touched.
     #[serde(default)]
     pub untouched_times: Vec<TimeSpan>,
+    /// Greatest force, either way, of a row in which nothing touches, in newtons; `None` to find it from the rows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_zero_n: Option<f64>,
     /// Separator of the fields; `None` for what the first line tells.
     #[serde(default)]
     pub separator: Option<Separator>,
@@ -208,6 +211,7 @@ impl Columns {
             time: None,
             untouched: None,
             untouched_times: Vec::new(),
+            force_zero_n: None,
             separator: None,
             decimal: None,
             repeated_readings: RepeatedReadings::Auto,
@@ -281,6 +285,7 @@ impl Columns {
             time: None,
             untouched: None,
             untouched_times: Vec::new(),
+            force_zero_n: None,
             separator: None,
             decimal: None,
             repeated_readings: RepeatedReadings::Auto,

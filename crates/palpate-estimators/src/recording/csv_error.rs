@@ -53,7 +53,7 @@ pub enum CsvProblem {
     NotText,
     /// Several separators are in the first line, and more than one of them gives the columns.
     #[error(
-        "fields may be separated by {first} or by {second}; say which as `separator` in [recording], \"comma\", \"semicolon\" or \"tab\""
+        "fields may be separated by {first} or by {second}; say which as `separator` in [recording], \"comma\", \"semicolon\", \"tab\", \"pipe\" or \"blanks\""
     )]
     ManySeparators {
         /// A separator that gives the columns.
@@ -91,7 +91,9 @@ pub enum CsvProblem {
         count: usize,
     },
     /// Two columns have the name of one that is needed.
-    #[error("columns {first} and {second} are both named `{name}`")]
+    #[error(
+        "columns {first} and {second} are both named `{name}`; name the column by its number, {first} or {second}"
+    )]
     DuplicateColumn {
         /// The name.
         name: String,
@@ -103,6 +105,14 @@ pub enum CsvProblem {
     /// A row has more or fewer fields than the header (or the first row).
     #[error("the row has {found} fields; it must have {expected}")]
     RowLength {
+        /// Number of fields in the row.
+        found: usize,
+        /// Number of fields that it must have.
+        expected: usize,
+    },
+    /// A row between whose fields are blanks has more or fewer fields than the header.
+    #[error("the row has {found} fields; it must have {expected}: between blanks a field cannot be empty")]
+    RowLengthBetweenBlanks {
         /// Number of fields in the row.
         found: usize,
         /// Number of fields that it must have.
@@ -132,6 +142,20 @@ pub enum CsvProblem {
     DoubtfulNumber {
         /// The field.
         text: String,
+    },
+    /// Numbers of a column that are plausible both with a decimal mark and with separators of thousands.
+    #[error(
+        "`{text}` beside `{beside}` may be {} or {}; write all numbers without thousands marks for the first, or say \
+         `decimal = \"{}\"` in [recording] for the second",
+        text.replace([',', '.'], ""),
+        text.replace(',', "."),
+        if text.contains(',') { "comma" } else { "point" }
+    )]
+    DoubtfulThousands {
+        /// The number with a mark.
+        text: String,
+        /// A whole number of the same column.
+        beside: String,
     },
     /// A number has another decimal mark than those before it.
     #[error(

@@ -2,12 +2,15 @@
 
 use std::io::Read;
 
-use super::cells::{Cells, split};
+use super::cells::Cells;
 use super::columns::{Column, Columns, Frame, Header, Need, PositionColumns, ValueColumn};
 use super::csv_error::{CsvError, CsvProblem};
-use super::dialect::{Dialect, windows_1252};
-use super::marks::{Decimal, Separator};
+use super::dialect::Dialect;
+use super::lines::{LineProgress, Lines, Reading};
+use super::notes::Origin;
+use super::text::TextDecoder;
 use super::timestamp::Clock;
+use super::zero_force::{self, Sample};
 use super::{Recording, Row, sha256_hex};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -41,10 +44,11 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
         Ok((contact, ChannelFields::find(head, columns)?, TimeField::find(head, columns)?))
     };
     let mut clock = Clock::default();
-    let (rows, dialect) = file.rows(columns, find, |cells, (contact, channels, time)| {
+    let (rows, mut dialect) = file.rows(columns, find, |cells, (contact, channels, time)| {
         let time_s = time.read(cells, &mut clock)?;
-        Ok(Row { reading: channels.reading(cells)?, ..contact.row(cells, schema, time_s)? })
+        Ok(contact.row(cells, schema, time_s)?.with_reading(channels.reading(cells)?))
     })?;
+    let rows = settle_forces(rows, columns, &mut dialect)?;
     schema.check_untouched_times(source, &rows)?;
     Ok(schema.recording(source, rows, vec![file.digest], [dialect]))
 }
@@ -71,7 +75,7 @@ pub fn read_pair(
         |cells, (channels, time)| Ok((channels.reading(cells)?, time.read(cells, &mut clock)?)),
     )?;
     let mut times_s = reading_rows.iter().map(|(_, time_s)| *time_s);
-    let (contact_rows, contact_dialect) = contacts.rows(
+    let (contact_rows, mut contact_dialect) = contacts.rows(
         columns,
         |head| ContactFields::find(head, columns),
         |cells, contact| contact.row(cells, schema, times_s.next().flatten()),
@@ -81,7 +85,8 @@ pub fn read_pair(
         return Err(problem.in_file(contacts.source));
     }
     let rows = reading_rows.into_iter().zip(contact_rows);
-    let rows: Vec<Row> = rows.map(|((reading, _), contact)| Row { reading, ..contact }).collect();
+    let rows = rows.map(|((reading, _), contact)| contact.with_reading(reading)).collect();
+    let rows = settle_forces(rows, columns, &mut contact_dialect)?;
     schema.check_untouched_times(readings.source, &rows)?;
     let digests = vec![readings.digest, contacts.digest];
     Ok(schema.recording(&source, rows, digests, [reading_dialect, contact_dialect]))
@@ -127,11 +132,51 @@ impl Schema<'_> {
     }
 }
 
+/// A row as it is written, while it is open which forces are 0 but for noise.
+#[derive(Debug)]
+struct OpenRow {
+    row: Row,
+    has_position: bool,
+    /// The error of the row where its force is not 0.
+    refusal: Option<Box<CsvError>>,
+}
+
+impl OpenRow {
+    fn with_reading(mut self, reading: Vec<f64>) -> Self {
+        self.row.reading = reading;
+        self
+    }
+
+    /// The row, if its force is what it says.
+    fn settled(self) -> Result<Row, CsvError> {
+        self.refusal.map_or(Ok(self.row), |error| Err(*error))
+    }
+}
+
+/// The rows, with those untouched whose force is 0 but for noise: as the columns say, or as the rows show.
+fn settle_forces(rows: Vec<OpenRow>, columns: &Columns, dialect: &mut Dialect) -> Result<Vec<Row>, CsvError> {
+    if columns.force_zero_n.is_none() {
+        let samples = rows.iter().map(|open| Sample { row: &open.row, has_position: open.has_position });
+        dialect.zero_force = zero_force::recognise(&samples.collect::<Vec<_>>());
+    }
+    let zero_n = dialect.zero_force.map_or(0.0, |zero| zero.zero_n);
+    let settle = |mut open: OpenRow| {
+        if open.row.force_n.is_some_and(|force_n| force_n.abs() <= zero_n) {
+            open.row.force_n = Some(0.0);
+            open.refusal = None;
+        }
+        open.settled()
+    };
+    rows.into_iter().map(settle).collect()
+}
+
 /// A file in memory.
 pub(super) struct File<'s> {
     pub source: &'s str,
+    /// In UTF-8, unless it is none.
     content: Vec<u8>,
     digest: String,
+    pub is_utf16: bool,
 }
 
 impl<'s> File<'s> {
@@ -139,7 +184,11 @@ impl<'s> File<'s> {
         let mut content = Vec::new();
         bytes.read_to_end(&mut content).map_err(|error| CsvProblem::Unreadable(error).in_file(source))?;
         let digest = sha256_hex(&content);
-        Ok(Self { source, content, digest })
+        let mut decoder = TextDecoder::default();
+        let mut text = decoder.decode(&content);
+        let is_utf16 = decoder.is_utf16();
+        text.extend(decoder.finish());
+        Ok(Self { source, content: text, digest, is_utf16 })
     }
 
     /// Its lines, with their ends, which some older spreadsheets write as carriage returns alone.
@@ -148,23 +197,30 @@ impl<'s> File<'s> {
         self.content.split_inclusive(move |byte| *byte == end)
     }
 
-    /// Every row, read by `row`, after `find` has found the columns in the first line; and how the table is written.
+    /// Every row, read by `row`, after `find` has found the columns in the heading; and the dialect.
     fn rows<C, T>(
         &self,
         columns: &Columns,
         find: impl Fn(&mut Cells) -> Result<C, CsvError>,
         mut row: impl FnMut(&mut Cells, &C) -> Result<T, CsvError>,
     ) -> Result<(Vec<T>, Dialect), CsvError> {
-        let (mut lines, mut rows) = (Lines::new(self.source, columns.separator, columns.decimal), Vec::new());
+        let mut lines = Lines::new(self.source, Reading::of(columns, Origin::File));
+        let mut rows = Vec::new();
         for line in self.lines() {
-            if let Some((mut cells, fields)) = lines.next(line, columns.header, &find)? {
+            if let Some((mut cells, fields)) = lines.next(line, &find)? {
                 rows.push(row(&mut cells, fields)?);
             }
         }
-        match lines.fields {
+        if let Some(error) = lines.unfound() {
+            return Err(error);
+        }
+        match lines.fields() {
             None => Err(CsvProblem::Empty.in_file(self.source)),
             Some(_) if rows.is_empty() => Err(CsvProblem::NoRows.in_file(self.source)),
-            Some(_) => Ok((rows, lines.dialect)),
+            Some(_) => {
+                let dialect = lines.into_dialect()?;
+                Ok((rows, Dialect { utf16: self.is_utf16, ..dialect }))
+            }
         }
     }
 }
@@ -207,7 +263,7 @@ impl ContactFields {
     }
 
     /// The row of a contact at a time, its reading still empty.
-    fn row(&self, cells: &mut Cells, schema: &Schema, time_s: Option<f64>) -> Result<Row, CsvError> {
+    fn row(&self, cells: &mut Cells, schema: &Schema, time_s: Option<f64>) -> Result<OpenRow, CsvError> {
         let position = self.position(cells)?;
         let is_marked = self.is_marked(cells, schema, time_s)?;
         let force_n = match self.force {
@@ -216,23 +272,50 @@ impl ContactFields {
             }
             _ => None,
         };
-        let is_found = position.is_none() && force_n.is_none_or(|force_n| force_n == 0.0);
+        let zero_n = schema.columns.force_zero_n.unwrap_or(0.0);
+        let is_zero = force_n.is_some_and(|force_n| force_n.abs() <= zero_n);
+        let is_found = position.is_none() && (force_n.is_none() || is_zero);
         if is_found && !is_marked {
             cells.count_without_position();
         }
-        if is_marked || is_found || force_n == Some(0.0) {
+        if is_marked || is_found || is_zero {
             return self.untouched_row(cells, schema, time_s, position);
         }
-        // The error of a field that is empty.
-        let position = position.map_or_else(|| self.coordinates(cells), Ok)?;
-        let extent = schema.extent;
-        if !extent.contains(position) {
-            let across = self.y.filter(|_| extent.contains(Position::along(position.x_m)));
-            return Err(cells.error(across.unwrap_or(self.x), CsvProblem::OffSurface { position, extent }));
+        let refusal = self.refusal(cells, schema, position)?;
+        if refusal.is_some() && force_n.is_some() {
+            let open = self.untouched_row(cells, schema, time_s, position)?;
+            return Ok(OpenRow { row: Row { force_n, ..open.row }, refusal: refusal.map(Box::new), ..open });
         }
+        let (None, Some(position)) = (&refusal, position) else {
+            return refusal.map_or_else(|| self.untouched_row(cells, schema, time_s, position), Err);
+        };
         let nuisances = self.nuisances(cells)?;
-        let force_n = force_n.or(schema.known_force_n);
-        Ok(Row { position, force_n, nuisances, time_s, reading: Vec::new() })
+        let row = Row {
+            position,
+            force_n: force_n.or(schema.known_force_n),
+            nuisances,
+            time_s,
+            reading: Vec::new(),
+        };
+        Ok(OpenRow { row, has_position: true, refusal: None })
+    }
+
+    /// The error of a press without a position, or with one off the surface.
+    fn refusal(
+        &self,
+        cells: &mut Cells,
+        schema: &Schema,
+        position: Option<Position>,
+    ) -> Result<Option<CsvError>, CsvError> {
+        let extent = schema.extent;
+        match position {
+            None => Ok(self.coordinates(cells).err()),
+            Some(position) if extent.contains(position) => Ok(None),
+            Some(position) => {
+                let across = self.y.filter(|_| extent.contains(Position::along(position.x_m)));
+                Ok(Some(cells.error(across.unwrap_or(self.x), CsvProblem::OffSurface { position, extent })))
+            }
+        }
     }
 
     /// The position; `None` where its fields are empty.
@@ -265,11 +348,14 @@ impl ContactFields {
         schema: &Schema,
         time_s: Option<f64>,
         position: Option<Position>,
-    ) -> Result<Row, CsvError> {
-        let position = position.filter(|position| schema.extent.contains(*position)).unwrap_or_default();
+    ) -> Result<OpenRow, CsvError> {
+        let position = position.filter(|position| schema.extent.contains(*position));
         let is_known = self.nuisances.iter().all(|(field, _)| !cells.is_empty(*field));
         let nuisances = if is_known { self.nuisances(cells)? } else { Vec::new() };
-        Ok(Row { position, force_n: Some(0.0), nuisances, time_s, reading: Vec::new() })
+        let has_position = position.is_some();
+        let position = position.unwrap_or_default();
+        let row = Row { position, force_n: Some(0.0), nuisances, time_s, reading: Vec::new() };
+        Ok(OpenRow { row, has_position, refusal: None })
     }
 }
 
@@ -295,146 +381,6 @@ impl TimeField {
     }
 }
 
-/// Lines of CSV as they come, and the fields that the first of them told.
-#[derive(Clone, Debug)]
-pub(super) struct Lines<F> {
-    /// Dialect of the lines, as far as they have told.
-    dialect: Dialect,
-    /// The separator, where the rig or a line before the header says it.
-    separator: Option<Separator>,
-    /// The text of the last line that was not UTF-8.
-    decoded: String,
-    /// Number of lines that have been read.
-    count: usize,
-    /// The fields, and how many a line has.
-    fields: Option<(F, usize)>,
-}
-
-impl<F> Lines<F> {
-    /// The lines of `source` from the first one, with the separator and the decimal mark that are said.
-    pub fn new(source: &str, separator: Option<Separator>, decimal: Option<Decimal>) -> Self {
-        let dialect = Dialect::new(source, decimal);
-        Self { dialect, separator, decoded: String::new(), count: 0, fields: None }
-    }
-
-    /// The cells of the next line and its fields, which `find` finds in the first one; `None` for the header, a blank line or a
-    /// comment (`#`).
-    pub fn next<'a>(
-        &'a mut self,
-        line: &'a [u8],
-        header: Header,
-        find: impl Fn(&mut Cells) -> Result<F, CsvError>,
-    ) -> Result<Option<(Cells<'a>, &'a F)>, CsvError> {
-        self.count += 1;
-        let Self { dialect, separator, decoded, count, fields } = self;
-        let Some(text) = written(line, *count, dialect, decoded)? else { return Ok(None) };
-        if fields.is_none()
-            && let Some(told) = Separator::told(text)
-        {
-            *separator = Some(told);
-            return Ok(None);
-        }
-        let (fields, width) = match fields {
-            Some(found) => found,
-            none => {
-                let separators = separator.map_or_else(|| separators(text, header), |told| vec![told]);
-                let Some(found) = first_line(*count, text, &separators, dialect, find)? else {
-                    return Ok(None);
-                };
-                let found = none.insert(found);
-                if header == Header::Present {
-                    return Ok(None);
-                }
-                found
-            }
-        };
-        let cells = Cells::parse(*count, text, dialect)?;
-        if cells.is_blank() {
-            return Ok(None);
-        }
-        cells.check_width(*width)?;
-        Ok(Some((cells, fields)))
-    }
-
-    /// The text of the next line, uncut; `None` where nothing is in it but separators, or a comment.
-    pub fn text<'a>(&'a mut self, line: &'a [u8]) -> Result<Option<&'a str>, CsvError> {
-        self.count += 1;
-        let text = written(line, self.count, &mut self.dialect, &mut self.decoded)?;
-        if let Some(told) = text.and_then(Separator::told) {
-            self.separator = Some(told);
-            return Ok(None);
-        }
-        let nothing = |c: char| c.is_whitespace() || matches!(c, '"' | ',' | ';');
-        Ok(text.filter(|text| !text.chars().all(nothing)))
-    }
-
-    /// Number of lines that have been read.
-    pub fn count(&self) -> usize {
-        self.count
-    }
-
-    /// The separator that was said, or that a line before the header has told.
-    pub fn separator(&self) -> Option<Separator> {
-        self.separator
-    }
-
-    /// The fields that the first line has told.
-    pub fn fields(&self) -> Option<&F> {
-        self.fields.as_ref().map(|(fields, _)| fields)
-    }
-}
-
-/// The separators by which the first line of a file may be meant to be cut.
-fn separators(text: &str, header: Header) -> Vec<Separator> {
-    let cuts = |separator: &Separator| split(text, *separator).is_ok_and(|fields| fields.len() > 1);
-    let mut separators: Vec<Separator> = Separator::ALL.into_iter().filter(cuts).collect();
-    // Between numbers, a comma beside semicolons or tabs stands before decimals.
-    if header == Header::Absent && separators.len() > 1 {
-        separators.retain(|separator| *separator != Separator::Comma);
-    }
-    if separators.is_empty() { vec![Separator::Comma] } else { separators }
-}
-
-/// The fields that `find` finds in the first line, and how many a line has, with the one separator that lets it; `None` for a line
-/// of empty fields.
-fn first_line<F>(
-    line: usize,
-    text: &str,
-    separators: &[Separator],
-    dialect: &mut Dialect,
-    find: impl Fn(&mut Cells) -> Result<F, CsvError>,
-) -> Result<Option<(F, usize)>, CsvError> {
-    let mut found: Option<(F, usize, Dialect)> = None;
-    let mut refused: Option<(usize, CsvError)> = None;
-    for separator in separators {
-        let mut dialect = Dialect { separator: *separator, ..dialect.clone() };
-        let mut cells = Cells::parse(line, text, &mut dialect)?;
-        if cells.is_blank() {
-            return Ok(None);
-        }
-        let width = cells.width();
-        match (find(&mut cells), &found) {
-            (Ok(fields), None) => found = Some((fields, width, dialect)),
-            (Ok(_), Some((.., other))) => {
-                let problem = CsvProblem::ManySeparators { first: other.separator, second: *separator };
-                return Err(cells.line_error(problem));
-            }
-            (Err(error), _) if refused.as_ref().is_none_or(|(most, _)| width > *most) => {
-                refused = Some((width, error));
-            }
-            (Err(_), _) => {}
-        }
-    }
-    match (found, refused) {
-        (Some((fields, width, found)), _) => {
-            *dialect = found;
-            Ok(Some((fields, width)))
-        }
-        (None, Some((_, error))) => Err(error),
-        (None, None) => Ok(None),
-    }
-}
-
 /// A parser of the lines of a stream, one by one, which finds its columns by the first of them.
 pub trait LineParser {
     /// The values of a line.
@@ -452,34 +398,8 @@ pub trait LineParser {
     fn progress(&mut self) -> &mut dyn LineProgress;
 }
 
-/// Progress of a [`LineParser`].
-pub trait LineProgress {
-    /// Counts a line that nobody reads, so that the lines after it have their numbers.
-    fn skip_line(&mut self);
-
-    /// True while no line yet has told which columns there are: an error now means that no line can be read.
-    fn awaits_columns(&self) -> bool;
-
-    /// Dialect of the lines, as far as they have told.
-    fn dialect(&self) -> &Dialect;
-}
-
-impl<F> LineProgress for Lines<F> {
-    fn skip_line(&mut self) {
-        self.count += 1;
-    }
-
-    fn awaits_columns(&self) -> bool {
-        self.fields.is_none()
-    }
-
-    fn dialect(&self) -> &Dialect {
-        &self.dialect
-    }
-}
-
 /// Turns lines of CSV into readings; only the channel columns need to be there.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct ReadingParser {
     lines: Lines<ChannelFields>,
     columns: Columns,
@@ -488,7 +408,7 @@ pub struct ReadingParser {
 impl ReadingParser {
     /// A parser for the lines of `source`, from the first one; the position and force columns need not be there.
     pub fn new(source: &str, columns: &Columns) -> Self {
-        Self { lines: Lines::new(source, columns.separator, columns.decimal), columns: columns.clone() }
+        Self { lines: Lines::new(source, Reading::of(columns, Origin::Stream)), columns: columns.clone() }
     }
 }
 
@@ -498,8 +418,8 @@ impl LineParser for ReadingParser {
 
     fn parse_line(&mut self, line: &[u8]) -> Result<Option<Vec<f64>>, CsvError> {
         let Self { lines, columns } = self;
-        let next = lines.next(line, columns.header, |head| ChannelFields::find(head, columns))?;
-        next.map(|(mut cells, channels)| channels.reading(&mut cells)).transpose()
+        let next = lines.next(line, |head| ChannelFields::find(head, columns))?;
+        next.map(|(mut cells, channels)| channels.checked_reading(&mut cells)).transpose()
     }
 
     fn progress(&mut self) -> &mut dyn LineProgress {
@@ -521,6 +441,13 @@ impl ChannelFields {
 
     fn reading(&self, cells: &mut Cells) -> Result<Vec<f64>, CsvError> {
         self.0.iter().map(|(index, unit)| cells.number(*index, *unit)).collect()
+    }
+
+    /// The reading of a stream, refused at once where a number may have a mark of thousands.
+    fn checked_reading(&self, cells: &mut Cells) -> Result<Vec<f64>, CsvError> {
+        let reading = self.reading(cells)?;
+        self.0.iter().try_for_each(|(index, _)| cells.check_grouping(*index))?;
+        Ok(reading)
     }
 }
 
@@ -585,13 +512,13 @@ struct TimedFields {
 impl<'a> TimedParser<'a> {
     /// A parser for the lines of `source`, from the first one.
     pub fn new(source: &str, schema: Schema<'a>) -> Self {
-        let Columns { separator, decimal, .. } = schema.columns;
-        Self { lines: Lines::new(source, *separator, *decimal), clock: Clock::default(), schema }
+        let lines = Lines::new(source, Reading::of(schema.columns, Origin::Stream));
+        Self { lines, clock: Clock::default(), schema }
     }
 
     /// Whether a column tells the time.
     pub fn has_time(&self) -> bool {
-        self.lines.fields.as_ref().is_some_and(|(fields, _)| fields.time.0.is_some())
+        self.lines.fields().is_some_and(|fields| fields.time.0.is_some())
     }
 }
 
@@ -600,11 +527,11 @@ impl LineParser for TimedParser<'_> {
 
     fn parse_line(&mut self, line: &[u8]) -> Result<Option<TimedReading>, CsvError> {
         let Self { lines, clock, schema } = self;
-        let next = lines.next(line, schema.columns.header, |head| TimedFields::find(head, schema))?;
+        let next = lines.next(line, |head| TimedFields::find(head, schema))?;
         let Some((mut cells, fields)) = next else { return Ok(None) };
         let time_s = fields.time.read(&mut cells, clock)?;
-        let row =
-            fields.contact.as_ref().map(|contact| contact.row(&mut cells, schema, time_s)).transpose()?;
+        let contact = fields.contact.as_ref();
+        let row = contact.map(|contact| contact.row(&mut cells, schema, time_s)?.settled()).transpose()?;
         // A force that nobody knows is not 0: something touched.
         let truth = row.map(|Row { position, force_n, .. }| Contact {
             position,
@@ -616,7 +543,7 @@ impl LineParser for TimedParser<'_> {
         };
         let second = fields.second.map(&mut second).transpose()?;
         let truth = truth.map(|first| std::iter::once(first).chain(second).collect());
-        Ok(Some(TimedReading { time_s, truth, reading: fields.channels.reading(&mut cells)? }))
+        Ok(Some(TimedReading { time_s, truth, reading: fields.channels.checked_reading(&mut cells)? }))
     }
 
     fn progress(&mut self) -> &mut dyn LineProgress {
@@ -644,35 +571,4 @@ impl TimedFields {
             channels: ChannelFields::find(head, columns)?,
         })
     }
-}
-
-/// Text of a line of bytes, without its end; `None` for a blank line or a comment. `decoded` holds the text where it is not
-/// UTF-8.
-fn written<'a>(
-    bytes: &'a [u8],
-    line: usize,
-    dialect: &mut Dialect,
-    decoded: &'a mut String,
-) -> Result<Option<&'a str>, CsvError> {
-    let text = match std::str::from_utf8(bytes).map_err(|error| (error, windows_1252(bytes))) {
-        Ok(text) => text,
-        Err((_, Some(text))) => {
-            dialect.windows_1252 = true;
-            *decoded = text;
-            decoded.as_str()
-        }
-        Err((error, None)) => {
-            let (good, bad) = bytes.split_at(error.valid_up_to());
-            let shown = |part| String::from_utf8_lossy(part).trim_end().replace(char::is_control, "\u{fffd}");
-            let (before, after) = (shown(good), shown(bad));
-            let mark = before.len()..before.len() + after.chars().next().map_or(0, char::len_utf8);
-            return Err(CsvProblem::NotText.in_line(&dialect.source, line, before + &after, mark));
-        }
-    };
-    let text = text.trim_end_matches(['\r', '\n']);
-    // Some spreadsheets begin a file with a byte-order mark.
-    let text = if line == 1 { text.strip_prefix('\u{feff}').unwrap_or(text) } else { text };
-    // A heading may be `#`, for the number of the row.
-    let is_comment = text.strip_prefix('#').is_some_and(|rest| !rest.starts_with([',', ';', '\t']));
-    Ok(Some(text).filter(|text| !text.trim().is_empty() && !is_comment))
 }

@@ -9,7 +9,9 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::csv_error::CsvProblem;
+use super::grouping::looks_grouped;
 use super::marks::{Decimal, Separator};
+use super::zero_force::ZeroForce;
 use palpate_mechanics::units::Unit;
 
 /// Dialect of a file, as far as its lines have told.
@@ -32,6 +34,47 @@ pub struct Dialect {
     /// Rows without a position, which were taken as untouched as nothing else said so.
     #[serde(default)]
     pub without_position: usize,
+    /// Whether the text was UTF-16.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub utf16: bool,
+    /// Lines above the heading that are no comments.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub preamble: Option<Preamble>,
+    /// Line of the row of units below the heading.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units_line: Option<usize>,
+    /// Lines below the heading that are no rows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub notes: Option<Notes>,
+    /// Rows whose force was taken as 0, as nothing said which forces are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zero_force: Option<ZeroForce>,
+}
+
+/// Lines above the heading of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Preamble {
+    /// Number of lines.
+    pub lines: usize,
+    /// Line of the heading.
+    pub heading_line: usize,
+}
+
+/// Lines below the heading that are no rows: the name of a run, a total, the heading again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Notes {
+    /// Number of lines.
+    pub lines: usize,
+    /// The first of them.
+    pub first_line: usize,
+    /// Its text, or the beginning of it.
+    pub text: String,
+}
+
+// serde asks with a reference.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_false(value: &bool) -> bool {
+    !*value
 }
 
 impl Dialect {
@@ -48,6 +91,21 @@ impl Dialect {
             ..Self::default()
         };
         *self == plain
+    }
+
+    /// Takes note of `lines` above the heading.
+    pub(super) fn note_preamble(&mut self, heading_line: usize, lines: usize) {
+        self.preamble = (lines > 0).then_some(Preamble { lines, heading_line });
+    }
+
+    /// Takes note of a line that is no row.
+    pub(super) fn note_line(&mut self, line: usize, text: &str) {
+        const MOST: usize = 40;
+        let shown = || text.chars().map(|c| if c.is_control() { ' ' } else { c });
+        let cut = if shown().count() > MOST { "…" } else { "" };
+        let text = || shown().take(MOST).collect::<String>().trim().to_owned() + cut;
+        let first = || Notes { lines: 0, first_line: line, text: text() };
+        self.notes.get_or_insert_with(first).lines += 1;
     }
 
     /// The finite number that `text` is, in SI units.
@@ -119,26 +177,35 @@ impl fmt::Display for Dialect {
         if self.windows_1252 {
             words.push("Windows-1252 text".to_owned());
         }
+        if self.utf16 {
+            words.push("UTF-16 text".to_owned());
+        }
+        if let Some(Preamble { lines, heading_line }) = self.preamble {
+            words
+                .push(format!("heading on line {heading_line}, {} above it skipped", counted(lines, "line")));
+        }
+        if let Some(line) = self.units_line {
+            words.push(format!("units on line {line}"));
+        }
+        if let Some(Notes { lines, first_line, text }) = &self.notes {
+            let first = if *lines == 1 { "" } else { "first " };
+            words.push(format!(
+                "{} without a reading skipped ({first}line {first_line}: `{text}`)",
+                counted(*lines, "line")
+            ));
+        }
         match self.without_position {
             0 => {}
             1 => words.push("1 row without a position, taken as untouched".to_owned()),
             count => words.push(format!("{count} rows without a position, taken as untouched")),
         }
+        words.extend(self.zero_force.map(|zero| zero.to_string()));
         f.write_str(&words.join(", "))
     }
 }
 
-/// Whether a number with one mark, a point or a comma, may be a whole number with a separator of thousands: `1,234`, not `0,234`.
-fn looks_grouped(number: &str) -> bool {
-    let digits = number.trim_start_matches(['+', '-']);
-    let all_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
-    digits.split_once([',', '.']).is_some_and(|(whole, rest)| {
-        (1..=3).contains(&whole.len())
-            && !whole.starts_with('0')
-            && rest.len() == 3
-            && all_digits(whole)
-            && all_digits(rest)
-    })
+fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Whether a text is a number but for several points or commas.
@@ -148,20 +215,6 @@ fn has_thousands(text: &str) -> bool {
     marks > 1
         && number.parse::<f64>().is_ok_and(f64::is_finite)
         && text.starts_with(|c: char| !",.".contains(c))
-}
-
-/// The text of a line that is not UTF-8, as Windows-1252; `None` where it has bytes that mean nothing there, or none that a text has.
-pub(super) fn windows_1252(bytes: &[u8]) -> Option<String> {
-    /// Characters of the bytes 0x80 to 0x9F; the space marks those that have none.
-    const HIGH: &str = "€ ‚ƒ„…†‡ˆ‰Š‹Œ Ž  ‘’“”•–—˜™š›œ žŸ";
-    bytes
-        .iter()
-        .map(|byte| match byte {
-            0 => None,
-            0x80..=0x9F => HIGH.chars().nth(usize::from(byte - 0x80)).filter(|c| *c != ' '),
-            _ => Some(char::from(*byte)),
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -214,13 +267,5 @@ mod tests {
             let mut dialect = Dialect { separator: Separator::Semicolon, ..Dialect::default() };
             assert_eq!(dialect.number(&number.replace('.', ","), mm).unwrap().to_bits(), plain.to_bits());
         }
-    }
-
-    #[test]
-    fn text_of_older_windows_is_read() {
-        assert_eq!(windows_1252(b"Stra\xdfe, 5 \xb5m, \x80").as_deref(), Some("Straße, 5 µm, €"));
-        assert_eq!(windows_1252(b"\x9fa\x81"), None);
-        assert_eq!(windows_1252(b"\xff\0a\0"), None);
-        assert_eq!(windows_1252(b"\x80\x8e\x91\x9e\x9f").as_deref(), Some("€Ž‘žŸ"));
     }
 }

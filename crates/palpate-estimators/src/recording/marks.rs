@@ -15,11 +15,18 @@ pub enum Separator {
     Semicolon,
     /// A tabulator.
     Tab,
+    /// `a|b`
+    Pipe,
+    /// One blank or several: fields cannot be empty.
+    Blanks,
 }
 
 impl Separator {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Comma, Self::Semicolon, Self::Tab];
+    pub const ALL: [Self; 5] = [Self::Comma, Self::Semicolon, Self::Tab, Self::Pipe, Self::Blanks];
+
+    /// Separators that are one character each.
+    pub(super) const MARKS: [Self; 4] = [Self::Comma, Self::Semicolon, Self::Tab, Self::Pipe];
 
     /// The word for it in rigs.
     pub const fn name(self) -> &'static str {
@@ -27,6 +34,8 @@ impl Separator {
             Self::Comma => "comma",
             Self::Semicolon => "semicolon",
             Self::Tab => "tab",
+            Self::Pipe => "pipe",
+            Self::Blanks => "blanks",
         }
     }
 
@@ -36,13 +45,15 @@ impl Separator {
             Self::Comma => b',',
             Self::Semicolon => b';',
             Self::Tab => b'\t',
+            Self::Pipe => b'|',
+            Self::Blanks => b' ',
         }
     }
 
     /// The separator in a line `sep=;`, by which some spreadsheets begin a file.
-    pub(super) fn told(line: &str) -> Option<Self> {
-        let told = line.trim_matches([' ', '"']).strip_prefix("sep=")?;
-        Self::ALL.into_iter().find(|separator| told.as_bytes() == [separator.byte()])
+    pub(super) fn from_declaration(line: &str) -> Option<Self> {
+        let mark = line.trim_matches([' ', '"']).strip_prefix("sep=")?;
+        Self::MARKS.into_iter().find(|separator| mark.as_bytes() == [separator.byte()])
     }
 }
 
@@ -52,6 +63,8 @@ impl fmt::Display for Separator {
             Self::Comma => "commas",
             Self::Semicolon => "semicolons",
             Self::Tab => "tabs",
+            Self::Pipe => "pipes",
+            Self::Blanks => "blanks",
         })
     }
 }
@@ -93,9 +106,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_before_the_header_may_tell_the_separator() {
-        assert_eq!(Separator::told("sep=;"), Some(Separator::Semicolon));
-        assert_eq!(Separator::told("\"sep=\t\""), Some(Separator::Tab));
-        assert_eq!(Separator::told("sep,Pl"), None);
+    fn reads_the_declaration_of_a_separator() {
+        assert_eq!(Separator::from_declaration("sep=;"), Some(Separator::Semicolon));
+        assert_eq!(Separator::from_declaration("\"sep=\t\""), Some(Separator::Tab));
+        assert_eq!(Separator::from_declaration("sep=|"), Some(Separator::Pipe));
+        assert_eq!(Separator::from_declaration("sep,Pl"), None);
     }
 }

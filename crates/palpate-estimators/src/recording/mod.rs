@@ -6,33 +6,40 @@ mod csv_error;
 mod csv_in;
 mod csv_out;
 mod dialect;
+mod grouping;
 mod heading;
+mod lines;
 mod marks;
+mod notes;
 mod repeat_watch;
 mod repeated_readings;
 mod sample_hold;
 mod table;
+mod text;
 mod timestamp;
 mod untouched;
 mod warnings;
+mod zero_force;
 
 pub use columns::{Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn};
 pub use csv_error::{CsvError, CsvProblem, Place};
 pub use csv_in::{
-    LineParser, LineProgress, ReadingParser, Schema, TimedParser, TimedReading, TimedRecording, read,
-    read_pair,
+    LineParser, ReadingParser, Schema, TimedParser, TimedReading, TimedRecording, read, read_pair,
 };
 pub use csv_out::{csv_row, write, write_as, write_timed};
-pub use dialect::Dialect;
+pub use dialect::{Dialect, Notes, Preamble};
 pub use heading::Heading;
+pub use lines::LineProgress;
 pub use marks::{Decimal, Separator};
 pub use repeat_watch::RepeatWatch;
 pub use repeated_readings::{RepeatedReadings, Repeats};
 pub use sample_hold::{FALSE_ALARM, RepeatCause, RepeatCounts};
 pub use table::{Content, Table, TableColumn};
+pub use text::TextDecoder;
 pub use untouched::{TimeSpan, TimeSpanError};
 pub(crate) use warnings::channel_list;
 pub use warnings::{DriftRows, Warning};
+pub use zero_force::ZeroForce;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -267,5 +274,7 @@ impl Recording {
     }
 }
 
+#[cfg(test)]
+mod file_tests;
 #[cfg(test)]
 mod tests;

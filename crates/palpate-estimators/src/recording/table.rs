@@ -5,12 +5,16 @@ use std::io::Read;
 use super::cells::split;
 use super::columns::Header;
 use super::csv_error::{CsvError, CsvProblem};
-use super::csv_in::{File, Lines};
+use super::csv_in::File;
 use super::dialect::Dialect;
+use super::lines::{self, LineProgress, Lines, Reading};
 use super::marks::{Decimal, Separator};
+use super::notes::{self, Origin};
 use super::timestamp::Clock;
 use super::untouched::is_mark;
 use palpate_mechanics::units::Unit;
+use std::cmp::Reverse;
+use std::ops::Range;
 
 /// The columns of a CSV file, and what is in them.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,15 +111,25 @@ impl Table {
         decimal: Option<Decimal>,
     ) -> Result<Self, CsvError> {
         let file = File::read(source, bytes)?;
-        let (separator, header) = shape(&file, separator)?;
-        let mut lines = Lines::new(source, Some(separator), decimal);
+        let Shape { separator, header, line: first_line } = Shape::find(&file, separator)?;
+        let reading = Reading {
+            header,
+            separator: Some(separator),
+            decimal,
+            has_names: true,
+            least_width: 1,
+            origin: Origin::File,
+        };
+        let mut lines = Lines::new(source, reading);
         let mut columns: Vec<Column> = Vec::new();
         let mut rows = 0;
-        let mut line = 0;
-        for bytes in file.lines() {
-            line += 1;
-            let next =
-                lines.next(bytes, header, |head| Ok(head.texts().map(str::to_owned).collect::<Vec<_>>()))?;
+        for (i, bytes) in file.lines().enumerate() {
+            let line = i + 1;
+            if line < first_line {
+                lines.skip_line();
+                continue;
+            }
+            let next = lines.next(bytes, |head| Ok(head.texts().map(str::to_owned).collect::<Vec<_>>()))?;
             let Some((cells, headings)) = next else { continue };
             rows += 1;
             if columns.is_empty() {
@@ -130,69 +144,138 @@ impl Table {
         if rows == 0 {
             return Err(CsvProblem::NoRows.in_file(source));
         }
+        let headings = match lines.units() {
+            Some(units) => notes::with_units(headings, units),
+            None => headings.clone(),
+        };
         let heading = |(i, heading): (usize, &String)| match header {
             Header::Present => heading.clone(),
             Header::Absent => (i + 1).to_string(),
         };
-        let headings = headings.iter().enumerate().map(heading);
+        let headings = headings.iter().enumerate().map(heading).collect::<Vec<_>>().into_iter();
         let columns =
             headings.zip(columns).map(|(heading, column)| TableColumn { heading, content: column.content() });
         Ok(Self { header, columns: columns.collect(), rows })
     }
 }
 
-/// The separator of a file, and whether it has a header, from its first two lines.
-fn shape(file: &File, told: Option<Separator>) -> Result<(Separator, Header), CsvError> {
-    let mut lines = Lines::<()>::new(file.source, told, None);
-    let mut texts = Vec::new();
-    for bytes in file.lines() {
-        let text = lines.text(bytes)?.map(str::to_owned);
-        texts.extend(text.map(|text| (lines.count(), text)));
-        if texts.len() == 2 {
-            break;
-        }
-    }
-    let Some((line, first)) = texts.first() else { return Err(CsvProblem::Empty.in_file(file.source)) };
-    let second = texts.get(1).map_or(first, |(_, second)| second);
-    let separator = match lines.separator() {
-        Some(separator) => separator,
-        None => best_separator(first, second)
-            .map_err(|problem| problem.in_line(file.source, *line, first.clone(), 0..first.len()))?,
-    };
-    let fields = split(first, separator).unwrap_or_default();
-    let mut values =
-        fields.iter().map(|field| field.value.as_ref()).filter(|text| !text.is_empty()).peekable();
-    let is_row = values.peek().is_some() && values.all(is_value);
-    Ok((separator, if is_row { Header::Absent } else { Header::Present }))
+/// Lines that show the shape of a file, several times as many as a preamble has.
+const MOST_LINES: usize = 1000;
+
+/// Shape of a file: its separator, whether it has a header, and the line of its heading, or of its first row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Shape {
+    separator: Separator,
+    header: Header,
+    line: usize,
 }
 
-/// The separator that cuts two lines into equally many fields, and leaves the fewest in the second that are no numbers.
-fn best_separator(first: &str, second: &str) -> Result<Separator, CsvProblem> {
-    let cut = |separator: Separator| {
-        let (head, row) = (split(first, separator).ok()?, split(second, separator).ok()?);
-        let words = row.iter().filter(|field| !is_value(&field.value)).count();
-        let fields = row.len();
-        (fields > 1 && head.len() == fields).then_some(((words, std::cmp::Reverse(fields)), separator))
-    };
-    let mut cuts: Vec<_> = Separator::ALL.into_iter().filter_map(cut).collect();
-    cuts.sort_by_key(|(order, _)| *order);
-    match cuts.as_slice() {
-        [(order, first), (other, second), ..] if order == other => {
-            Err(CsvProblem::ManySeparators { first: *first, second: *second })
+impl Shape {
+    /// The shape of the longest run of lines that one separator cuts into equally many fields.
+    fn find(file: &File, separator: Option<Separator>) -> Result<Self, CsvError> {
+        let mut texts = Texts::default();
+        for (i, bytes) in file.lines().enumerate() {
+            texts.push(i + 1, bytes, file.source)?;
+            if texts.lines.len() == MOST_LINES {
+                break;
+            }
         }
-        [(_, separator), ..] => Ok(*separator),
-        [] => {
-            // No two lines alike: whatever cuts the first into the most fields lets the second be refused for its length.
-            let fields = |separator: &Separator| split(first, *separator).map_or(0, |fields| fields.len());
-            Ok(Separator::ALL.into_iter().rev().max_by_key(fields).unwrap_or_default())
-        }
+        let Some((first_line, first)) = texts.lines.first() else {
+            return Err(CsvProblem::Empty.in_file(file.source));
+        };
+        let separator = separator.or(texts.declared);
+        let all: &[Separator] = separator.as_ref().map_or(&Separator::ALL, std::slice::from_ref);
+        let mut blocks: Vec<Block> =
+            all.iter().filter_map(|one| Block::longest(&texts.lines, *one)).collect();
+        blocks.sort_by_key(Block::rank);
+        let (separator, block) = match blocks.as_slice() {
+            [one, other, ..] if one.rank() == other.rank() => {
+                let problem = CsvProblem::ManySeparators { first: one.separator, second: other.separator };
+                let (line, text) = &texts.lines[one.lines.start];
+                return Err(problem.in_line(file.source, *line, text.clone(), 0..text.len()));
+            }
+            [block, ..] => (block.separator, &texts.lines[block.lines.clone()]),
+            [] => {
+                // No two lines are alike: the separator that cuts the first into most fields.
+                let fields = |one: &Separator| split(first, *one).map_or(0, |fields| fields.len());
+                let separator =
+                    separator.or(Separator::MARKS.into_iter().rev().max_by_key(fields)).unwrap_or_default();
+                let header = header_of(first, separator);
+                return Ok(Self { separator, header, line: *first_line });
+            }
+        };
+        let Some((line, text)) = heading(block, separator) else {
+            return Ok(Self { separator, header: Header::Present, line: *first_line });
+        };
+        Ok(Self { separator, header: header_of(text, separator), line: *line })
     }
 }
 
-/// Whether a text is a number with either decimal mark, or looks like a timestamp.
-fn is_value(text: &str) -> bool {
-    let number = Unit::NONE.parse_si(&text.replacen(',', ".", 1)).is_some();
-    number || (text.contains(':') && text.starts_with(|c: char| c.is_ascii_digit()))
+/// Lines with a text that is no comment.
+#[derive(Default)]
+struct Texts {
+    lines: Vec<(usize, String)>,
+    /// The separator that a line `sep=;` declares.
+    declared: Option<Separator>,
+}
+
+impl Texts {
+    fn push(&mut self, line: usize, bytes: &[u8], source: &str) -> Result<(), CsvError> {
+        let (mut dialect, mut decoded) = (Dialect::new(source, None), String::new());
+        let Some(text) = lines::written(bytes, line, &mut dialect, &mut decoded)? else { return Ok(()) };
+        match Separator::from_declaration(text) {
+            Some(separator) if self.lines.is_empty() => self.declared = Some(separator),
+            _ if text.chars().all(|c| c.is_whitespace() || matches!(c, '"' | ',' | ';' | '|')) => {}
+            _ => self.lines.push((line, text.to_owned())),
+        }
+        Ok(())
+    }
+}
+
+/// A run of lines that a separator cuts into equally many fields.
+struct Block {
+    separator: Separator,
+    lines: Range<usize>,
+    fields: usize,
+    /// Fields of the last line that are no values.
+    words: usize,
+}
+
+impl Block {
+    /// The longest of a separator that cuts lines at all.
+    fn longest(lines: &[(usize, String)], separator: Separator) -> Option<Self> {
+        let width = |(_, text): &(usize, String)| split(text, separator).map_or(0, |fields| fields.len());
+        let widths: Vec<usize> = lines.iter().map(width).collect();
+        let mut start = 0;
+        let blocks = widths.chunk_by(|a, b| a == b).map(|chunk| {
+            start += chunk.len();
+            (start - chunk.len()..start, chunk[0])
+        });
+        let least = lines.len().min(2);
+        let cut = blocks.filter(|(lines, fields)| *fields > 1 && lines.len() >= least);
+        let (range, fields) = cut.min_by_key(|(lines, _)| Reverse(lines.len()))?;
+        let words = lines::words_among(&lines[range.end - 1].1, separator);
+        Some(Self { separator, lines: range, fields, words })
+    }
+
+    /// Order of preference: most lines, fewest words in the last one, no blanks, most fields.
+    fn rank(&self) -> (Reverse<usize>, usize, bool, Reverse<usize>) {
+        let is_blanks = self.separator == Separator::Blanks;
+        (Reverse(self.lines.len()), self.words, is_blanks, Reverse(self.fields))
+    }
+}
+
+/// The heading of a block of lines: that with most distinct words above the first row of values, the last of several.
+fn heading(block: &[(usize, String)], separator: Separator) -> Option<&(usize, String)> {
+    let is_row = |(_, text): &(usize, String)| lines::is_row_of_values(text, separator, 1);
+    let above = block.iter().position(is_row).unwrap_or(1).max(1);
+    let likeness = |(_, text): &&(usize, String)| notes::heading_likeness(text, separator);
+    block[..above.min(block.len())].iter().max_by_key(likeness)
+}
+
+/// Whether a line names the columns: it does unless every field of it is a number or a time.
+fn header_of(text: &str, separator: Separator) -> Header {
+    if lines::is_row_of_values(text, separator, 1) { Header::Absent } else { Header::Present }
 }
 
 /// A column that is being read: by a dialect of its own, since a column without a role may be written in any way.

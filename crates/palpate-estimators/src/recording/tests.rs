@@ -34,6 +34,7 @@ fn foreign() -> Columns {
         time: None,
         untouched: None,
         untouched_times: Vec::new(),
+        force_zero_n: None,
         separator: None,
         decimal: None,
         repeated_readings: RepeatedReadings::Auto,
@@ -427,6 +428,8 @@ proptest! {
         let mut bytes = Vec::new();
         write(&recording, *STRIP, "a\ntest", &mut bytes).unwrap();
         let columns = Columns::own(&recording.channels, &recording.kinds, *STRIP);
+        // Forces of all magnitudes are no load cell's.
+        let columns = Columns { force_zero_n: Some(0.0), ..columns };
         let columns = ["nuisance_1", "nuisance_2"][..nuisances].iter().fold(columns, |columns, name| columns.nuisance(*name, Unit::NONE));
         let schema = Schema { columns: &columns, layout: &layout, extent: *STRIP, known_force_n: None };
         prop_assert_eq!(read("", bytes.as_slice(), &schema).unwrap().rows, recording.rows);

@@ -4,7 +4,8 @@ use std::fmt;
 use std::mem::discriminant;
 
 use super::{Recording, Repeats, Row};
-use palpate_mechanics::units::Quantity;
+use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::units::{Dimension, Quantity};
 use palpate_numerics::median;
 
 /// A defect of a recording that its owner should examine.
@@ -80,6 +81,20 @@ pub enum Warning {
         /// All the pairs.
         pairs: usize,
     },
+    /// No force is positive, although the rows have forces.
+    NoPositiveForce {
+        /// The least force, in newtons.
+        least_n: f64,
+    },
+    /// Some forces are negative and others positive.
+    NegativeForces {
+        /// Rows of a negative force.
+        rows: usize,
+        /// Rows in which something touches.
+        of: usize,
+        /// The least force, in newtons.
+        least_n: f64,
+    },
 }
 
 /// Rows in which a drift shows.
@@ -113,7 +128,7 @@ impl Recording {
         let repeats = self.repeats();
         let channels = (0..self.channels.len()).filter_map(|index| Channel::new(self, index));
         let of_channels = channels.flat_map(|channel| channel.warnings(&repeats));
-        self.repeat_warnings().into_iter().chain(of_channels).collect()
+        self.repeat_warnings().into_iter().chain(of_channels).chain(self.force_warning()).collect()
     }
 
     /// The warnings as lines of text, one for all channels with the same defect.
@@ -147,6 +162,20 @@ impl Recording {
         let channels = repeats.slow_channels.clone();
         let slow = (!channels.is_empty()).then_some(Warning::SlowChannels { channels });
         left_out.into_iter().chain(slow).collect()
+    }
+
+    /// The warning of forces of which some or all have the wrong sign.
+    fn force_warning(&self) -> Option<Warning> {
+        let forces_n: Option<Vec<f64>> = self.rows.iter().map(|row| row.force_n).collect();
+        let forces_n = forces_n.filter(|forces_n| !forces_n.is_empty())?;
+        let least_n = forces_n.iter().copied().fold(f64::INFINITY, f64::min);
+        let rows = forces_n.iter().filter(|force_n| **force_n < 0.0).count();
+        let of = forces_n.iter().filter(|force_n| **force_n != 0.0).count();
+        match (rows, forces_n.iter().any(|force_n| *force_n > 0.0)) {
+            (_, false) => Some(Warning::NoPositiveForce { least_n }),
+            (0, true) => None,
+            (rows, true) => Some(Warning::NegativeForces { rows, of, least_n }),
+        }
     }
 
     /// Row indices in groups of two or more with the same position and force, each in the order of recording.
@@ -301,11 +330,7 @@ impl<'a> Channel<'a> {
     }
 
     fn quantity(&self, value: f64) -> Quantity {
-        let dimension = self
-            .recording
-            .kinds
-            .get(self.index)
-            .map_or(palpate_mechanics::units::Dimension::None, |k| k.dimension());
+        let dimension = self.recording.kinds.get(self.index).map_or(Dimension::None, |kind| kind.dimension());
         Quantity { value, dimension }
     }
 }
@@ -330,7 +355,11 @@ impl Warning {
             | Self::Saturated { channel, .. }
             | Self::RepeatsDisagree { channel, .. }
             | Self::Drift { channel, .. } => Some(channel),
-            Self::RepeatsLeftOut(_) | Self::RepeatsCounted { .. } | Self::SlowChannels { .. } => None,
+            Self::RepeatsLeftOut(_)
+            | Self::RepeatsCounted { .. }
+            | Self::SlowChannels { .. }
+            | Self::NoPositiveForce { .. }
+            | Self::NegativeForces { .. } => None,
         }
     }
 
@@ -398,9 +427,11 @@ impl fmt::Display for Warning {
                 channel_list(channels)
             ),
             Self::Dead { channel, value } => {
+                let value = value.in_full();
                 write!(f, "channel `{channel}` reads {value} in every row: is it connected?")
             }
             Self::Saturated { channel, at, rows, of } => {
+                let at = at.in_full();
                 write!(
                     f,
                     "channel `{channel}` is at {at}, its extreme, in {rows} of {of} rows: does it saturate?"
@@ -422,6 +453,21 @@ impl fmt::Display for Warning {
                      {change} in the median"
                 )
             }
+            Self::NoPositiveForce { least_n: 0.0 } => f.write_str(
+                "the force is 0 in every row, so nothing touches: name another column as `force`, or none where no force was measured",
+            ),
+            Self::NoPositiveForce { least_n } => write!(
+                f,
+                "no force is greater than 0, and the least is {} N; a push is positive: change the sign of the column, or name \
+                 another one as `force`",
+                SensorKind::Reaction.unit().format_si(*least_n)
+            ),
+            Self::NegativeForces { rows, of, least_n } => write!(
+                f,
+                "the force is negative in {rows} of {of} presses, down to {} N; a push is positive: check sign and zero of the \
+                 force column",
+                SensorKind::Reaction.unit().format_si(*least_n)
+            ),
         }
     }
 }

@@ -6,6 +6,7 @@ use std::fmt::Write;
 
 use palpate_estimators::recording::{
     Content, CsvError, CsvProblem, Decimal, Header, Heading, Recording, Separator, Table, TableColumn,
+    ZeroForce,
 };
 use palpate_mechanics::units::{Dimension, Unit, format_length_mm};
 
@@ -145,7 +146,7 @@ impl FirstRigError {
         match self {
             Self::NoPosition { .. } | Self::ManyPositions { .. } => Some(
                 "name the columns: --position NAME, or --x NAME --y NAME on a plane; --force NAME, --time NAME and --channel NAME where they are \
-                 not guessed either",
+                 not guessed either; NAME may be a column's number",
             ),
             Self::NoChannels { .. } => Some("name the channels, each with --channel NAME"),
             Self::ForeignUnit { .. } => Some("convert the column, or name another one"),
@@ -154,6 +155,13 @@ impl FirstRigError {
             }
             Self::Csv(CsvError { problem: CsvProblem::DoubtfulNumber { .. }, .. }) => {
                 Some("--decimal comma takes it for the second")
+            }
+            Self::Csv(CsvError { problem: CsvProblem::DoubtfulThousands { text, .. }, .. }) => {
+                Some(if text.contains(',') {
+                    "--decimal comma takes it for the second"
+                } else {
+                    "--decimal point takes it for the second"
+                })
             }
             _ => None,
         }
@@ -180,6 +188,8 @@ pub struct FirstRig {
     roles: Roles,
     /// Start and end of the surface by coordinate, and those of the presses.
     sides: Vec<Side>,
+    /// Forces that are 0 but for noise, where there are any.
+    zero_force: Option<ZeroForce>,
     warnings: Vec<String>,
 }
 
@@ -199,21 +209,30 @@ impl FirstRig {
             source: source.to_owned(),
             hints: hints.clone(),
             sides: Vec::new(),
+            zero_force: None,
             warnings: Vec::new(),
             table,
             roles,
         };
-        for column in first.roles.position.columns() {
-            first.sides.push(first.side(column)?);
-        }
+        first.sides = first.sides()?;
         let checked = [(first.roles.force, Dimension::Force), (first.roles.time, Dimension::Time)];
         for (column, wanted) in checked.into_iter().filter_map(|(column, wanted)| Some((column?, wanted))) {
             first.unit(column, wanted)?;
         }
         let rig = Rig::from_toml(&first.to_toml("rig.toml")).map_err(FirstRigError::Refused)?;
         let recording = rig.setup.read_recording(source, bytes)?;
+        first.zero_force = recording.provenance.dialects.iter().find_map(|dialect| dialect.zero_force);
+        if first.zero_force.is_some() {
+            // Rows without contact may be anywhere, also beside the surface.
+            first.sides = first.sides()?;
+        }
         first.warnings = first.looked_at(&recording);
         Ok(first)
+    }
+
+    /// The sides of a surface that holds the presses, one a coordinate.
+    fn sides(&self) -> Result<Vec<Side>, FirstRigError> {
+        self.roles.position.columns().into_iter().map(|column| self.side(column)).collect()
     }
 
     /// Warnings for the bench's owner.
@@ -327,6 +346,12 @@ impl FirstRig {
         if let Some(force) = roles.force {
             self.write_column(toml, "force", force);
             self.write_unit(toml, "force_unit", force, Dimension::Force);
+            if let Some(ZeroForce { zero_n, rows, .. }) = self.zero_force {
+                let newton = usual_unit(Dimension::Force);
+                let zero = newton.format_si(zero_n);
+                let comment = format!("a guess: {rows} rows have less, and read as without contact");
+                toml.line(&format!("force_zero = \"{zero} {newton}\""), &comment);
+            }
         }
         if let Some(time) = roles.time {
             self.write_column(toml, "time", time);
@@ -372,7 +397,7 @@ impl FirstRig {
         toml.line(&format!("{key} = \"{unit}\""), comment);
     }
 
-    /// The column as a rig names it: without its unit where that is clear, by its number where there is no header.
+    /// The column as a rig names it: without its unit where that is clear, by its number where its heading is not its own.
     fn key(&self, column: usize) -> String {
         let heading = &self.table.columns[column].heading;
         if self.table.header == Header::Absent {
@@ -381,8 +406,14 @@ impl FirstRig {
         let name = Heading::parse(heading).name;
         let same =
             |other: &&TableColumn| other.heading == name || Heading::parse(&other.heading).name == name;
-        let clear = self.table.columns.iter().filter(same).count() == 1;
-        quoted(if clear { name } else { heading })
+        let is_heading = |other: &&TableColumn| other.heading == *heading;
+        match self.table.columns.iter().filter(same).count() {
+            1 if !name.is_empty() => quoted(name),
+            _ if heading.is_empty() || self.table.columns.iter().filter(is_heading).count() > 1 => {
+                (column + 1).to_string()
+            }
+            _ => quoted(heading),
+        }
     }
 
     fn left_in_words(&self, column: usize, left: &Left) -> String {
@@ -392,7 +423,7 @@ impl FirstRig {
             Left::Words => "there are words in it".to_owned(),
             Left::Word { line, text } => format!("`{text}` on line {line} is no number"),
             Left::Gap { line } => format!("there is nothing in it on line {line}"),
-            Left::Unnamed => "it has no name of its own".to_owned(),
+            Left::Unnamed => format!("column {} has no heading", column + 1),
             Left::Constant(value) => format!("it is {value} in every row"),
             Left::Dead(value) => format!("it is {value} in every row, which teaches a channel nothing"),
             Left::Counter => "it numbers the rows".to_owned(),
@@ -407,6 +438,9 @@ impl FirstRig {
             Left::Single => {
                 "if it is a channel, add it to them; if readings depend on it, say it as `nuisance`"
                     .to_owned()
+            }
+            Left::OneOfForces => {
+                format!("it may be the force, as others may: say force = {}", self.key(column))
             }
             Left::Second => "another column has the role that its name says".to_owned(),
             Left::Unit(unit) => format!("palpate does not read it in `{unit}`; convert it"),
@@ -451,9 +485,13 @@ impl FirstRig {
         let numbers = self.table.columns[column].numbers().unwrap_or_default();
         let forces = self.roles.force.and_then(|force| self.table.columns[force].numbers());
         let marks = self.roles.untouched.and_then(|untouched| self.table.columns[untouched].marks());
+        let zero_n = self.zero_force.map_or(0.0, |zero| zero.zero_n);
+        let unit = self.roles.force.and_then(|force| own_unit(&self.table.columns[force]));
+        let unit = unit.unwrap_or_else(|| usual_unit(Dimension::Force));
+        let is_zero = |force: f64| (force * unit.factor()).abs() <= zero_n;
         let is_touched = |row: usize| {
             let force = forces.as_ref().and_then(|forces| forces[row]);
-            force != Some(0.0) && !marks.as_ref().is_some_and(|marks| marks[row])
+            !force.is_some_and(is_zero) && !marks.as_ref().is_some_and(|marks| marks[row])
         };
         let rows = || numbers.iter().enumerate().filter_map(|(row, number)| Some((row, (*number)?)));
         let touched: Vec<f64> =
@@ -477,10 +515,16 @@ impl FirstRig {
                 Left::Unit(unit) => Some(format!(
                     "column `{heading}` was left out: palpate does not read it in `{unit}`; convert it"
                 )),
+                Left::Unnamed => Some(format!(
+                    "column {number} has no heading and was left out; if it is a channel, add {number} to `channels`",
+                    number = column + 1
+                )),
                 _ => None,
             }
         };
         let mut warnings: Vec<String> = self.roles.left.iter().filter_map(left).collect();
+        warnings.extend(self.warnings_of_headings());
+        warnings.extend(self.zero_force.map(|zero| zero.to_string()));
         warnings.extend(recording.warning_lines());
         let positions = recording.distinct_positions().len();
         let enough = if self.sides.len() == 1 { 5 } else { 9 };
@@ -489,10 +533,62 @@ impl FirstRig {
                 "there are presses at {positions} positions only; between them an estimator can but guess: press at {enough} or more"
             ));
         }
-        if recording.rows.iter().all(|row| !row.touches()) {
-            warnings.push("the force is 0 in every row: nothing touched".to_owned());
+        warnings
+    }
+
+    /// Warnings of headings that several columns have, exactly or but for case and blanks.
+    fn warnings_of_headings(&self) -> Vec<String> {
+        if self.table.header == Header::Absent {
+            return Vec::new();
+        }
+        let folded = |heading: &str| -> String {
+            heading.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase).collect()
+        };
+        let mut columns: Vec<(String, usize)> = self
+            .table
+            .columns
+            .iter()
+            .enumerate()
+            .map(|(i, column)| (folded(&column.heading), i))
+            .filter(|(heading, _)| !heading.is_empty())
+            .collect();
+        columns.sort();
+        let mut alike: Vec<&[(String, usize)]> =
+            columns.chunk_by(|a, b| a.0 == b.0).filter(|columns| columns.len() > 1).collect();
+        alike.sort_by_key(|columns| columns[0].1);
+        let mut warnings: Vec<String> =
+            alike.into_iter().map(|columns| self.warning_of_alike(columns)).collect();
+        let is_unnamed = |column: &&usize| self.table.columns[**column].heading.is_empty();
+        let unnamed: Vec<String> =
+            self.roles.channels.iter().filter(is_unnamed).map(|column| (column + 1).to_string()).collect();
+        if !unnamed.is_empty() {
+            warnings.push(format!(
+                "columns without a heading are taken as channels by their numbers: {}",
+                unnamed.join(", ")
+            ));
+        }
+        if !self.roles.many_forces.is_empty() {
+            let forces: Vec<String> = self.roles.many_forces.iter().map(|column| self.key(*column)).collect();
+            warnings.push(format!(
+                "columns {} may all be the force, and none was taken; say which with --force",
+                forces.join(", ")
+            ));
         }
         warnings
+    }
+
+    fn warning_of_alike(&self, columns: &[(String, usize)]) -> String {
+        let heading = |column: &usize| self.table.columns[*column].heading.as_str();
+        let indices: Vec<usize> = columns.iter().map(|(_, column)| *column).collect();
+        let numbers: Vec<String> = indices.iter().map(|column| (column + 1).to_string()).collect();
+        let numbers = numbers.join(", ");
+        let first = heading(&indices[0]);
+        if indices.iter().all(|column| heading(column) == first) {
+            format!("columns {numbers} share the heading `{first}`; the rig names them by their numbers")
+        } else {
+            let names: Vec<String> = indices.iter().map(|column| format!("`{}`", heading(column))).collect();
+            format!("columns {numbers} are named alike but for case or blanks: {}", names.join(", "))
+        }
     }
 }
 

@@ -155,6 +155,8 @@ const CIRCUMSTANCES: &[&str] = &[
 pub(super) struct Roles {
     pub position: PositionRole,
     pub force: Option<usize>,
+    /// Columns that may all be the force, where there are several.
+    pub many_forces: Vec<usize>,
     pub time: Option<usize>,
     pub nuisance: Option<usize>,
     /// The column that marks untouched rows.
@@ -198,6 +200,8 @@ pub(super) enum Left {
     Single,
     /// Another column has the role that its name suggests.
     Second,
+    /// Other columns may be the force as well.
+    OneOfForces,
     /// Of a unit in which the role that its name suggests is not read.
     Unit(String),
 }
@@ -229,7 +233,9 @@ impl Roles {
         let mut taken = position.columns();
         let others = told.force.iter().chain(&told.time).chain(&told.nuisance).chain(&untouched);
         taken.extend(others.chain(&told.channels));
-        let force = told.force.or_else(|| guess.force(&taken, position, untouched));
+        let forces =
+            if told.force.is_some() { Vec::new() } else { guess.forces(&taken, position, untouched) };
+        let force = told.force.or(forces.first().copied().filter(|_| forces.len() == 1));
         taken.extend(force);
         let time = told.time.or_else(|| guess.time(&taken));
         taken.extend(time);
@@ -242,8 +248,13 @@ impl Roles {
         // Separators at the ends of lines make columns that are no columns.
         let blank = |i: &usize| names[*i].words.is_empty() && table.columns[*i].content == Content::Empty;
         let left = (0..names.len()).filter(|i| !roles.contains(i) && !blank(i));
-        let left = left.map(|i| (i, guess.reason(i, force.is_some()))).collect();
-        Ok(Self { position, force, time, nuisance: told.nuisance, untouched, channels, left })
+        let reason = |i: usize| match forces.contains(&i) {
+            true if force.is_none() => Left::OneOfForces,
+            _ => guess.reason(i, force.is_some()),
+        };
+        let left = left.map(|i| (i, reason(i))).collect();
+        let many_forces = if forces.len() > 1 { forces } else { Vec::new() };
+        Ok(Self { position, force, many_forces, time, nuisance: told.nuisance, untouched, channels, left })
     }
 }
 
@@ -294,7 +305,7 @@ impl Told {
     }
 }
 
-/// The column of this heading, or of this name but for the unit.
+/// The column of this heading, of this name but for the unit, or of this number from 1.
 fn find(table: &Table, flag: &'static str, name: &str) -> Result<usize, FirstRigError> {
     let name = name.trim();
     let exact = |heading: &str| heading == name;
@@ -302,8 +313,10 @@ fn find(table: &Table, flag: &'static str, name: &str) -> Result<usize, FirstRig
     let all = |fits: &dyn Fn(&str) -> bool| -> Vec<usize> {
         (0..table.columns.len()).filter(|i| fits(&table.columns[*i].heading)).collect()
     };
+    let number = name.parse::<usize>().ok().filter(|number| (1..=table.columns.len()).contains(number));
     match (all(&exact).as_slice(), all(&without_unit).as_slice()) {
         ([only], _) | ([], [only]) => Ok(*only),
+        ([], []) if number.is_some() => Ok(number.unwrap_or(1) - 1),
         _ => Err(FirstRigError::NoSuchColumn { flag, name: name.to_owned(), columns: described(table) }),
     }
 }
@@ -361,8 +374,8 @@ struct Name {
     unit: Option<Unit>,
     /// Text in the place of the unit that is none.
     foreign_unit: Option<String>,
-    /// Whether a rig can name the column.
-    can_be_named: bool,
+    /// Whether the column has a heading.
+    has_heading: bool,
 }
 
 impl Name {
@@ -373,13 +386,12 @@ impl Name {
         let foreign_unit = heading.unit.filter(|_| unit.is_none()).map(str::to_owned);
         let words = name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
         let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
-        let same = table.columns.iter().filter(|column| column.heading == *text).count();
         Self {
             words: words.map(str::to_lowercase).collect(),
             stem: (stem.trim().to_lowercase(), stem.len() < name.len()),
             unit,
             foreign_unit,
-            can_be_named: table.header == Header::Absent || (same == 1 && !text.is_empty()),
+            has_heading: table.header == Header::Absent || !text.is_empty(),
         }
     }
 
@@ -411,9 +423,9 @@ struct Guess<'a> {
 }
 
 impl Guess<'_> {
-    /// The columns that are free, can be named in a rig, and whose names `fit`.
+    /// The columns that are free, have a heading, and whose names `fit`.
     fn columns(&self, taken: &[usize], fit: impl Fn(&Name) -> bool) -> Vec<usize> {
-        let free = (0..self.names.len()).filter(|i| !taken.contains(i) && self.names[*i].can_be_named);
+        let free = (0..self.names.len()).filter(|i| !taken.contains(i) && self.names[*i].has_heading);
         free.filter(|i| fit(&self.names[*i])).collect()
     }
 
@@ -477,8 +489,8 @@ impl Guess<'_> {
                 Ok(PositionRole::Plane(x[0], y[0]))
             }
             Some(many) => {
-                let names: Vec<String> =
-                    many.iter().map(|i| format!("`{}`", self.table.columns[*i].heading)).collect();
+                let name = |i: &usize| format!("`{}` (column {})", self.table.columns[*i].heading, i + 1);
+                let names: Vec<String> = many.iter().map(name).collect();
                 Err(FirstRigError::ManyPositions { candidates: names.join(", ") })
             }
             None => Err(self.no_position(&taken)),
@@ -505,8 +517,8 @@ impl Guess<'_> {
         }
     }
 
-    /// The force; rows without one must be untouched by a mark, or have no position either.
-    fn force(&self, taken: &[usize], position: PositionRole, untouched: Option<usize>) -> Option<usize> {
+    /// Columns that may be the force; rows without one must be untouched by a mark, or have no position either.
+    fn forces(&self, taken: &[usize], position: PositionRole, untouched: Option<usize>) -> Vec<usize> {
         let places: Vec<_> =
             position.columns().into_iter().map(|i| self.table.columns[i].numbers()).collect();
         let marks = untouched.and_then(|i| self.table.columns[i].marks());
@@ -527,11 +539,7 @@ impl Guess<'_> {
             self.columns(taken, |name| newtons(name) && !self.in_family(name))
         };
         let columns = if named.is_empty() { by_unit() } else { named };
-        let columns: Vec<usize> = columns.into_iter().filter(is_force).collect();
-        match columns.as_slice() {
-            [only] => Some(*only),
-            _ => None,
-        }
+        columns.into_iter().filter(is_force).collect()
     }
 
     fn time(&self, taken: &[usize]) -> Option<usize> {
@@ -545,6 +553,10 @@ impl Guess<'_> {
     fn channels(&self, taken: &[usize]) -> Vec<usize> {
         let mut columns = self.columns(taken, |name| !is_no_channel(name));
         columns.retain(|i| self.varies(*i) && !self.counts(*i));
+        if columns.is_empty() {
+            let unnamed = (0..self.names.len()).filter(|i| !taken.contains(i) && !self.names[*i].has_heading);
+            return unnamed.filter(|i| self.varies(*i) && !self.counts(*i)).collect();
+        }
         let families: Vec<usize> =
             columns.iter().copied().filter(|i| self.in_family(&self.names[*i])).collect();
         if families.is_empty() {
@@ -582,7 +594,11 @@ impl Guess<'_> {
             Content::Gaps { line, .. } => Left::Gap { line: *line },
             Content::Other { numbers: 0, .. } => Left::Words,
             Content::Other { line, text, .. } => Left::Word { line: *line, text: text.clone() },
-            _ if !name.can_be_named => Left::Unnamed,
+            Content::Numbers(numbers) if !name.has_heading && range(numbers).0 == range(numbers).1 => {
+                Left::Constant(numbers[0])
+            }
+            _ if !name.has_heading && self.counts(column) => Left::Counter,
+            _ if !name.has_heading => Left::Unnamed,
             Content::Times => Left::Second,
             Content::Numbers(numbers) if range(numbers).0 == range(numbers).1 => {
                 let other = is_no_channel(name);

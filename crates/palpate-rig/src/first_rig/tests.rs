@@ -179,3 +179,94 @@ fn very_many_columns_are_refused_and_not_all_listed() {
     let listed = wide(150);
     assert!(listed.ends_with("`c99` (1 to 1), and 50 more"), "{listed}");
 }
+
+/// What is said of a recording of four channels below a heading, and the roles of its columns.
+fn said_of_heading(heading: &str) -> String {
+    let text = presses(heading, |x, force, i| {
+        let noise = ((i * 7919) % 13) as f64 / 13.0;
+        format!(
+            "{x},{force},{},{},{},{}",
+            x * force + noise,
+            force - x + noise,
+            force * 5.0 + noise,
+            noise - x
+        )
+    });
+    match guess(&text, &Hints::default()) {
+        Ok(first) => {
+            let toml = first.to_toml("rig.toml");
+            let rig = Rig::from_toml(&toml).unwrap();
+            let recording = rig.setup.read_recording("presses.csv", text.as_bytes()).unwrap();
+            let channels =
+                toml.lines().find(|line| line.starts_with("channels")).unwrap_or_default().to_owned();
+            let warnings = first.warnings().join("\n  ");
+            format!("{}\n  {channels}; {} rows\n  {warnings}", first.summary(), recording.rows.len())
+        }
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn columns_without_a_heading_of_their_own_are_named_by_number() {
+    let headings = [
+        "Position,Force,S1,S2,S2,S4",
+        "Position,Force,S1,S2,,S4",
+        "Position,Force,,,,",
+        "Position,Force,S1,s1,S 2,S2",
+        "Position,Position,S1,S2,S3,S4",
+        "Position,Force,Force,S1,S2,S3",
+        "Position [mm],Position [N],S1 [mV],S1 [V],S2,S3",
+    ];
+    insta::assert_snapshot!(
+        headings.map(|heading| format!("{heading}\n  {}", said_of_heading(heading))).join("\n")
+    );
+}
+
+#[test]
+fn hints_name_columns_by_number() {
+    let text = presses("Position,Force,Force,S1,S1", |x, force, i| {
+        format!("{x},{force},{},{},{i}", 2.0 * force, x * force)
+    });
+    let named = |name: &str| Some(name.to_owned());
+    let hints = Hints { force: named("3"), channels: vec!["5".to_owned()], ..Hints::default() };
+    let toml = guess(&text, &hints).unwrap().to_toml("rig.toml");
+    assert!(toml.contains("force = 3") && toml.contains("channels = [5]"), "{toml}");
+    assert!(guess(&text, &Hints { force: named("6"), ..Hints::default() }).is_err());
+}
+
+#[test]
+fn a_load_cell_that_is_never_0_is_written_down() {
+    let pressed = presses("Position [cm],Force [kN],S1,S2", |x, force, i| {
+        let noise = ((i * 7919) % 13) as f64 / 13.0;
+        format!("{x},{},{},{}", 1e-3 * force, 100.0 + x * force + noise, 50.0 - x + noise)
+    });
+    let air = (0..12).map(|i| {
+        let noise = ((i * 7919) % 13) as f64 - 6.2;
+        format!("-80,{},{},{}\n", 3e-6 * noise, 100.0 + 0.08 * noise, 50.0 + 0.08 * noise)
+    });
+    let text = pressed + &air.collect::<String>();
+    let toml = guess(&text, &Hints::default()).unwrap().to_toml("rig.toml");
+    assert!(toml.contains("force_zero = \"0.2 N\""), "{toml}");
+    // The hand in the air is not on the surface.
+    assert!(!toml.contains("origin"), "{toml}");
+    let rig = Rig::from_toml(&toml).unwrap();
+    let recording = rig.setup.read_recording("presses.csv", text.as_bytes()).unwrap();
+    assert_eq!(recording.rows.iter().filter(|row| !row.touches()).count(), 12);
+    assert_eq!(recording.provenance.dialects[0].zero_force, None);
+}
+
+#[test]
+fn tables_below_a_preamble_become_rigs() {
+    let table = presses("Ort\tKraft\tS1\tS2\n[mm]\t[N]\t[mV]\t[mV]", |x, force, i| {
+        format!("{x}\t{force}\t{}\t{}", x * force + i as f64, force - x)
+    });
+    let text = format!("Bench\tB\n\nRate\t10 Hz\nNote\tby hand\n\n{table}");
+    let first = guess(&text, &Hints::default()).unwrap();
+    assert_eq!(first.summary(), "position `Ort [mm]`, force `Kraft [N]`, 2 channels `S1 [mV]` and `S2 [mV]`");
+    let rig = rig(&text);
+    let recording = rig.setup.read_recording("presses.csv", text.as_bytes()).unwrap();
+    assert_eq!((recording.rows.len(), recording.rows[0].position.x_m), (30, 0.01));
+    let thousands = presses("Ort;S1;S2", |x, _, i| format!("{x};{};1.{:03}", 503 + i, 3 + i)) + "10;5;900\n";
+    let error = guess(&thousands, &Hints::default()).unwrap_err();
+    assert_eq!(error.help(), Some("--decimal point takes it for the second"), "{error}");
+}

@@ -1,0 +1,123 @@
+//! Marks of decimals that may be separators of thousands: `1.003` beside `503`.
+
+use super::csv_error::{CsvError, CsvProblem};
+use super::marks::Decimal;
+use std::ops::Range;
+
+/// Whether a number with one mark, a point or a comma, may be a whole number with a separator of thousands: `1,234`, not `0,234`.
+pub(super) fn looks_grouped(number: &str) -> bool {
+    let digits = number.trim_start_matches(['+', '-']);
+    let all_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+    digits.split_once([',', '.']).is_some_and(|(whole, rest)| {
+        (1..=3).contains(&whole.len())
+            && !whole.starts_with('0')
+            && rest.len() == 3
+            && all_digits(whole)
+            && all_digits(rest)
+    })
+}
+
+/// The numbers of a file's columns, as far as their marks may separate thousands.
+///
+/// One number that can only have a decimal mark, such as `0.5`, decides for its column. While there is none, the marks of a column are in
+/// doubt where numbers with a mark stand beside whole ones below 1000, and all of them span no more decades as thousands than as decimals.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Groupings {
+    /// Whether the decimal mark is said, so that nothing is in doubt.
+    is_said: bool,
+    columns: Vec<Grouping>,
+}
+
+/// The numbers of one column.
+#[derive(Clone, Debug, Default)]
+struct Grouping {
+    is_decided: bool,
+    /// Whole numbers without a mark, other than 0: the least and the greatest magnitude, and the text of one.
+    whole: Option<(f64, f64, String)>,
+    /// The same of numbers that look grouped, with the place of the first.
+    grouped: Option<(f64, f64, Place)>,
+}
+
+/// Place of a number.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
+    pub line: usize,
+    pub column: usize,
+    /// Text of the line, and the number's bytes in it.
+    pub text: String,
+    pub span: Range<usize>,
+}
+
+impl Groupings {
+    /// Those of a file; without a doubt where its decimal mark is said.
+    pub fn new(decimal: Option<Decimal>) -> Self {
+        Self { is_said: decimal.is_some(), columns: Vec::new() }
+    }
+
+    /// Whether no number of a column can be in doubt any more.
+    pub fn is_decided(&self, column: usize) -> bool {
+        self.is_said || self.columns.get(column).is_some_and(|column| column.is_decided)
+    }
+
+    /// Takes the number `text` of a column into account.
+    pub fn insert(&mut self, column: usize, text: &str, place: impl FnOnce() -> Place) {
+        if self.columns.len() <= column {
+            self.columns.resize(column + 1, Grouping::default());
+        }
+        let Grouping { is_decided, whole, grouped } = &mut self.columns[column];
+        let digits = text.trim_start_matches(['+', '-']);
+        let is_grouped = looks_grouped(text);
+        // Whoever separates thousands separates all of them.
+        *is_decided |= !is_grouped && (digits.len() > 3 || !digits.bytes().all(|byte| byte.is_ascii_digit()));
+        let value = |value, digit| 10.0 * value + f64::from(digit - b'0');
+        let number = digits.bytes().filter(u8::is_ascii_digit).fold(0.0, value);
+        let magnitude = if is_grouped { number / 1000.0 } else { number };
+        if *is_decided || magnitude == 0.0 {
+            return;
+        }
+        if is_grouped {
+            let (low, high, _) = grouped.get_or_insert_with(|| (magnitude, magnitude, place()));
+            (*low, *high) = (low.min(magnitude), high.max(magnitude));
+        } else {
+            let (low, high, one) = whole.get_or_insert_with(|| (magnitude, magnitude, text.to_owned()));
+            if magnitude > *high {
+                text.clone_into(one);
+            }
+            (*low, *high) = (low.min(magnitude), high.max(magnitude));
+        }
+    }
+
+    /// The error of the first column in doubt.
+    pub fn doubt(&self, source: &str) -> Option<CsvError> {
+        if self.is_said {
+            return None;
+        }
+        self.columns.iter().find_map(|column| column.doubt(source))
+    }
+
+    /// The error of this column, where it is in doubt.
+    pub fn doubt_in(&self, column: usize, source: &str) -> Option<CsvError> {
+        self.columns.get(column).filter(|_| !self.is_said)?.doubt(source)
+    }
+}
+
+impl Grouping {
+    fn doubt(&self, source: &str) -> Option<CsvError> {
+        if self.is_decided {
+            return None;
+        }
+        let ((low, high, beside), (least, greatest, place)) = (self.whole.as_ref()?, self.grouped.as_ref()?);
+        let ratio = |factor: f64| high.max(greatest * factor) / low.min(least * factor);
+        if ratio(1000.0) > ratio(1.0) {
+            return None;
+        }
+        let Place { line, column, text, span } = place;
+        let number = text.get(span.clone()).unwrap_or_default().trim_matches('"').trim().to_owned();
+        let problem = CsvProblem::DoubtfulThousands { text: number, beside: beside.clone() };
+        let mut error = problem.in_line(source, *line, text.clone(), span.clone());
+        if let Some(place) = &mut error.place {
+            place.column = Some(*column);
+        }
+        Some(error)
+    }
+}

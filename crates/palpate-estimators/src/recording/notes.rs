@@ -1,0 +1,162 @@
+//! Lines about a table that are no rows of it: units, totals, remarks.
+
+use super::cells::split;
+use super::heading::Heading;
+use super::marks::Separator;
+use palpate_mechanics::units::Unit;
+
+/// Origin of lines: in a file, a line below the table may be a note of whoever wrote it; in a stream it is a reading that was lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Origin {
+    File,
+    Stream,
+}
+
+/// Kind of a line below the heading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum LineKind {
+    Row,
+    /// Units of the columns.
+    Units,
+    /// A line without a reading: the heading again, a total, the name of a run.
+    Note,
+}
+
+/// Texts for a value that is missing: a row that has one is a row.
+const MISSING: [&str; 16] = [
+    "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf", "infinity", "err", "error", "ol",
+    "ovld", "overload", "overflow",
+];
+
+/// Names of rows that spreadsheets compute from the others.
+const TOTALS: [&str; 26] = [
+    "total",
+    "totals",
+    "sum",
+    "mean",
+    "average",
+    "avg",
+    "median",
+    "min",
+    "max",
+    "minimum",
+    "maximum",
+    "std",
+    "sd",
+    "stdev",
+    "std dev",
+    "rms",
+    "variance",
+    "count",
+    "summe",
+    "gesamt",
+    "mittelwert",
+    "mittel",
+    "standardabweichung",
+    "varianz",
+    "anzahl",
+    "ø",
+];
+
+/// Units that loggers write and palpate does not convert.
+const OTHER_UNITS: [&str; 26] = [
+    "v", "mv", "µv", "uv", "a", "ma", "ohm", "ω", "kω", "w", "hz", "°c", "degc", "c", "k", "%", "counts",
+    "count", "cts", "digits", "digit", "lsb", "raw", "a.u.", "au", "bit",
+];
+
+/// Kind of a line with these fields, of which one is no value, below a heading; `words` says in which columns the last row has
+/// words, `None` before the first row.
+pub(super) fn kind_of(
+    texts: &[&str],
+    heading: &[String],
+    words: Option<&[bool]>,
+    origin: Origin,
+) -> LineKind {
+    if texts.len() == heading.len() && texts.iter().zip(heading).all(|(text, heading)| text == heading) {
+        return LineKind::Note;
+    }
+    let had_words = |i: usize| words.and_then(|words| words.get(i)).copied().unwrap_or(false);
+    let filled: Vec<usize> = (0..texts.len()).filter(|i| !texts[*i].is_empty()).collect();
+    let values = filled.iter().filter(|i| is_value(texts[**i])).count();
+    let is_missing = |i: &usize| texts[*i].starts_with("#") || among(texts[*i], &MISSING);
+    let is_total = |i: &usize| !had_words(*i) && among(texts[*i].trim_end_matches([':', '.']), &TOTALS);
+    // Remarks on the right of a row may have the same words.
+    if words.is_some() && filled.first().is_some_and(is_total) {
+        return LineKind::Note;
+    }
+    if filled.iter().any(is_missing) {
+        return LineKind::Row;
+    }
+    if values == 0 && texts.len() >= heading.len() && filled.iter().all(|i| is_unit(texts[*i])) {
+        return LineKind::Units;
+    }
+    let is_note = match (words, origin) {
+        (None, _) => values == 0,
+        (Some(_), Origin::Stream) => false,
+        (Some(_), Origin::File) if values == 0 => {
+            filled.len() == 1 || texts.len() != heading.len() || distinct_words(texts) == 1
+        }
+        // `Rows;69`: a torn row begins as rows do.
+        (Some(_), Origin::File) => {
+            texts.len() < heading.len()
+                && filled.first().is_some_and(|i| !is_value(texts[*i]) && !had_words(*i))
+        }
+    };
+    if is_note { LineKind::Note } else { LineKind::Row }
+}
+
+/// The headings, with the units of the row below them where they have none.
+pub(super) fn with_units(heading: &[String], units: &[String]) -> Vec<String> {
+    let bare = |unit: &str| unit.trim_matches(['[', ']', '(', ')']).trim().to_owned();
+    let composed = heading.iter().enumerate().map(|(i, heading)| {
+        let unit = units.get(i).map_or_else(String::new, |unit| bare(unit));
+        let is_without = Heading::parse(heading).unit.is_none() && !heading.is_empty();
+        if is_without && !matches!(unit.as_str(), "" | "-") {
+            format!("{heading} [{unit}]")
+        } else {
+            heading.clone()
+        }
+    });
+    composed.collect()
+}
+
+/// How much a line looks like a heading: the number of its distinct words; 0 for a row of units.
+pub(super) fn heading_likeness(text: &str, separator: Separator) -> usize {
+    let fields = split(text, separator).unwrap_or_default();
+    let texts: Vec<&str> = fields.iter().map(|field| field.value.as_ref()).collect();
+    let is_units = texts.iter().all(|text| text.is_empty() || is_unit(text));
+    if is_units { 0 } else { distinct_words(&texts) }
+}
+
+/// Number of distinct texts that are not empty and do not begin like a value.
+pub(super) fn distinct_words(texts: &[&str]) -> usize {
+    let mut words: Vec<&str> =
+        texts.iter().copied().filter(|text| !text.is_empty() && !begins_like_a_value(text)).collect();
+    words.sort_unstable();
+    words.dedup();
+    words.len()
+}
+
+/// Whether a text is a number with either decimal mark, or looks like a timestamp.
+pub(super) fn is_value(text: &str) -> bool {
+    begins_like_a_value(text)
+        && (Unit::NONE.parse_si(&text.replacen(',', ".", 1)).is_some() || text.contains(':'))
+}
+
+/// Whether a text begins as a number or a timestamp does.
+pub(super) fn begins_like_a_value(text: &str) -> bool {
+    let unsigned = text.strip_prefix(['+', '-']).unwrap_or(text);
+    unsigned.strip_prefix(['.', ',']).unwrap_or(unsigned).starts_with(|c: char| c.is_ascii_digit())
+}
+
+/// Whether a field of a row of units says one.
+fn is_unit(text: &str) -> bool {
+    let is_enclosed = |open, close| text.starts_with(open) && text.ends_with(close);
+    let known = |text: &str| Unit::from_symbol(text).is_some_and(|unit| unit != Unit::NONE);
+    is_enclosed('[', ']') || is_enclosed('(', ')') || text == "-" || known(text) || among(text, &OTHER_UNITS)
+}
+
+fn among(text: &str, words: &[&str]) -> bool {
+    let text = text.to_lowercase();
+    words.contains(&text.as_str())
+}
