@@ -31,7 +31,7 @@ fn the_papers_bench_is_what_the_paper_says() {
     assert_eq!(rig.setup.force_n(), Some(3.0));
     assert_eq!(
         rig.training,
-        Some(Training { arrangement: Arrangement::Even, count: 10, repeats: 1, force_n: None })
+        Some(Training::new(Arrangement::Even, 10))
     );
     assert_eq!(rig.estimator, Estimator::Network(Network::default()));
     assert_eq!(rig.setup.columns(), None);

@@ -33,6 +33,7 @@ fn recording_of(rows: Vec<Row>) -> Recording {
             digests: vec![],
             dialects: vec![],
             seed: None,
+            placement_sd_m: None,
         },
         rows,
     }

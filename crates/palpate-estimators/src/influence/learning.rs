@@ -494,8 +494,14 @@ mod tests {
             time_s: None,
             reading: vec![*value],
         });
-        let provenance =
-            Provenance { source: "test".into(), rows: 0, digests: vec![], dialects: vec![], seed: None };
+        let provenance = Provenance {
+            source: "test".into(),
+            rows: 0,
+            digests: vec![],
+            dialects: vec![],
+            seed: None,
+            placement_sd_m: None,
+        };
         let kinds = vec![SensorKind::Deflection];
         Recording { channels: vec!["d".into()], kinds, rows: rows.collect(), provenance }
     }

@@ -7,6 +7,7 @@ use super::columns::{Column, Columns, Frame, Header, Need, PositionColumns, Valu
 use super::csv_error::{CsvError, CsvProblem};
 use super::dialect::{Dialect, windows_1252};
 use super::marks::{Decimal, Separator};
+use super::placement::placement_of;
 use super::timestamp::Clock;
 use super::{Recording, Row, sha256_hex};
 use palpate_mechanics::contact::{Contact, Position};
@@ -46,7 +47,10 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
         Ok(Row { reading: channels.reading(cells)?, ..contact.row(cells, schema, time_s)? })
     })?;
     schema.check_untouched_times(source, &rows)?;
-    Ok(schema.recording(source, rows, vec![file.digest], [dialect]))
+    let placement_sd_m = placement_of(&file.content);
+    let mut recording = schema.recording(source, rows, vec![file.digest], [dialect]);
+    recording.provenance.placement_sd_m = placement_sd_m;
+    Ok(recording)
 }
 
 /// Reads a recording from two CSV files, of readings and of contacts, that pair row by row; the time column is that of the first

@@ -8,6 +8,7 @@ mod csv_out;
 mod dialect;
 mod heading;
 mod marks;
+mod placement;
 mod table;
 mod timestamp;
 mod untouched;
@@ -23,6 +24,7 @@ pub use csv_out::{csv_row, write, write_as, write_timed};
 pub use dialect::Dialect;
 pub use heading::Heading;
 pub use marks::{Decimal, Separator};
+pub use placement::comment_with_placement;
 pub use table::{Content, Table, TableColumn};
 pub use untouched::{TimeSpan, TimeSpanError};
 pub use warnings::Warning;
@@ -86,7 +88,7 @@ pub fn sha256_hex(content: &[u8]) -> String {
 }
 
 /// Provenance of a recording, so that whatever is fitted to it can say so.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// The name that the caller gave: usually a file's, or "simulation".
     pub source: String,
@@ -99,6 +101,10 @@ pub struct Provenance {
     pub dialects: Vec<Dialect>,
     /// The seed of a simulation.
     pub seed: Option<u64>,
+    /// Standard deviation in each direction of the pressed place about the position of its row, in metres, where a person pressed and
+    /// said so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub placement_sd_m: Option<f64>,
 }
 
 /// One way to hold positions out: the rows to fit, and the rows to judge by.
@@ -129,6 +135,7 @@ impl Recording {
             digests: Vec::new(),
             dialects: Vec::new(),
             seed: None,
+            placement_sd_m: None,
         };
         Self { channels: layout.names(), kinds: layout.kinds(), rows, provenance }
     }

@@ -348,6 +348,7 @@ fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
         digests: Vec::new(),
         dialects: Vec::new(),
         seed: None,
+        placement_sd_m: None,
     };
     Recording {
         channels: vec!["good".to_owned(), "bad".to_owned()],
