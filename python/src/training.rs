@@ -116,8 +116,8 @@ impl Training {
             },
         };
         let force = force_n.map_or_else(String::new, |force_n| format!(", {force_n} N"));
-        let placement = placement_sd_m
-            .map_or_else(String::new, |sd_m| format!(", placement {}", format_length_mm(sd_m)));
+        let placement =
+            placement_sd_m.map_or_else(String::new, |sd_m| format!(", placement {}", format_length_mm(sd_m)));
         format!("<Training: {count} positions, {rule}, {repeats} × each{force}{placement}>")
     }
 

@@ -78,6 +78,7 @@ export class Page {
       s: () => this.calibration.key("skip"),
       q: () => this.calibration.key("stop"),
       f: () => this.calibration.key("finish"),
+      c: () => this.calibration.key("check"),
       space: () => (this.replay.player === null ? this.pause() : this.replay.toggle()),
       "?": () => need<HTMLDialogElement>("help-dialog").showModal(),
       Escape: () => this.replay.close(),

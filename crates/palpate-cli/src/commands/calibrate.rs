@@ -1,15 +1,17 @@
 //! `palpate calibrate`: a calibration by hand, guided press by press, or by a machine.
 
+use super::operator;
 use crate::failure::{Complaint, Failure};
 use crate::progress::{self, Observer};
 use crate::remark::remark;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
+use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
-use palpate_estimators::recording::Row;
+use palpate_estimators::recording::{Recording, Row, comment_with_placement};
 use palpate_live::calibration::{
-    self, Assessment, Calibration, CalibrationError, DepthKnowledge, Journal, JournalError, Machine,
-    MachineError, MachineNote, Note, Press, Waiting,
+    self, Assessment, Calibration, CalibrationError, Check, DepthKnowledge, Journal, JournalError, Machine,
+    MachineError, MachineNote, Note, Press, Statements, Waiting, Weights,
 };
 use palpate_live::input::Input;
 use palpate_live::pipeline::WAITING;
@@ -28,7 +30,7 @@ use std::time::Duration;
 /// Calibrate by pressing: says where to press, takes each press once its reading is at rest, and ends with a locator.
 ///
 /// Positions and repeats are those of the rig's [training]. Every press is in the file of presses before the next one is asked for, and --resume
-/// goes on from there. Between presses the surface is let go, and what it reads then is recorded too: offsets and drift follow from it.
+/// goes on from there. A person is asked first how well he meets the places, and for a second weight where one is too few. Between presses the surface is let go, and what it reads then is recorded too: offsets and drift follow from it.
 /// With --stage a machine presses by itself, as the rig's [stage] says: Enter or Ctrl-C stops it at once.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -49,12 +51,42 @@ pub struct Arguments {
     /// Force of every press, as in `--force "2 N"` [default: the rig's, or unknown]
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     force: Option<f64>,
+    #[command(flatten)]
+    operator: OperatorOptions,
+    /// Check the locator by presses at five fresh places after the fit
+    #[arg(long, conflicts_with = "stage")]
+    check: bool,
     /// Go on with the presses that the file of presses has
     #[arg(long)]
     resume: bool,
     /// Seed of the fit
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+}
+
+/// Statements of the person who presses.
+#[derive(clap::Args)]
+pub struct OperatorOptions {
+    /// How far off the asked place a person presses, as a standard deviation: `--placement "2 mm"` [default: the rig's, or asked for]
+    #[arg(long, value_name = "LENGTH", value_parser = input::length)]
+    placement: Option<f64>,
+    /// A second weight, by which every other place is pressed too [default: asked for where one weight is too few]
+    #[arg(long, value_name = "FORCE", value_parser = input::force, conflicts_with_all = ["force_is_known", "stage"])]
+    second_force: Option<f64>,
+    /// Contacts in use have the force of the presses
+    #[arg(long)]
+    force_is_known: bool,
+}
+
+impl OperatorOptions {
+    /// The statements of the options.
+    pub fn statements(&self) -> Statements {
+        Statements {
+            placement_sd_m: self.placement,
+            second_force_n: self.second_force,
+            force_is_known: self.force_is_known,
+        }
+    }
 }
 
 /// Longest time without a look at keys, signals and the machine.
@@ -67,19 +99,43 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
     let machine = arguments.stage.as_ref();
     let stage = stage(&arguments.rig, &rig, machine, arguments.force)?;
-    let journal = journal(arguments, &rig, stage.as_ref())?;
+    let depths = DepthKnowledge::for_stage(stage.as_ref());
+    let (before, in_file_m) = rows_before(arguments, &rig, depths)?;
+    let known = arguments.operator.statements().or_known(&rig, arguments.force, in_file_m, &before);
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
-    let plan = calibration::plan(&rig, arguments.force, depths_m, journal.rows())
-        .map_err(|error| Complaint::about(&arguments.rig, error))?;
+    let to_come = |statements: &Statements, rows: &[Row]| {
+        calibration::plan(&rig, statements.weights(arguments.force), depths_m, rows)
+            .map_err(|error| Complaint::about(&arguments.rig, error))
+    };
+    let is_by_hand = stage.is_none() && !to_come(&known, &before)?.is_empty();
+    let keys = (arguments.from != SourceUrl::Stdin).then(keys);
+    let statements = match (&keys, is_by_hand) {
+        (Some(keys), true) => operator::ask(known, &rig, arguments.force, keys)?,
+        _ => known,
+    };
+    let rig = statements.applied_to(&rig, arguments.force);
+    let plan = to_come(&statements, &before)?;
+    let comment = comment_with_placement(&pressed_for(&arguments.rig), statements.placement_sd_m);
+    let bench = Bench { arguments, rig: &rig, keys: keys.as_ref() };
     if let Some(press) = plan.first() {
+        if let Some(force_n) = statements.single_weight_n(&rig, arguments.force).filter(|_| is_by_hand) {
+            remark!("{}", operator::single_weight(force_n));
+        }
+        let journal = Journal::new(&rig.setup, &arguments.presses, comment.clone(), before, depths)
+            .map_err(|error| about_journal(&arguments.rig, &error))?;
         let extent = rig.setup.surface().extent();
         remark!("{} presses to go; the first at {}", plan.len(), place(*press, extent));
-        let columns = arguments.from.columns();
-        let calibration = Calibration::new(&rig.setup, stage.as_ref(), columns, plan, journal)
-            .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
-        press_all(arguments, &rig, stage, calibration)?;
+        let calibration = bench.calibration(stage.as_ref(), plan, journal)?;
+        let replan = |rows: &[Row]| to_come(&statements, rows);
+        bench.press_all(stage.clone(), calibration, Some(&replan))?;
     }
-    finish(arguments, &rig, &out)
+    let (locator, recording) = finish(arguments, &rig, &out)?;
+    let weights = statements.weights(arguments.force);
+    let asks = is_by_hand && !arguments.check && bench.keys.is_some_and(operator::wants_check);
+    if arguments.check || asks {
+        bench.check(&locator, &recording.rows, weights, comment, statements.placement_sd_m)?;
+    }
+    Ok(())
 }
 
 /// The stage of the rig, where a machine presses.
@@ -109,30 +165,34 @@ pub fn stage(
     Ok(Some(stage.clone()))
 }
 
-/// The file of presses, empty, or with the presses that it had.
-fn journal(arguments: &Arguments, rig: &Rig, stage: Option<&Stage>) -> Result<Journal, Failure> {
+/// Rows that the file of presses has, and the placement that it says; none of a new file.
+fn rows_before(
+    arguments: &Arguments,
+    rig: &Rig,
+    depths: DepthKnowledge,
+) -> Result<(Vec<Row>, Option<f64>), Failure> {
     let path = &arguments.presses;
-    let depths = DepthKnowledge::for_stage(stage);
     if path.exists() && !arguments.resume {
         let complaint = Complaint::new(format!("{} is there already", path.display()));
         return Err(complaint.help("--resume goes on with its presses; another name begins anew").into());
     }
-    let before = pressed_before(&arguments.rig, rig, path, depths)?;
-    Journal::new(&rig.setup, path, pressed_for(&arguments.rig), before, depths)
-        .map_err(|error| about_journal(&arguments.rig, &error))
+    pressed_before(&arguments.rig, rig, path, depths)
 }
 
-/// Rows that a file of presses has already; none where there is no file.
+/// Rows that a file of presses has already, and the placement that it says; none where there is no file.
 pub fn pressed_before(
     rig_path: &Path,
     rig: &Rig,
     path: &Path,
     depths: DepthKnowledge,
-) -> Result<Vec<Row>, Failure> {
+) -> Result<(Vec<Row>, Option<f64>), Failure> {
     let columns = Journal::columns(&rig.setup, depths).map_err(|error| about_journal(rig_path, &error))?;
     match path.exists() {
-        true => Ok(input::read_recording_as(&rig.setup, path, &columns)?.rows),
-        false => Ok(Vec::new()),
+        true => {
+            let recording = input::read_recording_as(&rig.setup, path, &columns)?;
+            Ok((recording.rows, recording.provenance.placement_sd_m))
+        }
+        false => Ok((Vec::new(), None)),
     }
 }
 
@@ -150,61 +210,114 @@ pub fn about_journal(rig: &Path, error: &JournalError) -> Failure {
     complaint.help(error.help()).into()
 }
 
-/// Presses of a plan, guided; those that are taken are on disk.
-fn press_all(
-    arguments: &Arguments,
-    rig: &Rig,
-    stage: Option<Stage>,
-    mut calibration: Calibration,
-) -> Result<(), Failure> {
-    let keys = (arguments.from != SourceUrl::Stdin).then(keys);
-    let (to, inputs) = sync_channel(WAITING);
-    let _source = Source::open(&arguments.from, Path::new("."), HostClock::new(), to)
-        .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
-    let mut machine = machine(arguments, stage)?;
-    let extent = rig.setup.surface().extent();
-    if machine.is_none() {
-        remark!("r and Enter takes the last press back, s leaves the next out, q ends here");
-        ask(&calibration, extent);
+/// Presses that are missing from rows.
+type Replan<'a> = &'a dyn Fn(&[Row]) -> Result<Vec<Press>, Complaint>;
+
+/// The bench of a calibration, and the person at its keyboard.
+struct Bench<'a> {
+    arguments: &'a Arguments,
+    rig: &'a Rig,
+    keys: Option<&'a Receiver<String>>,
+}
+
+impl Bench<'_> {
+    fn calibration(
+        &self,
+        stage: Option<&Stage>,
+        plan: Vec<Press>,
+        journal: Journal,
+    ) -> Result<Calibration, Failure> {
+        let from = &self.arguments.from;
+        Calibration::new(&self.rig.setup, stage, from.columns(), plan, journal)
+            .map_err(|error| Complaint::new(format!("--from {from}: {error}")).into())
     }
-    let mut ended = false;
-    while calibration.guide().waiting() != Waiting::Nothing && !ended {
-        if progress::interrupted() {
-            // The machine is stopped as it is dropped.
+
+    /// Asks for presses at fresh places, and says how far off the locator is there.
+    fn check(
+        &self,
+        locator: &Locator,
+        rows: &[Row],
+        weights: Weights,
+        comment: String,
+        placement_sd_m: Option<f64>,
+    ) -> Result<(), Failure> {
+        let Self { arguments, rig, .. } = self;
+        let plan = calibration::check_presses(rig, rows, weights);
+        if plan.is_empty() {
+            return Err(
+                Complaint::new("there is no place between those of the calibration to check at").into()
+            );
+        }
+        let path = calibration::check_path(&arguments.presses);
+        let journal = Journal::new(&rig.setup, &path, comment, Vec::new(), DepthKnowledge::Unknown)
+            .map_err(|error| about_journal(&arguments.rig, &error))?;
+        remark!("check at {} fresh places; the presses are in {}", plan.len(), path.display());
+        self.press_all(None, self.calibration(None, plan, journal)?, None)?;
+        if !path.exists() {
+            remark!("no place was checked");
+            return Ok(());
+        }
+        let recording = input::read_recording(&rig.setup, &path)?;
+        let check = Check::new(locator, &recording).map_err(Complaint::new)?;
+        operator::say_check(check.as_ref(), placement_sd_m, rig.setup.surface().extent())
+    }
+
+    /// Presses of a plan, guided; those that are taken are on disk. A press can be struck out where `replan` asks for it again.
+    fn press_all(
+        &self,
+        stage: Option<Stage>,
+        mut calibration: Calibration,
+        replan: Option<Replan>,
+    ) -> Result<(), Failure> {
+        let Self { arguments, rig, keys } = self;
+        let (to, inputs) = sync_channel(WAITING);
+        let _source = Source::open(&arguments.from, Path::new("."), HostClock::new(), to)
+            .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
+        let mut machine = machine(arguments, stage)?;
+        let extent = rig.setup.surface().extent();
+        if machine.is_none() {
+            remark!("{}", help(replan.is_some()));
+            ask(&calibration, extent);
+        }
+        let mut ended = false;
+        while calibration.guide().waiting() != Waiting::Nothing && !ended {
+            if progress::interrupted() {
+                // The machine is stopped as it is dropped.
+                drop(machine);
+                return Err(stopped(arguments, &calibration));
+            }
+            let mut notes = Vec::new();
+            match inputs.recv_timeout(LOOK_EVERY) {
+                Ok(Input::Arrived(arrived)) => calibration
+                    .receive(&arrived, &mut notes)
+                    .map_err(|error| cannot_go_on(arguments, &calibration, error))?,
+                Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => ended = true,
+            }
+            ended |= notes.contains(&Note::Ended);
+            say(&notes, &calibration, machine.is_none().then_some(extent));
+            let key = keys.as_ref().and_then(|keys| keys.try_recv().ok());
+            match (&mut machine, key) {
+                (None, Some(key)) => press_key(&key, arguments, &mut calibration, extent, replan)?,
+                (None, None) => {}
+                (Some(machine), key) => step(machine, key.as_deref(), &notes, &mut calibration)
+                    .map_err(|error| machine_ended(arguments, &calibration, &error))?,
+            }
+        }
+        for (cause, count) in calibration.bad_frames() {
+            remark!("{count} frames were no reading: {}", cause.describe());
+        }
+        if calibration.guide().waiting() != Waiting::Nothing {
             drop(machine);
-            return Err(stopped(arguments, &calibration));
+            return Err(Failure::DataLost(format!(
+                "the source ended before all was pressed; {}",
+                goes_on(arguments, &calibration)
+            )));
         }
-        let mut notes = Vec::new();
-        match inputs.recv_timeout(LOOK_EVERY) {
-            Ok(Input::Arrived(arrived)) => calibration
-                .receive(&arrived, &mut notes)
-                .map_err(|error| cannot_go_on(arguments, &calibration, error))?,
-            Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => ended = true,
+        match machine {
+            Some(machine) => machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error)),
+            None => Ok(()),
         }
-        ended |= notes.contains(&Note::Ended);
-        say(&notes, &calibration, machine.is_none().then_some(extent));
-        let key = keys.as_ref().and_then(|keys| keys.try_recv().ok());
-        match (&mut machine, key) {
-            (None, Some(key)) => press_key(&key, arguments, &mut calibration, extent)?,
-            (None, None) => {}
-            (Some(machine), key) => step(machine, key.as_deref(), &notes, &mut calibration)
-                .map_err(|error| machine_ended(arguments, &calibration, &error))?,
-        }
-    }
-    for (cause, count) in calibration.bad_frames() {
-        remark!("{count} frames were no reading: {}", cause.describe());
-    }
-    if calibration.guide().waiting() != Waiting::Nothing {
-        drop(machine);
-        return Err(Failure::DataLost(format!(
-            "the source ended before all was pressed; {}",
-            goes_on(arguments, &calibration)
-        )));
-    }
-    match machine {
-        Some(machine) => machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error)),
-        None => Ok(()),
     }
 }
 
@@ -295,7 +408,7 @@ fn ask(calibration: &Calibration, extent: Extent) {
 }
 
 /// A press in words.
-fn place(press: Press, extent: Extent) -> String {
+pub fn place(press: Press, extent: Extent) -> String {
     let mm = |at_m: f64| format_length_mm(at_m);
     let place = match extent {
         Extent::Line { .. } => mm(press.position.x_m),
@@ -318,21 +431,48 @@ fn keys() -> Receiver<String> {
     keys
 }
 
+/// Words on the keys.
+fn help(can_strike: bool) -> &'static str {
+    match can_strike {
+        true => {
+            "r and Enter takes the last press back, s leaves the next out, l lists the presses, x 7 strikes press 7 out, q ends here"
+        }
+        false => "r and Enter takes the last press back, s leaves the next out, q ends here",
+    }
+}
+
 fn press_key(
     key: &str,
     arguments: &Arguments,
     calibration: &mut Calibration,
     extent: Extent,
+    replan: Option<Replan>,
 ) -> Result<(), Failure> {
-    match key.trim() {
-        "r" => {
-            if !calibration.redo().map_err(|error| about_journal(&arguments.rig, &error))? {
+    let about = |error: &JournalError| about_journal(&arguments.rig, error);
+    match (key.trim(), replan) {
+        ("r", _) => {
+            if !calibration.redo().map_err(|error| about(&error))? {
                 remark!("nothing was pressed yet");
             }
         }
-        "s" => calibration.skip(),
-        "q" => calibration.stop(),
-        _ => remark!("r and Enter takes the last press back, s leaves the next out, q ends here"),
+        ("s", _) => calibration.skip(),
+        ("q", _) => calibration.stop(),
+        ("l", Some(_)) => operator::list(calibration.journal().rows(), extent),
+        (key, Some(replan)) if key.starts_with("x ") => {
+            let press = key[2..].trim().parse::<usize>().ok().and_then(|press| press.checked_sub(1));
+            let is_struck = match press {
+                Some(press) => calibration.strike(press).map_err(|error| about(&error))?,
+                None => false,
+            };
+            if is_struck {
+                let to_come = replan(calibration.journal().rows())?;
+                calibration.replan(to_come);
+                remark!("struck out; it is asked for again");
+            } else {
+                remark!("no such press; l lists them");
+            }
+        }
+        (_, replan) => remark!("{}", help(replan.is_some())),
     }
     ask(calibration, extent);
     Ok(())
@@ -345,11 +485,18 @@ fn stopped(arguments: &Arguments, calibration: &Calibration) -> Failure {
 /// Words on what is kept.
 fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
     let presses = calibration.journal().presses();
-    format!("{presses} presses are in {}, and --resume goes on", arguments.presses.display())
+    let path = calibration.journal().path();
+    match path == arguments.presses {
+        true => format!("{presses} presses are in {}, and --resume goes on", path.display()),
+        false => format!(
+            "{presses} presses are in {}, and --resume --check begins the check again",
+            path.display()
+        ),
+    }
 }
 
 /// Fits the rig's estimator to the presses on disk, and says how good it is and what more presses would gain.
-fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure> {
+fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Recording), Failure> {
     let recording = input::read_recording(&rig.setup, &arguments.presses)?;
     let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
     let failed = |error: &(dyn std::error::Error + 'static)| match Failure::from_error(error) {
@@ -373,14 +520,15 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure>
     assessment.remarks.iter().for_each(|remark| remark!("{remark}"));
     match assessment.gain {
         Some(gain) if gain.is_enough() => {
-            output::say(format!("more presses would lower the error by less than {} %", gain.stop_percent))
+            output::say(format!("more presses would lower the error by less than {} %", gain.stop_percent))?;
         }
         Some(gain) => output::say(format!(
             "endlessly many more presses would lower the expected error by {:.0} %: `palpate design positions {} --data {}` says where",
             gain.percent,
             arguments.rig.display(),
             arguments.presses.display()
-        )),
-        None => Ok(()),
+        ))?,
+        None => {}
     }
+    Ok((locator, recording))
 }

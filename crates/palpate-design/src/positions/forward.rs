@@ -65,7 +65,15 @@ impl ForwardModel {
     pub fn from_presses(presses: &Presses, setup: &Setup, watch: Watch) -> Result<Self, PositionError> {
         let Presses { positions, readings, reading_sds, .. } = presses;
         let variances: Vec<f64> = (0..positions.len()).map(|row| presses.variance_of(row)).collect();
-        Self::fit(positions, readings, reading_sds, &variances, setup.surface().extent(), setup.force(), watch)
+        Self::fit(
+            positions,
+            readings,
+            reading_sds,
+            &variances,
+            setup.surface().extent(),
+            setup.force(),
+            watch,
+        )
     }
 
     /// Fits to readings of the living channels at some positions: divided by the standard deviations, each has its one of `variances`.
@@ -129,11 +137,15 @@ impl ForwardModel {
         let size = means.iter().map(|mean| mean * mean).sum::<f64>();
         if self.force == Force::Unknown && means.len() > 1 && size > 0.0 {
             for k in 0..d {
-                let along = means.iter().enumerate().map(|(j, mean)| slopes[j * d + k] * mean).sum::<f64>() / size;
+                let along =
+                    means.iter().enumerate().map(|(j, mean)| slopes[j * d + k] * mean).sum::<f64>() / size;
                 means.iter().enumerate().for_each(|(j, mean)| slopes[j * d + k] -= along * mean);
             }
         }
-        slopes.chunks(d).map(|slopes| sd_m * sd_m * slopes.iter().map(|slope| slope * slope).sum::<f64>()).collect()
+        slopes
+            .chunks(d)
+            .map(|slopes| sd_m * sd_m * slopes.iter().map(|slope| slope * slope).sum::<f64>())
+            .collect()
     }
 
     /// Fisher information of a position in one reading once everything is calibrated, by the expected readings' slopes.

@@ -385,8 +385,9 @@ fn beside_the_places(repeats: usize) -> (Setup, Recording) {
 fn stated_placement_is_taken_out_of_the_noise_of_repeats() {
     let ideal = advised(&TEN_M, 8);
     let (setup, mut recording) = beside_the_places(8);
-    let advice =
-        |recording: &Recording| next_press(&setup, recording, &PositionDesign::default(), Watch::NONE).unwrap();
+    let advice = |recording: &Recording| {
+        next_press(&setup, recording, &PositionDesign::default(), Watch::NONE).unwrap()
+    };
     let unstated = advice(&recording);
     recording.provenance.placement_sd_m = Some(2e-3);
     let stated = advice(&recording);

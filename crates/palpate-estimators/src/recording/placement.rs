@@ -43,7 +43,13 @@ mod tests {
 
     #[test]
     fn comments_of_other_programs_say_no_placement() {
-        for line in ["# logger; placement 2 mm", "# palpate 0.1; placement 2", "# palpate 0.1; placement -2 mm", "\u{fe}", ""] {
+        for line in [
+            "# logger; placement 2 mm",
+            "# palpate 0.1; placement 2",
+            "# palpate 0.1; placement -2 mm",
+            "\u{fe}",
+            "",
+        ] {
             assert_eq!(placement_of(line.as_bytes()), None, "{line}");
         }
     }

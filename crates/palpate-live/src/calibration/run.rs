@@ -2,6 +2,8 @@
 
 use super::guide::{Guide, Press, Progress, Waiting};
 use super::journal::{Journal, JournalError};
+use super::repeats::untouched_before;
+use super::trace::RecentReadings;
 use crate::event::{ChannelState, Event};
 use crate::frame::{BadFrame, Channel, ColumnsError, Decoder, Frame};
 use crate::input::{Arrival, Arrived};
@@ -79,6 +81,7 @@ pub struct Calibration {
     bad: BTreeMap<BadFrame, u64>,
     readings: u64,
     last: Vec<f64>,
+    recent: RecentReadings,
     /// True while readings are shown to the guide: not while a machine moves.
     is_guided: bool,
 }
@@ -119,6 +122,7 @@ impl Calibration {
             bad: BTreeMap::new(),
             readings: 0,
             last: Vec::new(),
+            recent: RecentReadings::default(),
             is_guided: true,
         })
     }
@@ -204,6 +208,7 @@ impl Calibration {
         self.readings += 1;
         let channels = reading.len() - usize::from(self.load_cell.is_some());
         self.last = reading[..channels].to_vec();
+        self.recent.add(at, &reading[..channels]);
         self.health.add(&reading[..channels], |event| {
             if let Event::Channel { name, state: ChannelState::Saturated } = event {
                 notes.push(Note::Saturated(name));
@@ -227,7 +232,13 @@ impl Calibration {
                 let depth_m = press.and_then(|press| press.depth_m).filter(|_| row.touches());
                 notes.push(if row.touches() { Note::Taken } else { Note::Untouched });
                 let row = self.weighed(row, &mean)?;
+                let is_press = row.touches();
                 self.journal.add(row, depth_m)?;
+                let rows = self.journal.rows();
+                if let Some(untouched) = untouched_before(rows, rows.len()).filter(|_| is_press) {
+                    let trace = self.recent.trace(&untouched.reading);
+                    self.journal.set_trace(trace);
+                }
             }
         }
         Ok(())
@@ -268,6 +279,19 @@ impl Calibration {
         }
         self.journal.take_back()?;
         Ok(true)
+    }
+
+    /// Strikes out a press, counted from 0; false where there is no such press. [`Self::replan`] asks for it again.
+    ///
+    /// # Errors
+    /// [`JournalError`] where the file cannot be written.
+    pub fn strike(&mut self, press: usize) -> Result<bool, JournalError> {
+        self.journal.strike(press)
+    }
+
+    /// Asks for these presses from now on; the untouched reading is learnt anew.
+    pub fn replan(&mut self, to_come: Vec<Press>) {
+        self.guide = Guide::new(to_come);
     }
 
     /// Leaves out the press that is next.

@@ -11,6 +11,7 @@ mod live;
 mod lock;
 mod machine;
 mod page;
+mod press_records;
 mod pressing;
 mod routes;
 mod session_info;
