@@ -61,8 +61,7 @@ pub(crate) struct TrainingKeys {
     pub repeats: Option<Count<1, MOST>>,
     /// The force of the presses; that of [contact] unless said otherwise.
     pub force: Option<At<Positive<Force>>>,
-    /// How far a person presses beside the asked place: the standard deviation in each direction; asked for at the start of a calibration by
-    /// hand, and unknown unless said.
+    /// How far off the asked place a person presses: the standard deviation in each direction; unknown unless said otherwise.
     pub placement: Option<At<Positive<Length>>>,
 }
 

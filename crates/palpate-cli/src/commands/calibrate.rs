@@ -79,6 +79,16 @@ pub struct OperatorOptions {
 }
 
 impl OperatorOptions {
+    /// The first option that is given.
+    pub fn given(&self) -> Option<&'static str> {
+        match self.statements() {
+            Statements { placement_sd_m: Some(_), .. } => Some("--placement"),
+            Statements { second_force_n: Some(_), .. } => Some("--second-force"),
+            Statements { force_is_known: true, .. } => Some("--force-is-known"),
+            _ => None,
+        }
+    }
+
     /// The statements of the options.
     pub fn statements(&self) -> Statements {
         Statements {

@@ -212,7 +212,12 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
         ..
     } = arguments
     else {
-        return Ok(None);
+        return match arguments.operator.given() {
+            Some(option) => Err(Complaint::new(format!("{option} is for a calibration"))
+                .help("add --calibrate with --presses and --out, or leave it out")
+                .into()),
+            None => Ok(None),
+        };
     };
     if !input::is_toml(path) {
         let complaint = Complaint::about(path, "--calibrate is for rigs, and this is a locator");

@@ -27,3 +27,6 @@ pub use repeats::{Place, deviation_percent, last_deviation_percent, places};
 pub use run::{Calibration, CalibrationError, Note};
 pub use statements::Statements;
 pub use trace::Trace;
+
+#[cfg(test)]
+mod tests;

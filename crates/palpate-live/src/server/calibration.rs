@@ -812,3 +812,85 @@ fn write_places(rows: &[Row], to_come: &[Press], extent: Extent, record: &mut Ca
         })
         .collect();
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn row(x_m: f64, force_n: f64, value: f64) -> Row {
+        let position = Position::along(x_m);
+        Row {
+            position,
+            force_n: Some(force_n),
+            nuisances: Vec::new(),
+            time_s: None,
+            reading: vec![value, 0.5],
+        }
+    }
+
+    fn calibrator(folder: &Path) -> Calibrator {
+        let rig = include_str!("../../../../examples/fsi-like.toml");
+        let rig = Rig::from_toml(&rig.replace("count = 9\nrepeats = 3", "count = 2\nrepeats = 2")).unwrap();
+        Calibrator::new(CalibrationPlan {
+            rig,
+            from: "udp://127.0.0.1:0".parse().unwrap(),
+            presses: folder.join("presses.csv"),
+            out: folder.join("locator.json"),
+            comment: "palpate 0.1.0, pressed for a test".to_owned(),
+            force_n: None,
+            machine: None,
+            before: vec![
+                row(0.0, 0.0, 0.0),
+                row(0.025, 1.0, 0.7),
+                row(0.025, 1.0, 0.9),
+                row(0.0, 0.0, 0.0),
+                row(0.075, 1.0, 0.3),
+            ],
+            statements: Statements { placement_sd_m: Some(1e-3), ..Statements::default() },
+            seed: 0,
+        })
+    }
+
+    fn record(calibrator: &Calibrator) -> Value {
+        serde_json::to_value(calibrator.record()).unwrap()
+    }
+
+    #[test]
+    fn presses_are_listed_and_struck_out_before_it_begins() {
+        let folder = tempfile::tempdir().unwrap();
+        let calibrator = calibrator(folder.path());
+        let state = record(&calibrator);
+        assert_eq!((&state["taken"], &state["left"]), (&json!(3), &json!(1)));
+        assert_eq!((&state["placement_mm"], &state["single_weight_n"]), (&json!(1.0), &Value::Null));
+        let presses = serde_json::to_value(calibrator.presses()).unwrap();
+        assert_eq!((&presses[1]["press"], &presses[1]["x_mm"]), (&json!(2), &json!(25.0)));
+        assert!(presses[1]["deviation_percent"].as_f64().unwrap() > 10.0, "{presses}");
+        assert_eq!(presses[2]["deviation_percent"], Value::Null);
+        calibrator.strike(2).unwrap();
+        let state = record(&calibrator);
+        assert_eq!(
+            (&state["phase"], &state["taken"], &state["left"]),
+            (&json!("ready"), &json!(2), &json!(2))
+        );
+        let file = std::fs::read_to_string(folder.path().join("presses.csv")).unwrap();
+        assert!(file.contains("0.7") && !file.contains("0.9") && file.contains("; placement 1 mm"), "{file}");
+        for press in [0, 3, usize::MAX] {
+            assert!(matches!(calibrator.strike(press), Err(CalibratorError::NoSuchPress { presses: 2, .. })));
+        }
+    }
+
+    #[test]
+    fn nothing_is_checked_before_a_fit_and_no_statement_is_taken_that_is_no_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let calibrator = calibrator(folder.path());
+        let clock = HostClock::new();
+        let checked = calibrator.begin_check(folder.path(), clock, || panic!("the session goes on"));
+        assert!(matches!(checked, Err(CalibratorError::NothingToCheck)));
+        let stated = Statements { second_force_n: Some(f64::NAN), ..Statements::default() };
+        let begun = calibrator.begin(stated, folder.path(), clock, || panic!("the session goes on"));
+        assert!(matches!(begun, Err(CalibratorError::Statement(_))));
+        assert!(!calibrator.finish_check());
+        assert_eq!(record(&calibrator)["can_check"], json!(false));
+    }
+}
