@@ -111,7 +111,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let stage = stage(&arguments.rig, &rig, machine, arguments.force)?;
     let depths = DepthKnowledge::for_stage(stage.as_ref());
     let (before, in_file_m) = rows_before(arguments, &rig, depths)?;
-    let known = arguments.operator.statements().or_known(&rig, arguments.force, in_file_m, &before);
+    let stated = arguments.operator.statements();
+    let known = match &stage {
+        None => stated.or_known(&rig, arguments.force, in_file_m, &before),
+        // The placement of the rig is that of a person.
+        Some(_) => stated,
+    };
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
     let to_come = |statements: &Statements, rows: &[Row]| {
         calibration::plan(&rig, statements.weights(arguments.force), depths_m, rows)

@@ -233,7 +233,11 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     let (before, in_file_m) = pressed_before(path, &rig, presses, depths)?;
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
     let stated = arguments.operator.statements();
-    let statements = stated.or_known(&rig, arguments.force, in_file_m, &before);
+    let statements = match &stage {
+        None => stated.or_known(&rig, arguments.force, in_file_m, &before),
+        // The placement of the rig is that of a person.
+        Some(_) => stated,
+    };
     plan(&rig, statements.weights(arguments.force), depths_m, &before)
         .map_err(|error| Complaint::about(path, error))?;
     let comment = pressed_for(path);

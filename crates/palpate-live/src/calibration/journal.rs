@@ -154,6 +154,8 @@ impl Journal {
             Some(_) => vec![depth_m.unwrap_or(0.0)],
             None => Vec::new(),
         };
+        // Rows that were taken out at the end have no trace any more.
+        self.traces.resize(self.rows.len(), None);
         self.rows.push(Row { time_s, nuisances, ..row });
         self.traces.push(None);
         self.save()
