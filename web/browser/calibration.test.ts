@@ -68,7 +68,7 @@ describe.skipIf(!hasChromium())("calibration", () => {
     await says(page, "calibration-step", /^Ready to calibrate$/);
     expect(await page.locator("#welcome").isVisible()).toBe(false);
     // Readings are shown before anything begins, and the placement is asked for.
-    await says(page, "calibration-rate", /^\d+ readings from .*Hz/);
+    await says(page, "calibration-rate", /^\d+ from .*Hz/);
     await page.locator("#calibration-placement").fill("1.5");
     await picture(page, "calibration-ready");
     await page.locator("#calibration-begin").click();

@@ -37,7 +37,7 @@ export class Preview {
     this.seen = this.seen.filter((seen) => now_s - seen.at_s <= SHOWN_S);
     const rate = rateOf(this.seen);
     const source = state.source === null ? "" : ` from ${state.source}`;
-    setText(need("calibration-rate"), `${state.readings} readings${source}${rate === null ? "" : `, ${hertz(rate)}`}`);
+    setText(need("calibration-rate"), `${state.readings}${source}${rate === null ? "" : `, ${hertz(rate)}`}`);
     const values = state.reading.map((value, i) => element("div", "", element("dt", "", String(i + 1)), element("dd", "", String(Number(value.toPrecision(6))))));
     need("calibration-values").replaceChildren(...values);
     this.draw(now_s);

@@ -4,8 +4,7 @@
 
 use palpate_mechanics::units::{Dimension, Quantity};
 
-/// Beginning of the comments that palpate writes, and the part of them that says the placement.
-const OWN: &str = "# palpate ";
+/// Part of a comment that says the placement.
 const PART: &str = "; placement ";
 
 /// A comment of a recording with its placement: the standard deviation of the distance between pressed and asked place in each
@@ -18,10 +17,10 @@ pub fn comment_with_placement(comment: &str, placement_sd_m: Option<f64>) -> Str
     }
 }
 
-/// Placement that the first line of a file says, where palpate wrote it.
+/// Placement that a comment in the first line of a file says.
 pub(super) fn placement_of(content: &[u8]) -> Option<f64> {
     let line = content.split(|byte| *byte == b'\n').next()?;
-    let (_, text) = std::str::from_utf8(line).ok()?.strip_prefix(OWN)?.rsplit_once(PART)?;
+    let (_, text) = std::str::from_utf8(line).ok()?.strip_prefix('#')?.rsplit_once(PART)?;
     let sd_m = Quantity::parse_as(text.trim_end(), Dimension::Length).ok()?;
     (sd_m.is_finite() && sd_m > 0.0).then_some(sd_m)
 }
@@ -42,9 +41,10 @@ mod tests {
     }
 
     #[test]
-    fn comments_of_other_programs_say_no_placement() {
+    fn lines_without_a_length_say_no_placement() {
         for line in [
-            "# logger; placement 2 mm",
+            "palpate 0.1; placement 2 mm",
+            "# palpate 0.1, placement 2 mm",
             "# palpate 0.1; placement 2",
             "# palpate 0.1; placement -2 mm",
             "\u{fe}",

@@ -236,7 +236,9 @@ impl Calibration {
                 self.journal.add(row, depth_m)?;
                 let rows = self.journal.rows();
                 if let Some(untouched) = untouched_before(rows, rows.len()).filter(|_| is_press) {
-                    let trace = self.recent.trace(&untouched.reading);
+                    let times_s = rows.last().and_then(|row| row.time_s).zip(untouched.time_s);
+                    let ago_s = times_s.map_or(f64::INFINITY, |(press_s, untouched_s)| press_s - untouched_s);
+                    let trace = self.recent.trace(&untouched.reading, ago_s);
                     self.journal.set_trace(trace);
                 }
             }

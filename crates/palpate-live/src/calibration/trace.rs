@@ -32,15 +32,17 @@ impl RecentReadings {
         }
     }
 
-    /// Trace of a press that is taken now, by the last of the readings.
-    pub fn trace(&self, untouched: &[f64]) -> Trace {
+    /// Trace of a press that is taken now, by the last of the readings, since the untouched reading was taken `ago_s` seconds before.
+    pub fn trace(&self, untouched: &[f64], ago_s: f64) -> Trace {
         let Some((taken, pressed)) = self.readings.back() else { return Trace::default() };
         let size = distance(pressed, untouched);
-        let every = self.readings.len().div_ceil(MOST_POINTS).max(1);
+        let age_s = |at: Duration| taken.saturating_sub(at).as_secs_f64();
+        let shown = self.readings.iter().rev().take_while(|(at, _)| age_s(*at) <= ago_s);
+        let every = shown.clone().count().div_ceil(MOST_POINTS).max(1);
         // From the last reading backwards, so that the reading that was taken is among the points.
-        let points = self.readings.iter().rev().step_by(every).map(|(at, reading)| {
+        let points = shown.step_by(every).map(|(at, reading)| {
             let percent = if size > 0.0 { 100.0 * distance(reading, untouched) / size } else { 0.0 };
-            (-taken.saturating_sub(*at).as_secs_f64(), percent)
+            (-age_s(*at), percent)
         });
         let mut points: Vec<(f64, f64)> = points.collect();
         points.reverse();
@@ -59,18 +61,21 @@ mod tests {
             let value = f64::from(i.saturating_sub(1000));
             recent.add(Duration::from_millis(5) * i, &[7.0 + value]);
         }
-        let points = recent.trace(&[7.0]).points;
+        let points = recent.trace(&[7.0], f64::INFINITY).points;
         assert!(points.len() <= MOST_POINTS, "{}", points.len());
         assert_eq!(points.last(), Some(&(0.0, 100.0)));
         assert!(points[0].0 >= -SHOWN.as_secs_f64() && points[0].0 < -3.9, "{:?}", points[0]);
         assert!(points.windows(2).all(|pair| pair[0].0 < pair[1].0 && pair[0].1 <= pair[1].1));
+        // What came before the untouched reading is of another press.
+        let points = recent.trace(&[7.0], 1.0).points;
+        assert!(points[0].0 >= -1.0 && points.len() > 50, "{points:?}");
     }
 
     #[test]
     fn a_trace_of_no_size_has_finite_points() {
         let mut recent = RecentReadings::default();
-        assert_eq!(recent.trace(&[1.0]), Trace::default());
+        assert_eq!(recent.trace(&[1.0], 1.0), Trace::default());
         recent.add(Duration::ZERO, &[1.0]);
-        assert_eq!(recent.trace(&[1.0]).points, [(0.0, 0.0)]);
+        assert_eq!(recent.trace(&[1.0], 1.0).points, [(0.0, 0.0)]);
     }
 }
