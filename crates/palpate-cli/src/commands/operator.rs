@@ -96,6 +96,9 @@ fn answer<T>(
 /// Lists the presses with how far each is off the others of its place.
 pub fn list(rows: &[Row], extent: Extent) {
     let touched = rows.iter().enumerate().filter(|(_, row)| row.touches());
+    if touched.clone().next().is_none() {
+        remark!("no press was taken yet");
+    }
     for (press, (at, row)) in touched.enumerate() {
         let place = place(Press { position: row.position, force_n: row.force_n, depth_m: None }, extent);
         let off = deviation_percent(rows, at).map_or_else(
