@@ -1,6 +1,6 @@
 //! `palpate calibrate`: a calibration by hand, guided press by press, or by a machine.
 
-use super::operator;
+use super::operator::{self, place};
 use crate::failure::{Complaint, Failure};
 use crate::progress::{self, Observer};
 use crate::remark::remark;
@@ -420,16 +420,6 @@ fn ask(calibration: &Calibration, extent: Extent) {
         (Waiting::Release, _) => remark!("let go"),
         (Waiting::Press | Waiting::Nothing, _) => {}
     }
-}
-
-/// A press in words.
-pub fn place(press: Press, extent: Extent) -> String {
-    let mm = |at_m: f64| format_length_mm(at_m);
-    let place = match extent {
-        Extent::Line { .. } => mm(press.position.x_m),
-        Extent::Plane { .. } => format!("{}, {}", mm(press.position.x_m), mm(press.position.y_m)),
-    };
-    press.force_n.map_or_else(|| place.clone(), |force_n| format!("{place} with {force_n} N"))
 }
 
 /// Lines that are typed.

@@ -1,6 +1,5 @@
 //! Questions to the person who presses in `palpate calibrate`, and what he is shown of the presses and of a check.
 
-use super::calibrate::place;
 use crate::failure::Failure;
 use crate::remark::remark;
 use crate::{input, output, progress};
@@ -135,4 +134,14 @@ pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Ext
     let placement = placement_sd_m
         .map_or_else(String::new, |sd_m| format!("; your placement of {} is in it", format_length_mm(sd_m)));
     output::say(format!("error at fresh places: median {median}, mean {mean}{covered}{placement}"))
+}
+
+/// A press in words.
+pub fn place(press: Press, extent: Extent) -> String {
+    let mm = |at_m: f64| format_length_mm(at_m);
+    let place = match extent {
+        Extent::Line { .. } => mm(press.position.x_m),
+        Extent::Plane { .. } => format!("{}, {}", mm(press.position.x_m), mm(press.position.y_m)),
+    };
+    press.force_n.map_or_else(|| place.clone(), |force_n| format!("{place} with {force_n} N"))
 }
