@@ -22,20 +22,19 @@ struct Hand<'a> {
 impl Hand<'_> {
     /// Does what is asked for until `until` holds of the calibration, or nothing is waited for.
     fn obey(&mut self, calibration: &mut Calibration, until: impl Fn(&Calibration) -> bool) {
-        let mut contact: Option<Contact> = None;
         for _ in 0..20_000 {
             if until(calibration) || calibration.guide().waiting() == Waiting::Nothing {
                 return;
             }
-            match calibration.guide().waiting() {
+            let contact = match calibration.guide().waiting() {
                 Waiting::Press | Waiting::Rest => {
                     let press = calibration.guide().next_press().map(|(_, press)| press);
                     let force_n = |press: Press| press.force_n.unwrap_or(1.0);
                     contact =
-                        press.map(|press| Contact { position: press.position, force_n: force_n(press) });
+                        press.map(|press| Contact { position: press.position, force_n: force_n(press) })
                 }
-                Waiting::Untouched | Waiting::Release | Waiting::Nothing => contact = None,
-            }
+                Waiting::Untouched | Waiting::Release | Waiting::Nothing => None,
+            };
             let clean = self.bench.clean(contact.as_slice());
             let reading: Vec<String> = self.bench.measure(&clean).iter().map(f64::to_string).collect();
             self.at += EVERY;
