@@ -30,8 +30,7 @@ impl Hand<'_> {
                 Waiting::Press | Waiting::Rest => {
                     let press = calibration.guide().next_press().map(|(_, press)| press);
                     let force_n = |press: Press| press.force_n.unwrap_or(1.0);
-                    contact =
-                        press.map(|press| Contact { position: press.position, force_n: force_n(press) })
+                    press.map(|press| Contact { position: press.position, force_n: force_n(press) })
                 }
                 Waiting::Untouched | Waiting::Release | Waiting::Nothing => None,
             };
