@@ -9,6 +9,8 @@ const SHOWN: Duration = Duration::from_secs(4);
 /// Most readings that are kept for it, and most points of a trace.
 const MOST_READINGS: usize = 8192;
 const MOST_POINTS: usize = 120;
+/// Seconds before the untouched reading that a trace shows: half of the shortest time for which the surface is at rest then.
+const BEFORE_S: f64 = 0.2;
 
 /// Course of the size of a press until it was taken.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -37,7 +39,7 @@ impl RecentReadings {
         let Some((taken, pressed)) = self.readings.back() else { return Trace::default() };
         let size = distance(pressed, untouched);
         let age_s = |at: Duration| taken.saturating_sub(at).as_secs_f64();
-        let shown = self.readings.iter().rev().take_while(|(at, _)| age_s(*at) <= ago_s);
+        let shown = self.readings.iter().rev().take_while(|(at, _)| age_s(*at) <= ago_s + BEFORE_S);
         let every = shown.clone().count().div_ceil(MOST_POINTS).max(1);
         // From the last reading backwards, so that the reading that was taken is among the points.
         let points = shown.step_by(every).map(|(at, reading)| {
@@ -68,7 +70,7 @@ mod tests {
         assert!(points.windows(2).all(|pair| pair[0].0 < pair[1].0 && pair[0].1 <= pair[1].1));
         // What came before the untouched reading is of another press.
         let points = recent.trace(&[7.0], 1.0).points;
-        assert!(points[0].0 >= -1.0 && points.len() > 50, "{points:?}");
+        assert!(points[0].0 >= -1.0 - BEFORE_S && points.len() > 50, "{points:?}");
     }
 
     #[test]

@@ -834,7 +834,7 @@ mod tests {
         let rig = Rig::from_toml(&rig.replace("count = 9\nrepeats = 3", "count = 2\nrepeats = 2")).unwrap();
         Calibrator::new(CalibrationPlan {
             rig,
-            from: "udp://127.0.0.1:0".parse().unwrap(),
+            from: "tcp://127.0.0.1:9".parse().unwrap(),
             presses: folder.join("presses.csv"),
             out: folder.join("locator.json"),
             comment: "palpate 0.1.0, pressed for a test".to_owned(),
