@@ -34,6 +34,7 @@ class Training:
         positions: Sequence[Point] | None = None,
         repeats: int = 1,
         force: Quantity | None = None,
+        placement: Quantity | None = None,
     ) -> Training: ...
     @property
     def count(self) -> int: ...
@@ -41,6 +42,8 @@ class Training:
     def repeats(self) -> int: ...
     @property
     def force(self) -> float | None: ...
+    @property
+    def placement(self) -> float | None: ...
 
 @final
 class Setup:

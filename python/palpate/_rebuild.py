@@ -16,6 +16,7 @@ def training(
     positions: list[Any] | None,
     repeats: int,
     force: float | None,
+    placement: float | None = None,
 ) -> Training:
     """Training positions from the keys that they were made of."""
     return Training(
@@ -27,4 +28,5 @@ def training(
         positions=positions,
         repeats=repeats,
         force=force,
+        placement=placement,
     )

@@ -20,7 +20,7 @@ pub struct Training(pub arrangement::Training);
 impl Training {
     /// Training positions by a rule; `even` and its like are shorter.
     #[new]
-    #[pyo3(signature = (arrangement, count=None, *, middle=None, portion=None, grid=None, positions=None, repeats=1, force=None))]
+    #[pyo3(signature = (arrangement, count=None, *, middle=None, portion=None, grid=None, positions=None, repeats=1, force=None, placement=None))]
     #[expect(clippy::too_many_arguments, reason = "keys of a section, each by its name")]
     fn new(
         arrangement: &str,
@@ -31,6 +31,7 @@ impl Training {
         positions: Option<Bound<'_, PyAny>>,
         repeats: usize,
         force: Option<Bound<'_, PyAny>>,
+        placement: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let needed =
             |name: &str| refused(format!("training positions by the rule \"{arrangement}\" need `{name}`"));
@@ -66,8 +67,12 @@ impl Training {
             return Err(refused("`repeats` is 0; it must be at least 1"));
         }
         let training = arrangement::Training::new(rule, count).repeated(repeats);
-        Ok(Self(match force {
+        let training = match force {
             Some(force) => training.with_force(checked_force(&force)?),
+            None => training,
+        };
+        Ok(Self(match placement {
+            Some(placement) => training.with_placement(checked_placement(&placement)?),
             None => training,
         }))
     }
@@ -90,8 +95,14 @@ impl Training {
         self.0.force_n
     }
 
+    /// Standard deviation in each direction of the pressed place about the asked one, in metres; None where it is unknown.
+    #[getter]
+    fn placement(&self) -> Option<f64> {
+        self.0.placement_sd_m
+    }
+
     fn __repr__(&self) -> String {
-        let arrangement::Training { arrangement, count, repeats, force_n } = &self.0;
+        let arrangement::Training { arrangement, count, repeats, force_n, placement_sd_m } = &self.0;
         let rule = match arrangement {
             Arrangement::Even | Arrangement::EvenOver { .. } => "even".to_owned(),
             Arrangement::EdgeDense { middle, .. } => format!("edge-dense, {middle} in the middle"),
@@ -105,13 +116,15 @@ impl Training {
             },
         };
         let force = force_n.map_or_else(String::new, |force_n| format!(", {force_n} N"));
-        format!("<Training: {count} positions, {rule}, {repeats} × each{force}>")
+        let placement =
+            placement_sd_m.map_or_else(String::new, |sd_m| format!(", placement {}", format_length_mm(sd_m)));
+        format!("<Training: {count} positions, {rule}, {repeats} × each{force}{placement}>")
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let py = slf.py();
         let rebuild = py.import("palpate._rebuild")?.getattr("training")?;
-        let arrangement::Training { arrangement, count, repeats, force_n } = &slf.get().0;
+        let arrangement::Training { arrangement, count, repeats, force_n, placement_sd_m } = &slf.get().0;
         let (name, middle, portion, grid, positions) = match arrangement {
             Arrangement::Even => ("even", None, None, None, None),
             Arrangement::EvenOver { portion } => ("even", None, Some(*portion), None, None),
@@ -126,8 +139,18 @@ impl Training {
                 ("explicit", None, None, None, Some(positions))
             }
         };
-        let arguments = (name, *count, middle, portion, grid, positions, *repeats, *force_n);
+        let arguments = (name, *count, middle, portion, grid, positions, *repeats, *force_n, *placement_sd_m);
         Ok((rebuild, arguments.into_pyobject(py)?))
+    }
+}
+
+/// A placement in metres, finite and greater than 0.
+fn checked_placement(placement: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let sd_m = length_m(placement, "placement")?;
+    if sd_m.is_finite() && sd_m > 0.0 {
+        Ok(sd_m)
+    } else {
+        Err(refused(format!("`placement` is {sd_m} m; it must be finite and greater than 0")))
     }
 }
 

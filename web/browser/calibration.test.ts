@@ -67,6 +67,9 @@ describe.skipIf(!hasChromium())("calibration", () => {
     const { page, faults } = await open(browser, server.url);
     await says(page, "calibration-step", /^Ready to calibrate$/);
     expect(await page.locator("#welcome").isVisible()).toBe(false);
+    // Readings are shown before anything begins, and the placement is asked for.
+    await says(page, "calibration-rate", /^\d+ from .*Hz/);
+    await page.locator("#calibration-placement").fill("1.5");
     await picture(page, "calibration-ready");
     await page.locator("#calibration-begin").click();
     await obey(page, bench, (_, taken) => taken === 3);
@@ -80,11 +83,28 @@ describe.skipIf(!hasChromium())("calibration", () => {
     await picture(page, "calibration-light");
     await obey(page, bench, (asked) => asked === "No more presses are asked for");
     expect(presses(bench)).toBe(12);
+    // A press that is struck out is asked for again.
+    await page.locator("#calibration-presses summary").click();
+    await page.getByRole("button", { name: "Strike out press 5", exact: true }).click();
+    await says(page, "calibration-progress", /^11 of 12/);
+    await obey(page, bench, (asked) => asked === "No more presses are asked for");
+    await says(page, "calibration-press-list", /^12/);
+    expect(await page.locator("#calibration-press-list svg.trace").count()).toBe(12);
+    await picture(page, "calibration-presses");
+    expect(readFileSync(bench.path("presses.csv"), "utf8")).toMatch(/^# .*; placement 1.5 mm\n/);
     await page.locator("#calibration-finish").click();
     expect(await says(page, "calibration-step", /^Fitted to 12 presses: error at positions held out [\d.]+ mm/)).toContain("median");
     expect(existsSync(bench.path("locator.json"))).toBe(true);
     await dotUnder(page, bench, 123);
     await picture(page, "calibration-done");
+    await page.locator("#calibration-check").click();
+    await obey(page, bench, (asked, taken) => asked.startsWith("Fitted") && taken === 12);
+    expect(await says(page, "calibration-checked-words", /^Error [\d.]+ mm/)).toContain("of 5 within their 95 % intervals");
+    expect(await page.locator("#calibration-checked-places tr").count()).toBe(5);
+    await picture(page, "calibration-checked");
+    bench.lift();
+    // The session goes on with the locator.
+    await dotUnder(page, bench, 200);
     await page.locator("#calibration-close").click();
     expect(await page.locator("#calibration").isVisible()).toBe(false);
     expect(faults).toEqual([]);

@@ -7,10 +7,12 @@ import type {
   CalibrationStep,
   MadeRigRecord,
   PastRecord,
+  PressRecord,
   RecordingContent,
   RecordingInfo,
   RigForm,
   SessionInfo,
+  StepDetails,
 } from "./protocol";
 
 /** An answer of the server that is no success: its words, and what can be done. */
@@ -63,7 +65,8 @@ export const api = {
   mark: async (text: string) => void (await post("mark", { text })),
   record: async (on: boolean) => void (await post("record", { on })),
   calibration: () => get<CalibrationRecord>("calibration"),
-  calibrate: async (step: CalibrationStep) => (await (await post("calibration", { step })).json()) as CalibrationRecord,
+  calibrate: async (step: CalibrationStep, details: StepDetails = {}) => (await (await post("calibration", { step, ...details })).json()) as CalibrationRecord,
+  presses: () => get<PressRecord[]>("calibration/presses"),
   emergencyStop: async () => void (await post("emergency-stop", {})),
   simulate: async () => void (await post("source", { url: "simulated" })),
   recordingFile: (name: string) => withToken(`api/recordings/${encodeURIComponent(name)}/file`),

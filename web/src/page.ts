@@ -88,6 +88,7 @@ export class Page {
       u: () => this.calibration.key("untouched"),
       q: () => this.calibration.key("stop"),
       f: () => this.calibration.key("finish"),
+      c: () => this.calibration.key("check"),
       space: () => (this.replay.player === null ? this.pause() : this.replay.toggle()),
       "?": () => need<HTMLDialogElement>("help-dialog").showModal(),
       Escape: () => this.replay.close(),

@@ -137,9 +137,17 @@ export interface RecordingContent {
   events: EventRecord[];
 }
 
-export type CalibrationPhase = "ready" | "pressing" | "pressed" | "fitting" | "assessing" | "done";
+export type CalibrationPhase = "ready" | "pressing" | "pressed" | "fitting" | "assessing" | "done" | "checking";
 export type Waiting = "untouched" | "press" | "rest" | "release" | "nothing";
-export type CalibrationStep = "begin" | "redo" | "skip" | "untouched" | "stop" | "finish";
+export type CalibrationStep = "begin" | "redo" | "skip" | "untouched" | "stop" | "finish" | "strike" | "check";
+
+/** What goes with a step: statements of the operator with `begin`, the number of the press with `strike`. */
+export interface StepDetails {
+  placement_mm?: number;
+  second_force_n?: number;
+  force_is_known?: boolean;
+  press?: number;
+}
 
 /** A place to press. */
 export interface PlaceRecord {
@@ -165,10 +173,38 @@ export interface CalibrationRecord {
   reading: number[];
   bad_frames: number;
   presses: string;
+  /** Standard deviation of the pressed place about the asked one; null while nobody says it. */
+  placement_mm: number | null;
+  /** The one weight of all presses, where a second one is to be asked for. */
+  single_weight_n: number | null;
   problem: string | null;
   hint: string | null;
   machine: MachineRecord | null;
   outcome: CalibrationOutcome | null;
+  check: CheckRecord | null;
+  can_check: boolean;
+}
+
+/** A press that was taken. */
+export interface PressRecord {
+  press: number;
+  x_mm: number;
+  y_mm?: number;
+  force_n: number | null;
+  deviation_percent: number | null;
+  held_out_mm: number | null;
+  /** Seconds before it was taken, and the distance from the untouched reading in %. */
+  trace: [number, number][];
+}
+
+/** A check of the locator at fresh places. */
+export interface CheckRecord {
+  presses: string;
+  places: { x_mm: number; y_mm?: number; estimate_x_mm: number; estimate_y_mm?: number; error_mm: number; covered: boolean | null }[];
+  median_mm: number;
+  mean_mm: number;
+  covered: number | null;
+  placement_mm: number | null;
 }
 
 export type Motion = "blind" | "homing" | "pressing" | "lifting" | "up" | "down";

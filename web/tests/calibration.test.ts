@@ -3,7 +3,9 @@ import type { CalibrationRecord, MachineRecord } from "../src/protocol";
 
 // The panel's module looks at the page's address as it is loaded.
 vi.stubGlobal("location", { search: "", href: "http://127.0.0.1/" });
-const { stepWords } = await import("../src/panel/calibration");
+const { stepWords, weightWords } = await import("../src/panel/calibration");
+const { checkWords, mmWords, tracePoints } = await import("../src/panel/presses");
+const { rateOf } = await import("../src/panel/preview");
 
 const { movesWords } = await import("../src/panel/machine");
 
@@ -20,17 +22,21 @@ const PRESSING: CalibrationRecord = {
   reading: [],
   bad_frames: 0,
   presses: "presses.csv",
+  placement_mm: null,
+  single_weight_n: null,
   problem: null,
   hint: null,
   machine: null,
   outcome: null,
+  check: null,
+  can_check: false,
 };
 
 describe("words of a calibration", () => {
   test("say where to press, on a line and on a plane, with the force that is known", () => {
-    expect(stepWords(PRESSING)).toBe("Press at 40.0 mm with 3 N");
+    expect(stepWords(PRESSING)).toBe("Press at 40 mm with 3 N");
     const next = { x_mm: 40, y_mm: 12.25, taken: 0, left: 1, spread_percent: null };
-    expect(stepWords({ ...PRESSING, next })).toBe("Press at 40.0, 12.3 mm");
+    expect(stepWords({ ...PRESSING, next })).toBe("Press at 40, 12.25 mm");
   });
 
   test("do not ask for a press while there are no readings", () => {
@@ -83,5 +89,45 @@ describe("words of a calibration", () => {
     const words = stepWords({ ...PRESSING, phase: "done", outcome });
     expect(words).toBe("Fitted to 12 presses: error at positions held out 0.041 mm (median), 0.060 mm (mean)");
     expect(stepWords({ ...PRESSING, phase: "done", outcome: { ...outcome, median_mm: null } })).toBe("Fitted to 12 presses.");
+  });
+});
+
+describe("presses and checks", () => {
+  test("places have the digits that say something", () => {
+    expect(mmWords(14)).toBe("14 mm");
+    expect(mmWords(13.63636)).toBe("13.64 mm");
+    expect(mmWords(4.5, 100)).toBe("4.5, 100 mm");
+  });
+
+  test("a trace fills its box, and one point is none", () => {
+    expect(tracePoints([[-4, 0], [-2, 50], [0, 100]], 100, 20)).toBe("0.0,20.0 50.0,10.0 100.0,0.0");
+    expect(tracePoints([[0, 100]], 100, 20)).toBe("");
+    // An overshoot stays within.
+    expect(tracePoints([[-1, 200], [0, 100]], 100, 20)).toBe("0.0,0.0 100.0,10.0");
+  });
+
+  test("a check says error, coverage and what the hand adds", () => {
+    const check = { presses: "presses-check.csv", places: [], median_mm: 0.5, mean_mm: 0.75, covered: 4, placement_mm: 2 };
+    const places = Array.from({ length: 5 }, () => ({ x_mm: 10, estimate_x_mm: 10.5, error_mm: 0.5, covered: true }));
+    const words = checkWords({ ...check, places });
+    expect(words).toContain("(median)");
+    expect(words).toContain("4 of 5 within their 95 % intervals");
+    expect(words).toContain("presses-check.csv");
+    expect(words).toContain("placement");
+    expect(checkWords({ ...check, places, covered: null, placement_mm: null })).not.toMatch(/interval|placement/);
+  });
+
+  test("a check asks for its places", () => {
+    expect(stepWords({ ...PRESSING, phase: "checking" })).toBe("Press at 40 mm with 3 N");
+    expect(stepWords({ ...PRESSING, phase: "checking", source: null })).toBe("Waiting for readings");
+  });
+
+  test("a second weight is asked for with the reason", () => {
+    expect(weightWords(2)).toContain("All presses have 2 N, and the force in use is unknown");
+  });
+
+  test("the rate needs two looks", () => {
+    expect(rateOf([{ at_s: 1, readings: 5 }])).toBeNull();
+    expect(rateOf([{ at_s: 1, readings: 5 }, { at_s: 3, readings: 205 }])).toBe(100);
   });
 });

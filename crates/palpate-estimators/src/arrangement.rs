@@ -230,6 +230,8 @@ pub struct Training {
     pub repeats: usize,
     /// The force of these presses in newtons, where it is not the contact's.
     pub force_n: Option<f64>,
+    /// Standard deviation in each direction of the pressed place about the asked one, in metres, where it is known.
+    pub placement_sd_m: Option<f64>,
 }
 
 impl Training {
@@ -242,7 +244,7 @@ impl Training {
     /// let training = Training::new(Arrangement::Even, 10).repeated(5).with_force(newtons(3.0));
     /// ```
     pub const fn new(arrangement: Arrangement, count: usize) -> Self {
-        Self { arrangement, count, repeats: 1, force_n: None }
+        Self { arrangement, count, repeats: 1, force_n: None, placement_sd_m: None }
     }
 
     /// `count` equally spaced positions along the length.
@@ -265,6 +267,12 @@ impl Training {
     #[must_use]
     pub fn with_force(self, force_n: f64) -> Self {
         Self { force_n: Some(force_n), ..self }
+    }
+
+    /// The same, pressed by a person who misses the asked place by this standard deviation in each direction, in metres.
+    #[must_use]
+    pub fn with_placement(self, sd_m: f64) -> Self {
+        Self { placement_sd_m: Some(sd_m), ..self }
     }
 
     /// The positions on a surface of this `extent`, each once.

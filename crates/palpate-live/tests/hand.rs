@@ -1,9 +1,11 @@
 //! Hands of all kinds press a board that has hysteresis, creep, residue, drift and a converter: every recorded press has a touch, and nobody waits for ever.
 
 use palpate_estimators::simulate::SimulatedBench;
-use palpate_live::calibration::{Calibration, DepthKnowledge, Journal, Note, Waiting, plan};
+use palpate_live::calibration::{Calibration, DepthKnowledge, Journal, Note, Waiting, Weights, plan};
 use palpate_live::input::{Arrival, Arrived};
-use palpate_live::simulated_board::{BoardConfig, FaultConfig, Finger, Hand, HandStyle, SimulatedBoard};
+use palpate_live::simulated_board::{
+    BoardConfig, FaultConfig, Finger, Hand, HandStyle, Instruction, SimulatedBoard,
+};
 use palpate_live::stamp::HostClock;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_rig::Rig;
@@ -79,7 +81,7 @@ fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
     let presses = folder.path().join("presses.csv");
     let journal =
         Journal::new(&rig.setup, &presses, "test".to_owned(), Vec::new(), DepthKnowledge::Unknown).unwrap();
-    let plan = plan(&rig, None, &[], &[]).unwrap();
+    let plan = plan(&rig, Weights::default(), &[], &[]).unwrap();
     let mut calibration = Calibration::new(&rig.setup, None, &[], plan, journal).unwrap();
     let config = BoardConfig { seed, ..BoardConfig::default() };
     let finger = Finger::random(&rig, seed);
@@ -98,7 +100,14 @@ fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
             (waiting, since_s) = (guide.waiting(), time.as_secs_f64());
         }
         outcome.longest_s = outcome.longest_s.max(time.as_secs_f64() - since_s);
-        let contact = hand.contact_at(time.as_secs_f64(), waiting, next, FORCE_N);
+        let instruction = match (waiting, next) {
+            (Waiting::Press, Some(press)) => {
+                Instruction::Press(Contact { position: press.position, force_n: FORCE_N })
+            }
+            (Waiting::Rest, _) => Instruction::Hold,
+            _ => Instruction::Lift,
+        };
+        let contact = hand.contact_at(time.as_secs_f64(), instruction);
         contacts.push(contact);
         board.finger_mut().hold(contact);
         let bytes = board.next_frame().unwrap_or_default();

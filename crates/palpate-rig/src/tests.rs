@@ -29,10 +29,7 @@ fn the_papers_bench_is_what_the_paper_says() {
     layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 5e-6)).unwrap();
     assert_eq!(rig.setup.layout(), &layout);
     assert_eq!(rig.setup.force_n(), Some(3.0));
-    assert_eq!(
-        rig.training,
-        Some(Training { arrangement: Arrangement::Even, count: 10, repeats: 1, force_n: None })
-    );
+    assert_eq!(rig.training, Some(Training::new(Arrangement::Even, 10)));
     assert_eq!(rig.estimator, Estimator::Network(Network::default()));
     assert_eq!(rig.setup.columns(), None);
 }

@@ -4,10 +4,11 @@ use serde::Deserialize;
 
 use palpate_estimators::arrangement::{Arrangement, ArrangementError, Training};
 use palpate_mechanics::surface::{Digit, Extent, SurfaceSpec, UniformLoad};
+use palpate_mechanics::units::format_length_mm;
 
 use crate::document::{At, place};
 use crate::error::{Place, RigError, RigProblem};
-use crate::values::{Count, Force, Grid, ON_A_PLANE, Point, Positive, Quantity, Ratio, check_order};
+use crate::values::{Count, Force, Grid, Length, ON_A_PLANE, Point, Positive, Quantity, Ratio, check_order};
 
 /// Greatest number of training positions, and of presses of one position.
 const MOST: i64 = 100_000;
@@ -60,6 +61,8 @@ pub(crate) struct TrainingKeys {
     pub repeats: Option<Count<1, MOST>>,
     /// The force of the presses; that of [contact] unless said otherwise.
     pub force: Option<At<Positive<Force>>>,
+    /// How far off the asked place a person presses: the standard deviation in each direction; unknown unless said otherwise.
+    pub placement: Option<At<Positive<Length>>>,
 }
 
 /// A rule that places positions.
@@ -139,12 +142,26 @@ impl At<TrainingKeys> {
             count,
             repeats: self.repeats.map_or(1, Count::get),
             force_n: self.force.as_ref().map(|force| force.si),
+            placement_sd_m: self.placement_sd_m(extent)?,
         };
         training.positions(extent).map_err(|error| {
             let place = self.place_of(&error).unwrap_or(&self.place);
             RigProblem::Arrangement(error).at_place(place)
         })?;
         Ok(training)
+    }
+
+    /// The placement, which is less than the surface's longest side: a place that could be anywhere is none.
+    fn placement_sd_m(&self, extent: Extent) -> Result<Option<f64>, RigError> {
+        let Some(placement) = &self.placement else { return Ok(None) };
+        let side_m = extent.length_m().max(extent.width_m().unwrap_or(0.0));
+        match placement.si < side_m {
+            true => Ok(Some(placement.si)),
+            false => {
+                let most = format_length_mm(side_m);
+                Err(placement.place.refuse(format!("less than {most}, the longest side of the surface")))
+            }
+        }
     }
 
     /// Refuses keys of other rules.

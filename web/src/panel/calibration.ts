@@ -2,21 +2,29 @@
 
 import { api } from "../api";
 import { element, need, setText } from "../dom";
-import type { CalibrationOutcome, CalibrationRecord, CalibrationStep, PlaceRecord } from "../protocol";
+import type { CalibrationOutcome, CalibrationRecord, CalibrationStep, PlaceRecord, StepDetails } from "../protocol";
 import { size } from "../words";
 import { machineStep, MachinePanel, motionWords } from "./machine";
+import { mmWords, writeCheck, writePresses } from "./presses";
+import { Preview } from "./preview";
 
 /** Milliseconds between two looks at a calibration that goes on, and at one that waits for a person. */
 const LOOK_MS = 150;
 const IDLE_MS = 1_000;
+/** Milliseconds between two looks while raw readings are shown. */
+const PREVIEW_MS = 200;
 
-const BUTTONS: { id: string; step: CalibrationStep }[] = [
+/** Steps that have a button. */
+type ButtonStep = Exclude<CalibrationStep, "strike">;
+
+const BUTTONS: { id: string; step: ButtonStep }[] = [
   { id: "calibration-begin", step: "begin" },
   { id: "calibration-redo", step: "redo" },
   { id: "calibration-skip", step: "skip" },
   { id: "calibration-untouched", step: "untouched" },
   { id: "calibration-stop", step: "stop" },
   { id: "calibration-finish", step: "finish" },
+  { id: "calibration-check", step: "check" },
 ];
 
 /** The panel of a calibration; hidden where the server has none. */
@@ -24,6 +32,9 @@ export class CalibrationPanel {
   /** Its state, while it is shown. */
   state: CalibrationRecord | null = null;
   private machine = new MachinePanel();
+  private preview = new Preview();
+  /** Presses that the list shows: their number, and whether they can be struck out. */
+  private listed = "";
   private looks = false;
   private closed = false;
 
@@ -33,6 +44,11 @@ export class CalibrationPanel {
   ) {
     for (const { id, step } of BUTTONS) need(id).addEventListener("click", () => this.act(step));
     need("calibration-close").addEventListener("click", () => this.close());
+    need("calibration-statements").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.act("begin");
+    });
+    need("calibration-presses").addEventListener("toggle", () => void this.list(true));
   }
 
   /** Begins to follow the server's calibration. */
@@ -48,17 +64,20 @@ export class CalibrationPanel {
   }
 
   /** Takes a step by a key, where its button is there. */
-  key(step: CalibrationStep): void {
+  key(step: ButtonStep): void {
     const button = BUTTONS.find((button) => button.step === step);
     if (button !== undefined && !need<HTMLButtonElement>(button.id).hidden) this.act(step);
   }
 
-  private act(step: CalibrationStep): void {
+  private act(step: CalibrationStep, details: StepDetails = {}): void {
     if (step === "begin" && this.state?.machine != null) this.machine.begins();
-    void api.calibrate(step).then(
+    const stated = step === "begin" ? statements() : details;
+    void api.calibrate(step, stated).then(
       (state) => {
         if (step === "begin") this.machine.begun();
         this.take(state);
+        this.follow();
+        void this.list(true);
       },
       (error: unknown) => this.failed(error),
     );
@@ -76,7 +95,8 @@ export class CalibrationPanel {
       this.looks = false;
       return;
     }
-    setTimeout(() => void this.look(), phase === "ready" || phase === undefined ? IDLE_MS : LOOK_MS);
+    const previews = phase === "ready" && (this.state?.readings ?? 0) > 0;
+    setTimeout(() => void this.look(), previews ? PREVIEW_MS : phase === "ready" || phase === undefined ? IDLE_MS : LOOK_MS);
   }
 
   private close(): void {
@@ -104,10 +124,12 @@ export class CalibrationPanel {
     const bar = need<HTMLProgressElement>("calibration-bar");
     bar.max = Math.max(1, planned);
     bar.value = state.taken;
-    const pressing = state.phase === "pressing";
+    const checking = state.phase === "checking";
+    const pressing = state.phase === "pressing" || checking;
     const waits = state.phase === "ready" || state.phase === "pressed";
-    const shown: Record<CalibrationStep, boolean> = {
+    const shown: Record<ButtonStep, boolean> = {
       begin: (state.phase === "ready" && state.left > 0) || state.phase === "pressed",
+      check: state.can_check,
       redo: (pressing || state.phase === "pressed") && state.taken > 0 && state.machine === null,
       skip: pressing && state.machine === null,
       untouched: pressing && state.machine === null,
@@ -117,7 +139,26 @@ export class CalibrationPanel {
     for (const { id, step } of BUTTONS) need(id).hidden = !shown[step];
     need("calibration-begin").firstChild!.textContent = beginWords(state);
     need("calibration-close").hidden = state.phase !== "done";
+    writeStatements(state);
+    this.preview.write(state, performance.now() / 1000);
+    writeCheck(state.check);
     this.writePlaces(state);
+    void this.list(false);
+  }
+
+  /** Lists the presses where the list is open and they have changed, or `anew`. */
+  private async list(anew: boolean): Promise<void> {
+    const state = this.state;
+    if (state === null || state.phase === "checking" || !need<HTMLDetailsElement>("calibration-presses").open) return;
+    const canStrike = state.machine?.runs !== true && !["fitting", "assessing"].includes(state.phase);
+    const listed = `${state.taken} ${state.phase} ${canStrike}`;
+    if (listed === this.listed && !anew) return;
+    this.listed = listed;
+    try {
+      writePresses(await api.presses(), canStrike, (press) => this.act("strike", { press }));
+    } catch (error) {
+      this.failed(error);
+    }
   }
 
   private writeProblem(words: string | null): void {
@@ -141,6 +182,36 @@ export class CalibrationPanel {
   }
 }
 
+/** A number of an input; undefined where it is empty. */
+function inputNumber(id: string): number | undefined {
+  const value = need<HTMLInputElement>(id).valueAsNumber;
+  return Number.isFinite(value) ? value : undefined;
+}
+
+/** What the operator states. */
+function statements(): StepDetails {
+  const details: StepDetails = {};
+  const [placement_mm, second_force_n] = [inputNumber("calibration-placement"), inputNumber("calibration-second")];
+  if (placement_mm !== undefined) details.placement_mm = placement_mm;
+  if (need<HTMLInputElement>("calibration-known").checked) details.force_is_known = true;
+  else if (second_force_n !== undefined) details.second_force_n = second_force_n;
+  return details;
+}
+
+/** Asks for what is not known before the first press of a run by hand. */
+function writeStatements(state: CalibrationRecord): void {
+  const asks = state.phase === "ready" && state.machine === null && state.left > 0;
+  need("calibration-placement-row").hidden = state.placement_mm !== null;
+  need("calibration-weights").hidden = state.single_weight_n === null;
+  need("calibration-statements").hidden = !asks || (state.placement_mm !== null && state.single_weight_n === null);
+  if (state.single_weight_n !== null) setText(need("calibration-weights-why"), weightWords(state.single_weight_n));
+}
+
+/** Why a second weight is asked for. */
+export function weightWords(force_n: number): string {
+  return `All presses have ${Number(force_n.toPrecision(3))} N, and the force in use is unknown: one weight cannot tell how readings grow with the force.`;
+}
+
 function beginWords(state: CalibrationRecord): string {
   if (state.machine !== null) return state.taken === 0 ? "Press by machine " : "Go on by machine ";
   return state.taken === 0 ? "Begin " : "Go on ";
@@ -156,6 +227,8 @@ export function stepWords(state: CalibrationRecord): string {
       if (state.machine?.runs === true) return machineStep(state.machine, state);
       if (state.source === null) return "Waiting for readings";
       return waitingWords(state);
+    case "checking":
+      return state.source === null ? "Waiting for readings" : waitingWords(state);
     case "pressed":
       return "No more presses are asked for";
     case "fitting":
@@ -196,6 +269,8 @@ function whyWords(state: CalibrationRecord): string {
       if (state.waiting === "untouched") return "The noise and the untouched reading are learnt.";
       if (state.last_percent === null) return state.waiting === "release" ? "The press is on disk." : "";
       return `The last press is ${size(state.last_percent)} % off the others of its place.`;
+    case "checking":
+      return `Check: ${state.taken} of ${state.taken + state.left} fresh places, which the calibration has not pressed.`;
     case "pressed":
       return "Take the last press back, go on with those that were left out, or fit the locator.";
     case "done":
@@ -223,8 +298,7 @@ function gainWords(outcome: CalibrationOutcome): string {
 }
 
 function placeWords(place: PlaceRecord): string {
-  const mm = (value: number) => value.toFixed(1);
-  return place.y_mm === undefined ? `${mm(place.x_mm)} mm` : `${mm(place.x_mm)}, ${mm(place.y_mm)} mm`;
+  return mmWords(place.x_mm, place.y_mm);
 }
 
 function forceWords(place: PlaceRecord): string {

@@ -1,15 +1,17 @@
 //! `palpate calibrate`: a calibration by hand, guided press by press, or by a machine.
 
+use super::operator::{self, place};
 use crate::failure::{Complaint, Failure};
 use crate::progress::{self, Observer};
 use crate::remark::remark;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
+use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
-use palpate_estimators::recording::Row;
+use palpate_estimators::recording::{Recording, Row, comment_with_placement};
 use palpate_live::calibration::{
-    self, Assessment, Calibration, CalibrationError, DepthKnowledge, Journal, JournalError, Machine,
-    MachineError, MachineNote, Note, Press, Waiting,
+    self, Assessment, Calibration, CalibrationError, Check, DepthKnowledge, Journal, JournalError, Machine,
+    MachineError, MachineNote, Note, Press, Statements, Waiting, Weights,
 };
 use palpate_live::input::Input;
 use palpate_live::pipeline::WAITING;
@@ -28,7 +30,7 @@ use std::time::Duration;
 /// Calibrate by pressing: says where to press, takes each press once its reading is at rest, and ends with a locator.
 ///
 /// Positions and repeats are those of the rig's [training]. Every press is in the file of presses before the next one is asked for, and --resume
-/// goes on from there. Between presses the surface is let go, and what it reads then is recorded too: offsets and drift follow from it.
+/// goes on from there. A person is asked first how well he meets the places, and for a second weight where one is too few. Between presses the surface is let go, and what it reads then is recorded too: offsets and drift follow from it.
 /// With --stage a machine presses by itself, as the rig's [stage] says: Enter or Ctrl-C stops it at once.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -52,6 +54,11 @@ pub struct Arguments {
     /// Travel to every position at the height of travel, and press nowhere; nothing is read or written
     #[arg(long, requires = "stage")]
     dry_run: bool,
+    #[command(flatten)]
+    operator: OperatorOptions,
+    /// Check the locator by presses at five fresh places after the fit
+    #[arg(long, conflicts_with = "stage")]
+    check: bool,
     /// Go on with the presses that the file of presses has
     #[arg(long)]
     resume: bool,
@@ -60,8 +67,41 @@ pub struct Arguments {
     seed: u64,
 }
 
-/// Keys of a calibration by hand.
-const KEYS: &str = "keys, each with Enter: r takes the last press back, s leaves the next out, u learns the untouched reading anew, q ends here";
+/// Statements of the person who presses.
+#[derive(clap::Args)]
+pub struct OperatorOptions {
+    /// How far off the asked place a person presses, as a standard deviation: `--placement "2 mm"` [default: the rig's, or asked for]
+    #[arg(long, value_name = "LENGTH", value_parser = input::length)]
+    placement: Option<f64>,
+    /// A second weight, by which every other place is pressed too [default: asked for where one weight is too few]
+    #[arg(long, value_name = "FORCE", value_parser = input::force, conflicts_with_all = ["force_is_known", "stage"])]
+    second_force: Option<f64>,
+    /// Contacts in use have the force of the presses
+    #[arg(long)]
+    force_is_known: bool,
+}
+
+impl OperatorOptions {
+    /// The first option that is given.
+    pub fn given(&self) -> Option<&'static str> {
+        match self.statements() {
+            Statements { placement_sd_m: Some(_), .. } => Some("--placement"),
+            Statements { second_force_n: Some(_), .. } => Some("--second-force"),
+            Statements { force_is_known: true, .. } => Some("--force-is-known"),
+            _ => None,
+        }
+    }
+
+    /// The statements of the options.
+    pub fn statements(&self) -> Statements {
+        Statements {
+            placement_sd_m: self.placement,
+            second_force_n: self.second_force,
+            force_is_known: self.force_is_known,
+        }
+    }
+}
+
 /// Longest time without a look at keys, signals and the machine.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
@@ -75,19 +115,48 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let (true, Some(stage)) = (arguments.dry_run, &stage) {
         return dry_run(arguments, &rig, stage.clone());
     }
-    let journal = journal(arguments, &rig, stage.as_ref())?;
+    let depths = DepthKnowledge::for_stage(stage.as_ref());
+    let (before, in_file_m) = rows_before(arguments, &rig, depths)?;
+    let stated = arguments.operator.statements();
+    let known = match &stage {
+        None => stated.or_known(&rig, arguments.force, in_file_m, &before),
+        // The placement of the rig is that of a person.
+        Some(_) => stated,
+    };
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
-    let plan = calibration::plan(&rig, arguments.force, depths_m, journal.rows())
-        .map_err(|error| Complaint::about(&arguments.rig, error))?;
+    let to_come = |statements: &Statements, rows: &[Row]| {
+        calibration::plan(&rig, statements.weights(arguments.force), depths_m, rows)
+            .map_err(|error| Complaint::about(&arguments.rig, error))
+    };
+    let is_by_hand = stage.is_none() && !to_come(&known, &before)?.is_empty();
+    let keys = (arguments.from != SourceUrl::Stdin).then(keys);
+    let statements = match (&keys, is_by_hand) {
+        (Some(keys), true) => operator::ask(known, &rig, arguments.force, keys)?,
+        _ => known,
+    };
+    let rig = statements.applied_to(&rig, arguments.force);
+    let plan = to_come(&statements, &before)?;
+    let comment = comment_with_placement(&pressed_for(&arguments.rig), statements.placement_sd_m);
+    let bench = Bench { arguments, rig: &rig, keys: keys.as_ref() };
     if let Some(press) = plan.first() {
+        if let Some(force_n) = statements.single_weight_n(&rig, arguments.force).filter(|_| is_by_hand) {
+            remark!("{}", operator::single_weight(force_n));
+        }
+        let journal = Journal::new(&rig.setup, &arguments.presses, comment.clone(), before, depths)
+            .map_err(|error| about_journal(&arguments.rig, &error))?;
         let extent = rig.setup.surface().extent();
         remark!("{} presses to go; the first at {}", plan.len(), place(*press, extent));
-        let columns = arguments.from.columns();
-        let calibration = Calibration::new(&rig.setup, stage.as_ref(), columns, plan, journal)
-            .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
-        press_all(arguments, &rig, stage, calibration)?;
+        let calibration = bench.calibration(stage.as_ref(), plan, journal)?;
+        let replan = |rows: &[Row]| to_come(&statements, rows);
+        bench.press_all(stage.clone(), calibration, Some(&replan))?;
     }
-    finish(arguments, &rig, &out)
+    let (locator, recording) = finish(arguments, &rig, &out)?;
+    let weights = statements.weights(arguments.force);
+    let asks = is_by_hand && !arguments.check && bench.keys.is_some_and(operator::wants_check);
+    if arguments.check || asks {
+        bench.check(&locator, &recording.rows, weights, comment, statements.placement_sd_m)?;
+    }
+    Ok(())
 }
 
 /// The stage of the rig, where a machine presses.
@@ -117,30 +186,34 @@ pub fn stage(
     Ok(Some(stage.clone()))
 }
 
-/// The file of presses, empty, or with the presses that it had.
-fn journal(arguments: &Arguments, rig: &Rig, stage: Option<&Stage>) -> Result<Journal, Failure> {
+/// Rows that the file of presses has, and the placement that it says; none of a new file.
+fn rows_before(
+    arguments: &Arguments,
+    rig: &Rig,
+    depths: DepthKnowledge,
+) -> Result<(Vec<Row>, Option<f64>), Failure> {
     let path = &arguments.presses;
-    let depths = DepthKnowledge::for_stage(stage);
     if path.exists() && !arguments.resume {
         let complaint = Complaint::new(format!("{} is there already", path.display()));
         return Err(complaint.help("--resume goes on with its presses; another name begins anew").into());
     }
-    let before = pressed_before(&arguments.rig, rig, path, depths)?;
-    Journal::new(&rig.setup, path, pressed_for(&arguments.rig), before, depths)
-        .map_err(|error| about_journal(&arguments.rig, &error))
+    pressed_before(&arguments.rig, rig, path, depths)
 }
 
-/// Rows that a file of presses has already; none where there is no file.
+/// Rows that a file of presses has already, and the placement that it says; none where there is no file.
 pub fn pressed_before(
     rig_path: &Path,
     rig: &Rig,
     path: &Path,
     depths: DepthKnowledge,
-) -> Result<Vec<Row>, Failure> {
+) -> Result<(Vec<Row>, Option<f64>), Failure> {
     let columns = Journal::columns(&rig.setup, depths).map_err(|error| about_journal(rig_path, &error))?;
     match path.exists() {
-        true => Ok(input::read_recording_as(&rig.setup, path, &columns)?.rows),
-        false => Ok(Vec::new()),
+        true => {
+            let recording = input::read_recording_as(&rig.setup, path, &columns)?;
+            Ok((recording.rows, recording.provenance.placement_sd_m))
+        }
+        false => Ok((Vec::new(), None)),
     }
 }
 
@@ -158,64 +231,117 @@ pub fn about_journal(rig: &Path, error: &JournalError) -> Failure {
     complaint.help(error.help()).into()
 }
 
-/// Presses of a plan, guided; those that are taken are on disk.
-fn press_all(
-    arguments: &Arguments,
-    rig: &Rig,
-    stage: Option<Stage>,
-    mut calibration: Calibration,
-) -> Result<(), Failure> {
-    let keys = (arguments.from != SourceUrl::Stdin).then(keys);
-    let (to, inputs) = sync_channel(WAITING);
-    let _source = Source::open(&arguments.from, Path::new("."), HostClock::new(), to)
-        .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
-    let mut machine = machine(arguments, stage)?;
-    let extent = rig.setup.surface().extent();
-    if machine.is_none() {
-        remark!("{KEYS}");
-        ask(&calibration, extent);
+/// Presses that are missing from rows.
+type Replan<'a> = &'a dyn Fn(&[Row]) -> Result<Vec<Press>, Complaint>;
+
+/// The bench of a calibration, and the person at its keyboard.
+struct Bench<'a> {
+    arguments: &'a Arguments,
+    rig: &'a Rig,
+    keys: Option<&'a Receiver<String>>,
+}
+
+impl Bench<'_> {
+    fn calibration(
+        &self,
+        stage: Option<&Stage>,
+        plan: Vec<Press>,
+        journal: Journal,
+    ) -> Result<Calibration, Failure> {
+        let from = &self.arguments.from;
+        Calibration::new(&self.rig.setup, stage, from.columns(), plan, journal)
+            .map_err(|error| Complaint::new(format!("--from {from}: {error}")).into())
     }
-    let mut ended = false;
-    while calibration.guide().waiting() != Waiting::Nothing && !ended {
-        if progress::interrupted() {
-            // The machine is stopped as it is dropped.
-            drop(machine);
-            return Err(stopped(arguments, &calibration));
+
+    /// Asks for presses at fresh places, and says how far off the locator is there.
+    fn check(
+        &self,
+        locator: &Locator,
+        rows: &[Row],
+        weights: Weights,
+        comment: String,
+        placement_sd_m: Option<f64>,
+    ) -> Result<(), Failure> {
+        let Self { arguments, rig, .. } = self;
+        let plan = calibration::check_presses(rig, rows, weights);
+        if plan.is_empty() {
+            return Err(
+                Complaint::new("there is no place between those of the calibration to check at").into()
+            );
         }
-        let mut notes = Vec::new();
-        match inputs.recv_timeout(LOOK_EVERY) {
-            Ok(Input::Arrived(arrived)) => calibration
-                .receive(&arrived, &mut notes)
-                .map_err(|error| cannot_go_on(arguments, &calibration, error))?,
-            Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => ended = true,
+        let path = calibration::check_path(&arguments.presses);
+        let journal = Journal::new(&rig.setup, &path, comment, Vec::new(), DepthKnowledge::Unknown)
+            .map_err(|error| about_journal(&arguments.rig, &error))?;
+        remark!("check at {} fresh places; the presses are in {}", plan.len(), path.display());
+        self.press_all(None, self.calibration(None, plan, journal)?, None)?;
+        if !path.exists() {
+            remark!("no place was checked");
+            return Ok(());
         }
-        ended |= notes.contains(&Note::Ended);
-        say(&notes, &calibration, machine.is_none().then_some(extent));
-        let key = keys.as_ref().and_then(|keys| keys.try_recv().ok());
-        match (&mut machine, key) {
-            (None, Some(key)) => press_key(&key, arguments, &mut calibration, extent)?,
-            (None, None) => {}
-            (Some(machine), key) => step(machine, key.as_deref(), &notes, &mut calibration)
-                .map_err(|error| machine_ended(arguments, &calibration, &error))?,
-        }
+        let recording = input::read_recording(&rig.setup, &path)?;
+        let check = Check::new(locator, &recording).map_err(Complaint::new)?;
+        operator::say_check(check.as_ref(), placement_sd_m, rig.setup.surface().extent())
     }
-    for (cause, count) in calibration.bad_frames() {
-        remark!("{count} frames were no reading: {}", cause.describe());
-    }
-    if calibration.guide().waiting() != Waiting::Nothing {
-        if let Some(machine) = machine {
-            // No reading shows its finger any more.
-            machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error))?;
+
+    /// Presses of a plan, guided; those that are taken are on disk. A press can be struck out where `replan` asks for it again.
+    fn press_all(
+        &self,
+        stage: Option<Stage>,
+        mut calibration: Calibration,
+        replan: Option<Replan>,
+    ) -> Result<(), Failure> {
+        let Self { arguments, rig, keys } = self;
+        let (to, inputs) = sync_channel(WAITING);
+        let _source = Source::open(&arguments.from, Path::new("."), HostClock::new(), to)
+            .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
+        let mut machine = machine(arguments, stage)?;
+        let extent = rig.setup.surface().extent();
+        if machine.is_none() {
+            remark!("{}", help(replan.is_some()));
+            ask(&calibration, extent);
         }
-        return Err(Failure::DataLost(format!(
-            "the source ended before all was pressed; {}",
-            goes_on(arguments, &calibration)
-        )));
-    }
-    match machine {
-        Some(machine) => machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error)),
-        None => Ok(()),
+        let mut ended = false;
+        while calibration.guide().waiting() != Waiting::Nothing && !ended {
+            if progress::interrupted() {
+                // The machine is stopped as it is dropped.
+                drop(machine);
+                return Err(stopped(arguments, &calibration));
+            }
+            let mut notes = Vec::new();
+            match inputs.recv_timeout(LOOK_EVERY) {
+                Ok(Input::Arrived(arrived)) => calibration
+                    .receive(&arrived, &mut notes)
+                    .map_err(|error| cannot_go_on(arguments, &calibration, error))?,
+                Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => ended = true,
+            }
+            ended |= notes.contains(&Note::Ended);
+            say(&notes, &calibration, machine.is_none().then_some(extent));
+            let key = keys.as_ref().and_then(|keys| keys.try_recv().ok());
+            match (&mut machine, key) {
+                (None, Some(key)) => press_key(&key, arguments, &mut calibration, extent, replan)?,
+                (None, None) => {}
+                (Some(machine), key) => step(machine, key.as_deref(), &notes, &mut calibration)
+                    .map_err(|error| machine_ended(arguments, &calibration, &error))?,
+            }
+        }
+        for (cause, count) in calibration.bad_frames() {
+            remark!("{count} frames were no reading: {}", cause.describe());
+        }
+        if calibration.guide().waiting() != Waiting::Nothing {
+            if let Some(machine) = machine {
+                // No reading shows its finger any more.
+                machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error))?;
+            }
+            return Err(Failure::DataLost(format!(
+                "the source ended before all was pressed; {}",
+                goes_on(arguments, &calibration)
+            )));
+        }
+        match machine {
+            Some(machine) => machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error)),
+            None => Ok(()),
+        }
     }
 }
 
@@ -248,7 +374,8 @@ fn open_stage(url: &StageUrl, stage: Stage) -> Result<StageThread, Failure> {
 /// Homes, and travels to every position at the height of travel.
 fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage) -> Result<(), Failure> {
     let Some(url) = &arguments.stage else { return Ok(()) };
-    let plan = calibration::plan(rig, arguments.force, &[], &[])
+    let weights = arguments.operator.statements().weights(arguments.force);
+    let plan = calibration::plan(rig, weights, &stage.depths_m, &[])
         .map_err(|error| Complaint::about(&arguments.rig, error))?;
     let mut positions: Vec<_> = plan.iter().map(|press| press.position).collect();
     positions.dedup();
@@ -371,16 +498,6 @@ fn ask(calibration: &Calibration, extent: Extent) {
     }
 }
 
-/// A press in words.
-fn place(press: Press, extent: Extent) -> String {
-    let mm = |at_m: f64| format_length_mm(at_m);
-    let place = match extent {
-        Extent::Line { .. } => mm(press.position.x_m),
-        Extent::Plane { .. } => format!("{}, {}", mm(press.position.x_m), mm(press.position.y_m)),
-    };
-    press.force_n.map_or_else(|| place.clone(), |force_n| format!("{place} with {force_n} N"))
-}
-
 /// Lines that are typed.
 fn keys() -> Receiver<String> {
     let (to, keys) = channel();
@@ -395,22 +512,52 @@ fn keys() -> Receiver<String> {
     keys
 }
 
+/// Words on the keys.
+fn help(can_strike: bool) -> &'static str {
+    match can_strike {
+        true => {
+            "keys, each with Enter: r takes the last press back, s leaves the next out, u learns the untouched reading anew, l lists the presses, \
+             x 7 strikes press 7 out, q ends here"
+        }
+        false => {
+            "keys, each with Enter: r takes the last press back, s leaves the next out, u learns the untouched reading anew, q ends here"
+        }
+    }
+}
+
 fn press_key(
     key: &str,
     arguments: &Arguments,
     calibration: &mut Calibration,
     extent: Extent,
+    replan: Option<Replan>,
 ) -> Result<(), Failure> {
-    match key.trim() {
-        "r" => {
-            if !calibration.redo().map_err(|error| about_journal(&arguments.rig, &error))? {
+    let about = |error: &JournalError| about_journal(&arguments.rig, error);
+    match (key.trim(), replan) {
+        ("r", _) => {
+            if !calibration.redo().map_err(|error| about(&error))? {
                 remark!("nothing was pressed yet");
             }
         }
-        "s" => calibration.skip(),
-        "u" => calibration.relearn_untouched(),
-        "q" => calibration.stop(),
-        _ => remark!("{KEYS}"),
+        ("s", _) => calibration.skip(),
+        ("u", _) => calibration.relearn_untouched(),
+        ("q", _) => calibration.stop(),
+        ("l", Some(_)) => operator::list(calibration.journal().rows(), extent),
+        (key, Some(replan)) if key.starts_with("x ") => {
+            let press = key[2..].trim().parse::<usize>().ok().and_then(|press| press.checked_sub(1));
+            let is_struck = match press {
+                Some(press) => calibration.strike(press).map_err(|error| about(&error))?,
+                None => false,
+            };
+            if is_struck {
+                let to_come = replan(calibration.journal().rows())?;
+                calibration.replan(to_come);
+                remark!("struck out; it is asked for again");
+            } else {
+                remark!("no such press; l lists them");
+            }
+        }
+        (_, replan) => remark!("{}", help(replan.is_some())),
     }
     ask(calibration, extent);
     Ok(())
@@ -426,11 +573,18 @@ fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
     if presses == 0 {
         return "no press was taken".to_owned();
     }
-    format!("{presses} presses are in {}, and --resume goes on", arguments.presses.display())
+    let path = calibration.journal().path();
+    match path == arguments.presses {
+        true => format!("{presses} presses are in {}, and --resume goes on", path.display()),
+        false => format!(
+            "{presses} presses are in {}, and --resume --check begins the check again",
+            path.display()
+        ),
+    }
 }
 
 /// Fits the rig's estimator to the presses on disk, and says how good it is and what more presses would gain.
-fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure> {
+fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Recording), Failure> {
     if !arguments.presses.exists() {
         let words =
             "the calibration ended before any press, so there is nothing to fit; run it again and press";
@@ -459,14 +613,15 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure>
     assessment.remarks.iter().for_each(|remark| remark!("{remark}"));
     match assessment.gain {
         Some(gain) if gain.is_enough() => {
-            output::say(format!("more presses would lower the error by less than {} %", gain.stop_percent))
+            output::say(format!("more presses would lower the error by less than {} %", gain.stop_percent))?;
         }
         Some(gain) => output::say(format!(
             "endlessly many more presses would lower the expected error by {:.0} %: `palpate design positions {} --data {}` says where",
             gain.percent,
             arguments.rig.display(),
             arguments.presses.display()
-        )),
-        None => Ok(()),
+        ))?,
+        None => {}
     }
+    Ok((locator, recording))
 }

@@ -10,6 +10,7 @@ pub mod inspect;
 mod learnt;
 pub mod limit;
 pub mod locate;
+mod operator;
 mod outlets;
 pub mod profile;
 pub mod record;

@@ -1,6 +1,6 @@
 //! `palpate serve`: a session that browsers follow.
 
-use super::calibrate::{about_journal, pressed_before, pressed_for, stage};
+use super::calibrate::{OperatorOptions, about_journal, pressed_before, pressed_for, stage};
 use super::outlets::Outlets;
 use super::record::Words;
 use crate::failure::{Complaint, Failure};
@@ -60,6 +60,8 @@ pub struct Arguments {
     /// Force of every press of the calibration [default: the rig's, or unknown]
     #[arg(long, value_name = "FORCE", value_parser = input::force, requires = "calibrate")]
     force: Option<f64>,
+    #[command(flatten)]
+    operator: OperatorOptions,
     /// A machine that presses in the calibration: `gcode:serial:///dev/ttyUSB0?baud=115200` or `gcode:tcp://host:port`, of Marlin or GRBL firmware
     #[arg(long, value_name = "MACHINE", requires = "calibrate")]
     stage: Option<StageUrl>,
@@ -232,7 +234,12 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
         ..
     } = arguments
     else {
-        return Ok(None);
+        return match arguments.operator.given() {
+            Some(option) => Err(Complaint::new(format!("{option} is for a calibration"))
+                .help("add --calibrate with --presses and --out, or leave it out")
+                .into()),
+            None => Ok(None),
+        };
     };
     if !input::is_toml(path) {
         let complaint = Complaint::about(path, "--calibrate is for rigs, and this is a locator");
@@ -245,9 +252,16 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     // What cannot be calibrated is refused here, where the place in the file can be shown.
     let stage = stage(path, &rig, arguments.stage.as_ref(), arguments.force)?;
     let depths = DepthKnowledge::for_stage(stage.as_ref());
-    let before = pressed_before(path, &rig, presses, depths)?;
+    let (before, in_file_m) = pressed_before(path, &rig, presses, depths)?;
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
-    plan(&rig, arguments.force, depths_m, &before).map_err(|error| Complaint::about(path, error))?;
+    let stated = arguments.operator.statements();
+    let statements = match &stage {
+        None => stated.or_known(&rig, arguments.force, in_file_m, &before),
+        // The placement of the rig is that of a person.
+        Some(_) => stated,
+    };
+    plan(&rig, statements.weights(arguments.force), depths_m, &before)
+        .map_err(|error| Complaint::about(path, error))?;
     let comment = pressed_for(path);
     Journal::new(&rig.setup, presses, comment.clone(), Vec::new(), depths)
         .map_err(|error| about_journal(path, &error))?;
@@ -260,6 +274,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
         force_n: arguments.force,
         machine: arguments.stage.clone(),
         before,
+        statements,
         seed: arguments.seed,
     }))
 }

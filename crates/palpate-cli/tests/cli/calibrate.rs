@@ -327,3 +327,30 @@ fn a_board_whose_frames_are_no_readings_is_told_at_once() {
     assert_eq!(complaint.matches(told).count(), 1, "{complaint}");
     assert!(complaint.contains("150 frames were no reading: a channel is missing"), "{complaint}");
 }
+
+#[test]
+fn statements_of_the_operator_are_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
+    let complaint = |arguments: &[&str]| {
+        let mut command = palpate(folder.path());
+        complained(&command.args(arguments).output().unwrap(), 2)
+    };
+    let calibrating = |more: &[&'static str]| {
+        let begin =
+            ["calibrate", "rig.toml", "--from", "-", "--presses", "presses.csv", "--out", "locator.json"];
+        complaint(&[&begin, more].concat())
+    };
+    for wrong in ["2", "-1 mm", "2 N", "0 mm"] {
+        let words = complaint(&["calibrate", "rig.toml", "--placement", wrong]);
+        assert!(words.contains("--placement"), "{wrong}: {words}");
+    }
+    let words = calibrating(&["--second-force", "2 N", "--force-is-known"]);
+    assert!(words.contains("cannot be used with"), "{words}");
+    let words = complaint(&["serve", "rig.toml", "--placement", "2 mm"]);
+    assert!(words.contains("--placement is for a calibration"), "{words}");
+    let far = RIG.replace("repeats = 3", "repeats = 3\nplacement = \"2 m\"");
+    std::fs::write(folder.path().join("rig.toml"), far).unwrap();
+    let words = calibrating(&[]);
+    assert!(words.contains("placement") && words.contains("less than 100 mm"), "{words}");
+}

@@ -58,22 +58,30 @@ impl ForwardModel {
         };
         let sds: Vec<f64> = living.iter().enumerate().map(sd).collect();
         // The model is exact: regressions take as much noise as rounding leaves.
-        Self::fit(&positions, &clean, &sds, 0.0, extent, force, watch)
+        Self::fit(&positions, &clean, &sds, &vec![0.0; positions.len()], extent, force, watch)
     }
 
     /// Model of a bench from the presses of a recording begun.
     pub fn from_presses(presses: &Presses, setup: &Setup, watch: Watch) -> Result<Self, PositionError> {
-        let Presses { positions, readings, reading_sds, variance, .. } = presses;
-        Self::fit(positions, readings, reading_sds, *variance, setup.surface().extent(), setup.force(), watch)
+        let Presses { positions, readings, reading_sds, .. } = presses;
+        let variances: Vec<f64> = (0..positions.len()).map(|row| presses.variance_of(row)).collect();
+        Self::fit(
+            positions,
+            readings,
+            reading_sds,
+            &variances,
+            setup.surface().extent(),
+            setup.force(),
+            watch,
+        )
     }
 
-    /// Fits to readings of the living channels at some positions: divided by the standard deviations, they have the
-    /// `press_variance`.
+    /// Fits to readings of the living channels at some positions: divided by the standard deviations, each has its one of `variances`.
     fn fit(
         positions: &[Position],
         readings: &[Vec<f64>],
         sds: &[f64],
-        press_variance: f64,
+        variances: &[f64],
         extent: Extent,
         force: Force,
         watch: Watch,
@@ -86,7 +94,7 @@ impl ForwardModel {
         let samples = Samples {
             coordinates: coordinates.view(),
             outputs: whitened.view(),
-            noise_variance: Some(&vec![press_variance; rows]),
+            noise_variance: Some(variances),
         };
         let mut fitted = Vec::new();
         for kernel in KERNELS {
@@ -107,8 +115,8 @@ impl ForwardModel {
         self.signal_variance * self.kernel.correlation(r2)
     }
 
-    /// Fisher information of a position in one reading once everything is calibrated, by the expected readings' slopes.
-    pub fn information(&self, at: Position) -> Information {
+    /// Expected whitened reading at a position, and its slopes in 1/m: those of a channel by x, and on a plane by y, side by side.
+    fn mean_and_slopes(&self, at: Position) -> (Vec<f64>, Vec<f64>) {
         let (outputs, d) = (self.process.outputs(), self.process.coordinates());
         let (mut means, mut slopes) = (vec![0.0; outputs], vec![0.0; outputs * d]);
         let point = [at.x_m, at.y_m];
@@ -118,6 +126,32 @@ impl ForwardModel {
             &mut slopes,
             &mut self.process.scratch(),
         );
+        (means, slopes)
+    }
+
+    /// Variance of each channel's whitened reading at a place that is missed by a standard deviation of `sd_m` in each direction:
+    /// |I′|²·σ², to first order. Where the force is unknown, the part of the slope along the reading is a change of force and no error.
+    pub fn placement_variances(&self, at: Position, sd_m: f64) -> Vec<f64> {
+        let d = self.process.coordinates();
+        let (means, mut slopes) = self.mean_and_slopes(at);
+        let size = means.iter().map(|mean| mean * mean).sum::<f64>();
+        if self.force == Force::Unknown && means.len() > 1 && size > 0.0 {
+            for k in 0..d {
+                let along =
+                    means.iter().enumerate().map(|(j, mean)| slopes[j * d + k] * mean).sum::<f64>() / size;
+                means.iter().enumerate().for_each(|(j, mean)| slopes[j * d + k] -= along * mean);
+            }
+        }
+        slopes
+            .chunks(d)
+            .map(|slopes| sd_m * sd_m * slopes.iter().map(|slope| slope * slope).sum::<f64>())
+            .collect()
+    }
+
+    /// Fisher information of a position in one reading once everything is calibrated, by the expected readings' slopes.
+    pub fn information(&self, at: Position) -> Information {
+        let (outputs, d) = (self.process.outputs(), self.process.coordinates());
+        let (means, slopes) = self.mean_and_slopes(at);
         let dot = |f: &dyn Fn(usize) -> (f64, f64)| (0..outputs).map(f).map(|(a, b)| a * b).sum::<f64>();
         // By ln W a reading that is linear in the force changes as much as it is.
         let by_force = dot(&|j| (means[j], means[j])).max(f64::MIN_POSITIVE);

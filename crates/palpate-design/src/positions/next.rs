@@ -8,7 +8,7 @@ use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_numerics::watch::Watch;
-use palpate_numerics::{OutOfRange, random_order};
+use palpate_numerics::{OutOfRange, mean, random_order};
 
 /// Presses that are looked ahead, at most.
 const MOST_AHEAD: usize = 200;
@@ -72,6 +72,7 @@ impl Advice {
 /// Advice on where to press next, for the contacts of a design and until its rule says to stop.
 ///
 /// Influence functions are Gaussian processes whose smoothness and noise the recording tells; no model of the surface is needed.
+/// Where the recording, or else the design's training, says how well places are met, a press has the variance |I′|²·σ² beside its noise.
 ///
 /// ```
 /// use palpate_design::positions::{PositionDesign, next_press};
@@ -102,9 +103,22 @@ pub fn next_press(
     let stop = [("the gain in % that is worth a press", stop_percent)];
     OutOfRange::check("greater than 0 and less than 100", stop, |percent| percent > 0.0 && percent < 100.0)?;
     let contacts = design.weighted_contacts(extent)?;
-    let presses = Presses::new(recording, setup)?;
+    let mut presses = Presses::new(recording, setup)?;
     presses.check_reach(extent)?;
-    let forward = ForwardModel::from_presses(&presses, setup, watch)?;
+    let mut forward = ForwardModel::from_presses(&presses, setup, watch)?;
+    let stated = design.existing.as_ref().and_then(|training| training.placement_sd_m);
+    let placement_sd_m = recording.provenance.placement_sd_m.or(stated);
+    if let Some(sd_m) = placement_sd_m {
+        let placed: Vec<Vec<f64>> =
+            presses.positions.iter().map(|at| forward.placement_variances(*at, sd_m)).collect();
+        presses.place_with(&placed);
+        forward = ForwardModel::from_presses(&presses, setup, watch)?;
+    }
+    // Variance of a press at a place, in units of a reading's: of its noise, and of the place itself.
+    let press_variance = |at: Position| {
+        let placed = placement_sd_m.map_or(0.0, |sd_m| mean(forward.placement_variances(at, sd_m)));
+        presses.variance + placed
+    };
     let mut expected = ExpectedError::new(&forward, &contacts, extent);
     if expected.error_m(|_| 0.0) > MOST_OF_A_GUESS * expected.error_m(|_| f64::INFINITY) {
         return Err(PositionError::NothingTold);
@@ -115,7 +129,7 @@ pub fn next_press(
     let mut posterior = Posterior::prior(&forward, &expected.places);
     for (i, (_, repeats)) in pressed.iter().enumerate() {
         watch.round()?;
-        posterior.condition(first + i, presses.variance / *repeats as f64);
+        posterior.condition(first + i, press_variance(expected.places[first + i]) / *repeats as f64);
     }
     let mut advice = Advice {
         presses: presses.positions.len(),
@@ -128,10 +142,11 @@ pub fn next_press(
     if advice.is_enough() {
         return Ok(advice);
     }
+    let variances: Vec<f64> = expected.sites().map(|site| press_variance(expected.places[site])).collect();
     while advice.next.len() < MOST_AHEAD && !advice.reaches_goal() {
         watch.round()?;
-        let (site, error_m) = expected.best(&posterior, presses.variance);
-        posterior.condition(site, presses.variance);
+        let (site, error_m) = expected.best(&posterior, |site| variances[site]);
+        posterior.condition(site, variances[site]);
         advice.next.push(NextPress { position: expected.places[site], error_m });
     }
     Ok(advice)

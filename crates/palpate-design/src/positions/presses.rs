@@ -16,6 +16,10 @@ use palpate_numerics::small::dot;
 const FEWEST_POSITIONS: usize = 4;
 /// Share of a surface's side over which the presses must reach.
 const LEAST_REACH: f64 = 0.1;
+/// Untouched rows up to which nothing is learnt of their noise.
+const FEWEST_UNTOUCHED: usize = 4;
+/// Quantile of the standard normal distribution at 95 %.
+const ONE_SIDED_95: f64 = 1.644_853_626_951_472_2;
 /// Rounds in which presses are brought to one amplitude.
 const AMPLITUDE_ROUNDS: usize = 8;
 /// Variance of the forces at one position, of their squared mean, below which they are one force.
@@ -33,6 +37,16 @@ pub(super) struct Presses {
     pub reading_sds: Vec<f64>,
     /// Noise variance of a press, in units of a reading's: less than 1 where a press is the mean of many readings.
     pub variance: f64,
+    /// Standard deviation of a press and that which the setup states for a reading, of each living channel.
+    press_sds: Vec<f64>,
+    stated_sds: Vec<f64>,
+    /// Noise that is known apart from the presses: the stated one, or that of the untouched rows; 0 where there is none.
+    quiet_sds: Vec<f64>,
+    /// Presses of places that were pressed more than once, and the degrees of freedom of their scatter.
+    repeated: Vec<usize>,
+    freedom: usize,
+    /// Variance that the placement adds to each press, in units of a reading's; empty where nobody says how well places are met.
+    placement_variances: Vec<f64>,
 }
 
 impl Presses {
@@ -63,6 +77,7 @@ impl Presses {
         let mut readings = at_one_force(&touched, &living, &offsets);
         let places = groups.iter().map(|group| (touched[group[0]].position, group.len())).collect();
         let repeated: Vec<Vec<usize>> = groups.into_iter().filter(|group| group.len() > 1).collect();
+        let freedom = repeated.iter().map(|group| group.len() - 1).sum();
         let sds = living.iter().enumerate().map(|(j, &s)| {
             let sd = scatter(&readings, &repeated, j).unwrap_or(stated[j]);
             if sd > 0.0 { Ok(sd) } else { Err(PositionError::NoNoise { channel: s + 1 }) }
@@ -71,10 +86,67 @@ impl Presses {
         if setup.force() == Force::Unknown && sds.len() > 1 {
             bring_to_one_amplitude(&mut readings, &repeated, &mut sds);
         }
-        let reading_sds: Vec<f64> = sds.iter().zip(stated).map(|(sd, stated)| sd.max(stated)).collect();
-        let variance = mean(sds.iter().zip(&reading_sds).map(|(press, sd)| (press / sd).powi(2)));
         let positions = touched.iter().map(|row| row.position).collect();
-        Ok(Self { positions, readings, places, reading_sds, variance })
+        let untouched: Vec<&Row> = recording.rows.iter().filter(|row| !row.touches()).collect();
+        let quiet = living.iter().zip(&stated).map(|(&s, stated)| match *stated {
+            0.0 => scatter_of_successive(&untouched, s),
+            stated => stated,
+        });
+        let quiet_sds = quiet.collect();
+        let mut presses = Self {
+            positions,
+            readings,
+            places,
+            reading_sds: Vec::new(),
+            variance: 0.0,
+            press_sds: sds,
+            stated_sds: stated,
+            quiet_sds,
+            repeated: repeated.concat(),
+            freedom,
+            placement_variances: Vec::new(),
+        };
+        presses.whiten();
+        Ok(presses)
+    }
+
+    /// Noise of a reading in use, and of a press in its units, by the scatter of presses and what is stated.
+    fn whiten(&mut self) {
+        let sds = self.press_sds.iter().zip(&self.stated_sds);
+        self.reading_sds = sds.map(|(sd, stated)| sd.max(*stated)).collect();
+        self.variance =
+            mean(self.press_sds.iter().zip(&self.reading_sds).map(|(press, sd)| (press / sd).powi(2)));
+    }
+
+    /// Variance of a press, in units of a reading's: of its noise and of its placement.
+    pub fn variance_of(&self, press: usize) -> f64 {
+        self.variance + self.placement_variances.get(press).unwrap_or(&0.0)
+    }
+
+    /// Takes the part of the placement in the scatter of repeats out of the noise, and gives each press the variance of its place.
+    /// `placed` is the variance of each channel's whitened reading that the placement makes at each press.
+    ///
+    /// Repeats are placed one by one, so that their scatter s² is noise and placement together: the noise is s²·(1 − p), where p·s² is the
+    /// mean of the placement's variance at the places with repeats. Of ν degrees of freedom s² is known to s²·√(2/ν); a noise that this
+    /// does not resolve is the stated one or that of the untouched rows, or its bound of 95 %.
+    pub fn place_with(&mut self, placed: &[Vec<f64>]) {
+        let before = self.reading_sds.clone();
+        if self.freedom > 0 {
+            let resolved = (ONE_SIDED_95 * (2.0 / self.freedom as f64).sqrt()).min(1.0);
+            for (channel, sd) in self.press_sds.iter_mut().enumerate() {
+                let by_placement = mean(self.repeated.iter().map(|&press| placed[press][channel]));
+                let share = 1.0 - by_placement * (before[channel] / *sd).powi(2);
+                let known = (self.quiet_sds[channel] / *sd).powi(2);
+                let bound = if known > 0.0 { known.min(resolved) } else { resolved };
+                *sd *= if share > resolved { share } else { bound }.sqrt();
+            }
+            self.whiten();
+        }
+        let scales: Vec<f64> =
+            before.iter().zip(&self.reading_sds).map(|(old, new)| (old / new).powi(2)).collect();
+        let variance =
+            |placed: &Vec<f64>| mean(placed.iter().zip(&scales).map(|(placed, scale)| placed * scale));
+        self.placement_variances = placed.iter().map(variance).collect();
     }
 
     /// Checks that the presses reach over enough of a surface to tell how readings change on it.
@@ -151,6 +223,16 @@ fn scatter(readings: &[Vec<f64>], repeated: &[Vec<usize>], channel: usize) -> Op
         freedom += group.len() - 1;
     }
     (freedom > 0).then(|| (squares / freedom as f64).sqrt()).filter(|sd| *sd > 0.0)
+}
+
+/// Noise of a channel by the differences of untouched rows that follow one another, to which a slow drift adds little; 0 of too few.
+fn scatter_of_successive(untouched: &[&Row], channel: usize) -> f64 {
+    if untouched.len() <= FEWEST_UNTOUCHED {
+        return 0.0;
+    }
+    let squares =
+        untouched.windows(2).map(|pair| (pair[1].reading[channel] - pair[0].reading[channel]).powi(2));
+    (0.5 * mean(squares)).sqrt()
 }
 
 /// Brings the presses of each position to one amplitude, as locating at an unknown force looks at the shape of a reading alone: however hard

@@ -4,6 +4,7 @@ use super::search::reads_mirrored;
 use super::variance::{ExpectedError, Posterior};
 use super::*;
 use crate::contacts::ContactPrior;
+use palpate_estimators::arrangement::Training;
 use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::sensing::{Sensor, SensorKind};
@@ -366,4 +367,47 @@ fn a_channel_that_never_changes_is_left_out() {
     let mut dead = setup.clone();
     dead.edit_sensors(|sensors| sensors[2].channel.dead = true).unwrap();
     assert_eq!(advice(&setup, &recording), advice(&dead, &recording));
+}
+
+/// Presses of ten places that are missed by 2 mm (root mean square), under the places that were asked for.
+fn beside_the_places(repeats: usize) -> (Setup, Recording) {
+    let beside_m = [2.4e-3, -1.5e-3, -2.4e-3, 1.5e-3];
+    let asked = TEN_M.iter().flat_map(|x_m| std::iter::repeat_n(Position::along(*x_m), repeats));
+    let pressed = asked.clone().zip(beside_m.into_iter().cycle());
+    let pressed: Vec<Position> = pressed.map(|(at, off_m)| Position::along(at.x_m + off_m)).collect();
+    let setup = noisy().setup;
+    let mut recording = simulate_at(&setup, &pressed, 1, 3).unwrap();
+    recording.rows.iter_mut().zip(asked).for_each(|(row, asked)| row.position = asked);
+    (setup, recording)
+}
+
+#[test]
+fn stated_placement_is_taken_out_of_the_noise_of_repeats() {
+    let ideal = advised(&TEN_M, 8);
+    let (setup, mut recording) = beside_the_places(8);
+    let advice = |recording: &Recording| {
+        next_press(&setup, recording, &PositionDesign::default(), Watch::NONE).unwrap()
+    };
+    let unstated = advice(&recording);
+    recording.provenance.placement_sd_m = Some(2e-3);
+    let stated = advice(&recording);
+    // Without it the scatter of the places passes for noise of the readings: the limit is then that of a hand.
+    assert!(unstated.endless_error_m > 3.0 * ideal.endless_error_m, "{unstated:?} beside {ideal:?}");
+    let limit = stated.endless_error_m / ideal.endless_error_m;
+    assert!((0.7..1.8).contains(&limit), "{stated:?} beside {ideal:?}");
+    assert!(stated.error_m > 1.2 * stated.endless_error_m && !stated.is_enough(), "{stated:?}");
+}
+
+#[test]
+fn placement_of_single_presses_is_added_to_their_noise() {
+    let (setup, recording) = begun(&TEN_M, 1);
+    let errors_m = [None, Some(1e-3), Some(4e-3)].map(|placement_sd_m| {
+        let existing = Training { placement_sd_m, ..Training::even(10) };
+        let advice =
+            next_press(&setup, &recording, &PositionDesign::for_training(&existing), Watch::NONE).unwrap();
+        advice.error_m
+    });
+    assert!(errors_m[0] < errors_m[1] && errors_m[1] < errors_m[2], "{errors_m:?}");
+    // Ten places that are missed by 4 mm cannot tell a contact to much better than a third of that.
+    assert!(errors_m[2] > 4e-3 / 10f64.sqrt() * 0.5, "{errors_m:?}");
 }

@@ -65,9 +65,9 @@ impl ExpectedError {
             .sum()
     }
 
-    /// The site at which presses help most, and the error that is then expected.
-    pub fn best(&self, posterior: &Posterior, noise: f64) -> (usize, f64) {
-        let after = |site: usize| self.error_m(|place| posterior.variance_after(place, site, noise));
+    /// The site at which presses help most, and the error that is then expected; `noise` is their variance at a site.
+    pub fn best(&self, posterior: &Posterior, noise: impl Fn(usize) -> f64) -> (usize, f64) {
+        let after = |site: usize| self.error_m(|place| posterior.variance_after(place, site, noise(site)));
         let all = self.sites().map(|site| (site, after(site)));
         all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::INFINITY))
     }
@@ -130,7 +130,7 @@ pub(super) fn least(
     let mut error_m = f64::INFINITY;
     while chosen.len() < design.count {
         watch.round()?;
-        let (site, left_m) = expected.best(&posterior, noise);
+        let (site, left_m) = expected.best(&posterior, |_| noise);
         posterior.condition(site, noise);
         chosen.push(site);
         error_m = left_m;
@@ -144,7 +144,7 @@ pub(super) fn least(
         let slot = step % design.count;
         let mut others = chosen.clone();
         let leaving = others.remove(slot);
-        let (site, left_m) = expected.best(&after(&others), noise);
+        let (site, left_m) = expected.best(&after(&others), |_| noise);
         let improves = site != leaving && left_m < error_m * (1.0 - 1e-9);
         if improves {
             (chosen[slot], error_m) = (site, left_m);

@@ -35,7 +35,9 @@ pub fn locator(locator: &Locator) -> Vec<String> {
             .to_owned(),
     });
     let recording = &provenance.recording;
-    lines.push(format!("fitted to: {}, {} rows", recording.source, recording.rows));
+    let placement =
+        recording.placement_sd_m.map_or_else(String::new, |sd_m| format!(", {}", super::placement(sd_m)));
+    lines.push(format!("fitted to: {}, {} rows{placement}", recording.source, recording.rows));
     for digest in &recording.digests {
         lines.push(format!("    sha256 {digest}"));
     }

@@ -93,7 +93,13 @@ pub fn training(training: &Training) -> String {
         Arrangement::EdgeDense { middle, .. } => format!("edge-dense, {middle} in the middle"),
         Arrangement::Explicit(_) => "as listed".to_owned(),
     };
-    format!("{}, {rule}, {} × each", training.count, training.repeats)
+    let placement = training.placement_sd_m.map_or_else(String::new, |sd_m| format!(", {}", placement(sd_m)));
+    format!("{}, {rule}, {} × each{placement}", training.count, training.repeats)
+}
+
+/// The placement of presses by hand.
+fn placement(sd_m: f64) -> String {
+    format!("placement {} (standard deviation)", format_length_mm(sd_m))
 }
 
 /// A recording of a setup: rows, positions, and the range of every channel.

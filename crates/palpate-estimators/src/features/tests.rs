@@ -34,6 +34,7 @@ fn recording_of(rows: Vec<Row>) -> Recording {
             dialects: vec![],
             repeats: None,
             seed: None,
+            placement_sd_m: None,
         },
         rows,
     }

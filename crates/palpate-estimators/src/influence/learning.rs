@@ -501,6 +501,7 @@ mod tests {
             dialects: vec![],
             repeats: None,
             seed: None,
+            placement_sd_m: None,
         };
         let kinds = vec![SensorKind::Deflection];
         Recording { channels: vec!["d".into()], kinds, rows: rows.collect(), provenance }

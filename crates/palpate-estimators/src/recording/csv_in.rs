@@ -8,6 +8,7 @@ use super::csv_error::{CsvError, CsvProblem};
 use super::dialect::Dialect;
 use super::lines::{LineProgress, Lines, Reading};
 use super::notes::Origin;
+use super::placement::placement_of;
 use super::text::TextDecoder;
 use super::timestamp::Clock;
 use super::zero_force::{self, Sample};
@@ -50,7 +51,10 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
     })?;
     let rows = settle_forces(rows, columns, &mut dialect)?;
     schema.check_untouched_times(source, &rows)?;
-    Ok(schema.recording(source, rows, vec![file.digest], [dialect]))
+    let placement_sd_m = placement_of(&file.content);
+    let mut recording = schema.recording(source, rows, vec![file.digest], [dialect]);
+    recording.provenance.placement_sd_m = placement_sd_m;
+    Ok(recording)
 }
 
 /// Reads a recording from two CSV files, of readings and of contacts, that pair row by row; the time column is that of the first

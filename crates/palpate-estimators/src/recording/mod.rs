@@ -11,6 +11,7 @@ mod heading;
 mod lines;
 mod marks;
 mod notes;
+mod placement;
 mod repeat_watch;
 mod repeated_readings;
 mod sample_hold;
@@ -31,6 +32,7 @@ pub use dialect::{Dialect, Notes, Preamble};
 pub use heading::Heading;
 pub use lines::LineProgress;
 pub use marks::{Decimal, Separator};
+pub use placement::comment_with_placement;
 pub use repeat_watch::RepeatWatch;
 pub use repeated_readings::{RepeatedReadings, Repeats};
 pub use sample_hold::{FALSE_ALARM, RepeatCause, RepeatCounts};
@@ -100,7 +102,7 @@ pub fn sha256_hex(content: &[u8]) -> String {
 }
 
 /// Provenance of a recording, so that whatever is fitted to it can say so.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// The name that the caller gave: usually a file's, or "simulation".
     pub source: String,
@@ -116,6 +118,10 @@ pub struct Provenance {
     pub repeats: Option<Repeats>,
     /// The seed of a simulation.
     pub seed: Option<u64>,
+    /// Standard deviation in each direction of the pressed place about the position of its row, in metres, where a person pressed and
+    /// said so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub placement_sd_m: Option<f64>,
 }
 
 /// One way to hold positions out: the rows to fit, and the rows to judge by.
@@ -147,6 +153,7 @@ impl Recording {
             dialects: Vec::new(),
             repeats: None,
             seed: None,
+            placement_sd_m: None,
         };
         Self { channels: layout.names(), kinds: layout.kinds(), rows, provenance }
     }

@@ -351,6 +351,7 @@ fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
         dialects: Vec::new(),
         repeats: None,
         seed: None,
+        placement_sd_m: None,
     };
     Recording {
         channels: vec!["good".to_owned(), "bad".to_owned()],

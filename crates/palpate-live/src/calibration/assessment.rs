@@ -1,7 +1,7 @@
 //! Assessment of a calibration: its error at positions held out, and the gain of more presses.
 
 use palpate_design::positions::{PositionDesign, next_press};
-use palpate_estimators::evaluation::cross_validate;
+use palpate_estimators::evaluation::{Evaluation, cross_validate};
 use palpate_estimators::fit::FitTask;
 use palpate_estimators::recording::Recording;
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -42,6 +42,8 @@ impl Gain {
 pub struct Assessment {
     /// Errors at positions held out; `None` where they are too few, or a fold cannot be fitted.
     pub held_out: Option<HeldOut>,
+    /// Error of each press at its position held out, in metres, in the recording's order; empty where they are not known.
+    pub errors_m: Vec<Option<f64>>,
     /// Gain of more presses; `None` where it is not known.
     pub gain: Option<Gain>,
     /// Reasons why something is not known.
@@ -59,6 +61,7 @@ impl Assessment {
             let task = FitTask::new(&rig.setup, recording).seed(seed).watch(watch);
             match cross_validate(&rig.estimator, task, FOLDS) {
                 Ok(evaluation) => {
+                    own.errors_m = errors_by_press(recording, &evaluation);
                     own.held_out = evaluation.summary(None).map(|summary| HeldOut {
                         folds: FOLDS,
                         median_m: summary.median_m,
@@ -79,5 +82,44 @@ impl Assessment {
             Err(error) => own.remarks.push(format!("no advice on more presses: {error}")),
         }
         Ok(own)
+    }
+}
+
+/// Errors of a cross-validation in the order of the presses: its answers are in the order of its folds.
+fn errors_by_press(recording: &Recording, evaluation: &Evaluation) -> Vec<Option<f64>> {
+    let presses = recording.rows.iter().scan(0, |presses, row| {
+        let press = row.touches().then_some(*presses);
+        *presses += usize::from(row.touches());
+        Some(press)
+    });
+    let press_of_row: Vec<Option<usize>> = presses.collect();
+    let mut errors_m = vec![None; press_of_row.iter().flatten().count()];
+    let held_out = recording.folds(FOLDS).unwrap_or_default().into_iter().flat_map(|fold| fold.held_out);
+    let judged = held_out.filter_map(|row| press_of_row[row]);
+    for (press, located) in judged.zip(&evaluation.located) {
+        errors_m[press] = Some(located.error_m());
+    }
+    errors_m
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_belong_to_their_presses() {
+        let rig = Rig::from_toml(include_str!("../../../../examples/noisy-beam.toml")).unwrap();
+        let mut recording = rig.simulate(0).unwrap();
+        recording.rows.truncate(60);
+        let task = FitTask::new(&rig.setup, &recording);
+        let evaluation = cross_validate(&rig.estimator, task, FOLDS).unwrap();
+        let errors_m = errors_by_press(&recording, &evaluation);
+        assert_eq!(errors_m.len(), 60);
+        for (row, error_m) in recording.rows.iter().zip(&errors_m) {
+            let is_its_own = |located: &&palpate_estimators::evaluation::Located| {
+                located.truth == row.position && Some(located.error_m()) == *error_m
+            };
+            assert!(evaluation.located.iter().any(|located| is_its_own(&located)), "{row:?} {error_m:?}");
+        }
     }
 }

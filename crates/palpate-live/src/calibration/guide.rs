@@ -7,6 +7,7 @@
 //! The untouched row of a press is recorded together with the press, so that it is the last reading before the touch, whatever drifted in between.
 
 use super::baseline::{Baseline, NOISE_LIMIT_SD};
+use super::press::Press;
 use super::repeat_check::{Doubt, RepeatCheck, TouchReading};
 use super::stretch::{Stretch, mean};
 use palpate_estimators::recording::Row;
@@ -49,17 +50,6 @@ const GROWTH: f64 = 1.2;
 const LINGER: Duration = Duration::from_millis(1200);
 /// Silence after which the untouched reading is learnt anew: a board may have restarted.
 const SILENCE: Duration = Duration::from_secs(5);
-
-/// A press that is planned.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Press {
-    /// Its position.
-    pub position: Position,
-    /// Its force in newtons, where it is known.
-    pub force_n: Option<f64>,
-    /// Its depth in metres, where a machine presses.
-    pub depth_m: Option<f64>,
-}
 
 /// Next step that a guide waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -1,5 +1,6 @@
 //! The file of the presses of a calibration.
 
+use super::trace::Trace;
 use crate::whole_file;
 use palpate_estimators::recording::{self, Column, Columns, Recording, Row};
 use palpate_estimators::setup::Setup;
@@ -15,6 +16,8 @@ pub struct Journal {
     comment: String,
     path: PathBuf,
     rows: Vec<Row>,
+    /// Trace of each row; of presses of this run only.
+    traces: Vec<Option<Trace>>,
     /// Seconds by which the times of new rows come after those of the file.
     later_s: f64,
 }
@@ -75,7 +78,15 @@ impl Journal {
         let columns = Self::columns(setup, depths)?;
         let last_s = before.iter().filter_map(|row| row.time_s).fold(0.0, f64::max);
         let later_s = if before.is_empty() { 0.0 } else { last_s + BETWEEN_RUNS_S };
-        Ok(Self { setup: setup.clone(), columns, comment, path: path.to_owned(), rows: before, later_s })
+        let (path, traces) = (path.to_owned(), vec![None; before.len()]);
+        Ok(Self { setup: setup.clone(), columns, comment, path, rows: before, traces, later_s })
+    }
+
+    /// The same with traces of its rows, where they are known.
+    #[must_use]
+    pub fn with_traces(self, mut traces: Vec<Option<Trace>>) -> Self {
+        traces.resize(self.rows.len(), None);
+        Self { traces, ..self }
     }
 
     /// The columns of a file of presses: those that the rig reads, and where a machine presses to several depths one more, `depth_mm`, by which its rows are
@@ -111,6 +122,18 @@ impl Journal {
         &self.rows
     }
 
+    /// Trace of each row, where there is one.
+    pub fn traces(&self) -> &[Option<Trace>] {
+        &self.traces
+    }
+
+    /// Keeps the trace of the last row.
+    pub(super) fn set_trace(&mut self, trace: Trace) {
+        if let Some(last) = self.traces.last_mut() {
+            *last = Some(trace);
+        }
+    }
+
     /// Presses that were recorded.
     pub fn presses(&self) -> usize {
         self.rows.iter().filter(|row| row.touches()).count()
@@ -131,7 +154,10 @@ impl Journal {
             Some(_) => vec![depth_m.unwrap_or(0.0)],
             None => Vec::new(),
         };
+        // Rows that were taken out at the end have no trace any more.
+        self.traces.resize(self.rows.len(), None);
         self.rows.push(Row { time_s, nuisances, ..row });
+        self.traces.push(None);
         self.save()
     }
 
@@ -142,6 +168,7 @@ impl Journal {
     pub fn take_back(&mut self) -> Result<(), JournalError> {
         if let Some(last) = self.rows.iter().rposition(Row::touches) {
             self.rows.truncate(last);
+            self.traces.truncate(last);
             self.save()?;
         }
         Ok(())
@@ -156,6 +183,19 @@ impl Journal {
             self.rows.truncate(last);
         }
         self.add(row, depth_m)
+    }
+
+    /// Strikes out a press, counted from 0; false where there is no such press. The untouched rows stay, by which drift is learnt.
+    ///
+    /// # Errors
+    /// [`JournalError::Write`].
+    pub fn strike(&mut self, press: usize) -> Result<bool, JournalError> {
+        let touched = self.rows.iter().enumerate().filter(|(_, row)| row.touches());
+        let Some((row, _)) = touched.clone().nth(press) else { return Ok(false) };
+        self.rows.remove(row);
+        self.traces.remove(row);
+        self.save()?;
+        Ok(true)
     }
 
     fn save(&self) -> Result<(), JournalError> {
@@ -191,5 +231,37 @@ impl DepthKnowledge {
             Some(stage) if stage.depths_m.len() > 1 => Self::Several,
             Some(_) => Self::One,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_mechanics::contact::Position;
+    use palpate_rig::Rig;
+
+    fn row(x_m: f64, force_n: f64) -> Row {
+        let position = Position::along(x_m);
+        Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading: vec![x_m, 0.5] }
+    }
+
+    #[test]
+    fn a_press_that_is_struck_out_leaves_the_file_and_the_others_stay() {
+        let rig = Rig::from_toml(include_str!("../../../../examples/fsi-like.toml")).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("presses.csv");
+        let before = vec![row(0.0, 0.0), row(0.01, 1.0), row(0.0, 0.0), row(0.02, 1.0)];
+        let comment = "palpate 0.1.0, pressed for rig.toml; placement 2 mm".to_owned();
+        let mut journal = Journal::new(&rig.setup, &path, comment, before, DepthKnowledge::Unknown).unwrap();
+        journal.add(row(0.03, 1.0), None).unwrap();
+        journal.set_trace(Trace { points: vec![(0.0, 100.0)] });
+        assert!(journal.strike(1).unwrap() && !journal.strike(2).unwrap());
+        assert_eq!(journal.presses(), 2);
+        assert!(journal.traces().last().unwrap().is_some() && journal.traces().len() == journal.rows().len());
+        let read = rig.setup.read_recording("presses.csv", std::fs::read(&path).unwrap().as_slice()).unwrap();
+        let pressed: Vec<f64> = read.touched().rows.iter().map(|row| row.position.x_m).collect();
+        assert_eq!(pressed, [0.01, 0.03]);
+        assert_eq!(read.rows.len(), 4);
+        assert_eq!(read.provenance.placement_sd_m, Some(2e-3));
     }
 }

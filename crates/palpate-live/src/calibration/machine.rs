@@ -1,6 +1,7 @@
 //! A machine that presses where the guide of a calibration asks for it.
 
-use super::guide::{Press, Waiting};
+use super::guide::Waiting;
+use super::press::Press;
 use super::run::{Calibration, Note};
 use crate::stage::{Done, Doubt, Finger, Order, StageError, StageThread, Stopping};
 use serde::Serialize;
@@ -228,7 +229,7 @@ impl Machine {
                 self.thread.close();
                 return Err(MachineError::NoRest);
             }
-            (Motion::Down, Waiting::Release | Waiting::Nothing) => {
+            (Motion::Down, Waiting::Untouched | Waiting::Release | Waiting::Nothing) => {
                 self.unseen = 0;
                 self.order(Order::Lift, calibration);
             }

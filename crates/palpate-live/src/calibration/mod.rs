@@ -2,24 +2,36 @@
 //!
 //! The [`Guide`] takes readings with their instants and says what it waits for; it uses no device, file or clock. A [`Calibration`] passes the readings of
 //! a source to it, and writes every press to the file of a [`Journal`] before the next one is asked for. A [`Machine`] presses in place of a person; an
-//! [`Assessment`] estimates the error of the locator, and the gain of more presses.
+//! [`Assessment`] estimates the error of the locator, and the gain of more presses; a [`Check`] measures the error at fresh places. [`Statements`] are
+//! what the operator says before the first press.
 
 mod assessment;
 mod baseline;
+mod check;
 mod guide;
 mod journal;
 mod machine;
 mod plan;
+mod press;
 mod repeat_check;
 mod repeats;
 mod run;
+mod statements;
 mod stretch;
+mod trace;
 
 pub use assessment::{Assessment, Gain, HeldOut};
-pub use guide::{Guide, Press, Progress, RestingRow, Waiting};
+pub use check::{CHECK_PLACES, Check, CheckedPlace, check_path, check_presses};
+pub use guide::{Guide, Progress, RestingRow, Waiting};
 pub use journal::{DepthKnowledge, Journal, JournalError};
 pub use machine::{Machine, MachineError, MachineNote, Motion};
-pub use plan::{PlanError, plan};
+pub use plan::{PlanError, Weights, plan};
+pub use press::Press;
 pub use repeat_check::Doubt;
-pub use repeats::{Place, last_deviation_percent, places};
+pub use repeats::{Place, deviation_percent, last_deviation_percent, places};
 pub use run::{Calibration, CalibrationError, Note};
+pub use statements::Statements;
+pub use trace::Trace;
+
+#[cfg(test)]
+mod tests;

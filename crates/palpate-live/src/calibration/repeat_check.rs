@@ -1,7 +1,7 @@
 //! A press compared with earlier presses, before it is recorded.
 
 use super::baseline::Baseline;
-use super::guide::Press;
+use super::press::Press;
 use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
 use std::fmt;

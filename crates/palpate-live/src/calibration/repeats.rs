@@ -1,6 +1,6 @@
 //! Repeatability: how far presses of one place are apart.
 
-use super::guide::Press;
+use super::press::Press;
 use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
 
@@ -42,15 +42,22 @@ pub fn places(rows: &[Row], to_come: &[Press]) -> Vec<Place> {
 
 /// Deviation of the last press from the mean of the others of its place and force, in % of its size; `None` where there are none.
 pub fn last_deviation_percent(rows: &[Row]) -> Option<f64> {
-    let last = rows.last().filter(|row| row.touches())?;
-    let others: Vec<&Row> = rows[..rows.len() - 1].iter().filter(|row| is_repeat(row, last)).collect();
-    let untouched = untouched_before(rows, rows.len() - 1)?;
+    deviation_percent(rows, rows.len().checked_sub(1)?)
+}
+
+/// Deviation of the press at an index of the rows from the mean of the others of its place and force, in % of its size; `None` of an
+/// untouched row, and where there are no others.
+pub fn deviation_percent(rows: &[Row], at: usize) -> Option<f64> {
+    let press = rows.get(at).filter(|row| row.touches())?;
+    let others = rows.iter().enumerate().filter(|(i, row)| *i != at && is_repeat(row, press));
+    let others: Vec<&Row> = others.map(|(_, row)| row).collect();
+    let untouched = untouched_before(rows, at)?;
     if others.is_empty() {
         return None;
     }
-    let mean = mean(&others, last.reading.len());
+    let mean = mean(&others, press.reading.len());
     let size = distance(&mean, &untouched.reading);
-    (size > 0.0).then(|| 100.0 * distance(&last.reading, &mean) / size)
+    (size > 0.0).then(|| 100.0 * distance(&press.reading, &mean) / size)
 }
 
 fn spread_percent(rows: &[Row], here: &[(usize, &Row)]) -> Option<f64> {
@@ -74,7 +81,8 @@ fn is_repeat(row: &Row, other: &Row) -> bool {
         && row.nuisances == other.nuisances
 }
 
-fn untouched_before(rows: &[Row], at: usize) -> Option<&Row> {
+/// The last untouched row before an index.
+pub(super) fn untouched_before(rows: &[Row], at: usize) -> Option<&Row> {
     rows[..at].iter().rev().find(|row| !row.touches())
 }
 
@@ -85,7 +93,7 @@ fn mean(rows: &[&Row], channels: usize) -> Vec<f64> {
 }
 
 /// Euclidean distance of two readings.
-fn distance(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
@@ -115,6 +123,19 @@ mod tests {
         let spread = places[0].spread_percent.unwrap();
         assert!((spread - 100.0 * 0.1 / 2f64.sqrt() / 5.04).abs() < 0.01, "{spread}");
         assert_eq!(places[1].spread_percent, None);
+    }
+
+    #[test]
+    fn a_press_is_measured_against_its_repeats_before_and_after() {
+        let rows = [
+            row(0.0, 0.0, [0.0, 0.0]),
+            row(0.1, 2.0, [0.0, 8.0]),
+            row(0.1, 2.0, [0.0, 10.0]),
+            row(0.2, 2.0, [5.0, 5.0]),
+            row(0.1, 2.0, [0.0, 10.0]),
+        ];
+        assert!((deviation_percent(&rows, 1).unwrap() - 20.0).abs() < 1e-9);
+        assert_eq!([0, 3, 5].map(|at| deviation_percent(&rows, at)), [None; 3]);
     }
 
     #[test]

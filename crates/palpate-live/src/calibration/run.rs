@@ -1,8 +1,11 @@
 //! A calibration in progress: arrivals of a source in, rows on disk and notes out.
 
-use super::guide::{Guide, Press, Progress, RestingRow, Waiting};
+use super::guide::{Guide, Progress, RestingRow, Waiting};
 use super::journal::{Journal, JournalError};
+use super::press::Press;
 use super::repeat_check::Doubt;
+use super::repeats::untouched_before;
+use super::trace::RecentReadings;
 use crate::event::{ChannelState, Event};
 use crate::frame::{BadFrame, Channel, ColumnsError, Decoder, Frame};
 use crate::input::{Arrival, Arrived};
@@ -86,6 +89,7 @@ pub struct Calibration {
     bad: BTreeMap<BadFrame, u64>,
     readings: u64,
     last: Vec<f64>,
+    recent: RecentReadings,
     /// True while readings are shown to the guide: not while a machine moves.
     is_guided: bool,
     /// Step that is waited for, and the instant of its last explanation.
@@ -130,6 +134,7 @@ impl Calibration {
             bad: BTreeMap::new(),
             readings: 0,
             last: Vec::new(),
+            recent: RecentReadings::default(),
             is_guided: true,
         })
     }
@@ -227,6 +232,7 @@ impl Calibration {
         self.readings += 1;
         let channels = reading.len() - usize::from(self.load_cell.is_some());
         self.last = reading[..channels].to_vec();
+        self.recent.add(at, &reading[..channels]);
         self.health.add(&reading[..channels], |event| {
             if let Event::Channel { name, state: ChannelState::Saturated } = event {
                 notes.push(Note::Saturated(name));
@@ -256,11 +262,13 @@ impl Calibration {
                 }
                 let row = self.weighed(press)?;
                 self.journal.add(row, depth_m)?;
+                self.trace_last_press();
                 notes.push(Note::Taken);
             }
             Progress::Replaced(press) => {
                 let row = self.weighed(press)?;
                 self.journal.replace_last(row, depth_m)?;
+                self.trace_last_press();
                 notes.push(Note::Replaced);
             }
             Progress::Untouched(untouched) => {
@@ -269,6 +277,16 @@ impl Calibration {
             }
         }
         Ok(())
+    }
+
+    /// Keeps the trace of the press that was recorded last, from before its untouched row on.
+    fn trace_last_press(&mut self) {
+        let rows = self.journal.rows();
+        let Some(untouched) = untouched_before(rows, rows.len()) else { return };
+        let times_s = rows.last().and_then(|row| row.time_s).zip(untouched.time_s);
+        let ago_s = times_s.map_or(f64::INFINITY, |(press_s, untouched_s)| press_s - untouched_s);
+        let trace = self.recent.trace(&untouched.reading, ago_s);
+        self.journal.set_trace(trace);
     }
 
     /// Explains a step that takes long, except the wait for a press.
@@ -322,6 +340,19 @@ impl Calibration {
     /// Learns the untouched reading anew: the operator says that nothing touches.
     pub fn relearn_untouched(&mut self) {
         self.guide.relearn();
+    }
+
+    /// Strikes out a press, counted from 0; false where there is no such press. [`Self::replan`] asks for it again.
+    ///
+    /// # Errors
+    /// [`JournalError`] where the file cannot be written.
+    pub fn strike(&mut self, press: usize) -> Result<bool, JournalError> {
+        self.journal.strike(press)
+    }
+
+    /// Asks for these presses from now on; the untouched reading is learnt anew.
+    pub fn replan(&mut self, to_come: Vec<Press>) {
+        self.guide = Guide::new(to_come).with_rows(self.journal.rows());
     }
 
     /// Leaves out the press that is next.

@@ -2,10 +2,12 @@
 
 use super::lock::locked;
 use super::machine::{Attendance, MachineRecord, MachineState};
+use super::press_records::{CheckRecord, PressRecord, press_records};
 use super::pressing::{MachineRun, listen};
 use super::shared::Shared;
 use crate::calibration::{
-    Assessment, Calibration, DepthKnowledge, Journal, JournalError, PlanError, Press, Waiting, places, plan,
+    Assessment, Calibration, Check, DepthKnowledge, Journal, JournalError, PlanError, Press, Statements,
+    Trace, Waiting, check_path, check_presses, places, plan,
 };
 use crate::frame::{Channel, ColumnsError};
 use crate::input::Input;
@@ -16,9 +18,10 @@ use crate::stamp::HostClock;
 use crate::whole_file;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
-use palpate_estimators::recording::Row;
+use palpate_estimators::recording::{Row, comment_with_placement};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 use palpate_rig::{Rig, Stage};
 use serde::Serialize;
@@ -47,6 +50,8 @@ pub struct CalibrationPlan {
     pub machine: Option<StageUrl>,
     /// Rows that the file of presses has already.
     pub before: Vec<Row>,
+    /// Statements of the operator so far, and of the rig and the file of presses.
+    pub statements: Statements,
     /// Seed of the fit.
     pub seed: u64,
 }
@@ -63,9 +68,14 @@ impl CalibrationPlan {
     }
 
     /// The presses that are not among these rows.
-    fn to_come(&self, rows: &[Row]) -> Result<Vec<Press>, PlanError> {
+    fn to_come(&self, statements: &Statements, rows: &[Row]) -> Result<Vec<Press>, PlanError> {
         let depths_m = self.machine().map_or(&[][..], |(_, stage)| &stage.depths_m);
-        plan(&self.rig, self.force_n, depths_m, rows)
+        plan(&self.rig, statements.weights(self.force_n), depths_m, rows)
+    }
+
+    /// The comment of a file of presses.
+    fn comment(&self, statements: &Statements) -> String {
+        comment_with_placement(&self.comment, statements.placement_sd_m)
     }
 }
 
@@ -87,6 +97,20 @@ pub enum CalibratorError {
     /// There is nothing to fit, or to take back.
     #[error("no press was taken yet")]
     NoPress,
+    /// A press that is to be struck out.
+    #[error("there is no press {press}; {presses} were taken")]
+    NoSuchPress {
+        /// Its number, from 1.
+        press: usize,
+        /// Presses that were taken.
+        presses: usize,
+    },
+    /// There is no locator to check, or no place between those of its calibration.
+    #[error("no locator was fitted that could be checked")]
+    NothingToCheck,
+    /// A statement of the operator that is no length or force.
+    #[error(transparent)]
+    Statement(#[from] OutOfRange),
     /// The rig does not say where to press.
     #[error(transparent)]
     Plan(#[from] PlanError),
@@ -120,6 +144,8 @@ enum Phase {
     Assessing,
     /// All is done.
     Done,
+    /// Presses at fresh places are asked for, which check the locator.
+    Checking,
 }
 
 /// State of a calibration as a record of JSON.
@@ -138,12 +164,20 @@ pub struct CalibrationRecord {
     reading: Vec<f64>,
     bad_frames: u64,
     presses: String,
+    /// Placement, in mm; `None` while nobody says it.
+    placement_mm: Option<f64>,
+    /// The one weight of all presses, in newtons, where a second one is to be asked for.
+    single_weight_n: Option<f64>,
     problem: Option<String>,
     /// Why a press is asked for again, or what a step that takes long waits for.
     hint: Option<String>,
     /// The machine, where one presses.
     machine: Option<MachineRecord>,
     outcome: Option<OutcomeRecord>,
+    /// The last check of the locator.
+    check: Option<CheckRecord>,
+    /// True where the locator can be checked by hand.
+    can_check: bool,
 }
 
 /// A place of a calibration.
@@ -186,9 +220,25 @@ struct State {
     phase: Phase,
     /// Rows of the file of presses, before it begins and after it has ended.
     rows: Vec<Row>,
+    /// Trace of each row, and error of each press at its place held out, where they are known.
+    traces: Vec<Option<Trace>>,
+    errors_m: Vec<Option<f64>>,
+    statements: Statements,
     running: Option<Running>,
     problem: Option<String>,
     outcome: Option<OutcomeRecord>,
+    check: Option<CheckRecord>,
+}
+
+/// Purpose of the readings of a calibration that runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Purpose {
+    /// They are shown before it begins.
+    Preview,
+    /// Presses are taken for the calibration.
+    Press,
+    /// Presses are taken at fresh places.
+    Check,
 }
 
 /// A calibration that runs, with its thread and its source.
@@ -196,6 +246,7 @@ struct Running {
     shared: Arc<Mutex<Shared>>,
     inputs: SyncSender<Input>,
     thread: JoinHandle<()>,
+    purpose: Purpose,
     by_machine: bool,
     /// Its thread ends with it.
     _source: Source,
@@ -205,7 +256,17 @@ impl Calibrator {
     /// A calibration that has not begun.
     pub fn new(mut plan: CalibrationPlan) -> Self {
         let rows = std::mem::take(&mut plan.before);
-        let state = State { phase: Phase::Ready, rows, running: None, problem: None, outcome: None };
+        let state = State {
+            phase: Phase::Ready,
+            traces: vec![None; rows.len()],
+            rows,
+            errors_m: Vec::new(),
+            statements: plan.statements,
+            running: None,
+            problem: None,
+            outcome: None,
+            check: None,
+        };
         Self {
             channels: Channel::all_of(&plan.rig.setup),
             plan,
@@ -225,36 +286,146 @@ impl Calibrator {
         &self.attendance
     }
 
-    /// Begins, or goes on after it was ended early; with a machine it greets that, which then moves. `free_source` ends the session that has the source.
+    /// Begins, or goes on after it was ended early, with what the operator states; with a machine it greets that, which then moves.
+    /// `free_source` ends the session that has the source.
     ///
     /// # Errors
     /// [`CalibratorError`] where it goes on already, the source cannot be opened, or the presses cannot be kept.
     pub fn begin(
         &self,
+        stated: Statements,
         folder: &Path,
         clock: HostClock,
         free_source: impl FnOnce(),
     ) -> Result<(), CalibratorError> {
+        stated.check()?;
         let mut state = self.lock();
         match state.phase() {
             Phase::Ready | Phase::Pressed | Phase::Done => {}
-            Phase::Pressing | Phase::Fitting | Phase::Assessing => return Err(CalibratorError::GoesOn),
+            Phase::Pressing | Phase::Fitting | Phase::Assessing | Phase::Checking => {
+                return Err(CalibratorError::GoesOn);
+            }
         }
         state.end_running();
-        let CalibrationPlan { rig, from, presses, comment, .. } = &self.plan;
-        let to_come = self.plan.to_come(&state.rows)?;
+        let CalibrationPlan { rig, presses, .. } = &self.plan;
+        state.state(stated);
+        let to_come = self.plan.to_come(&state.statements, &state.rows)?;
         let machine = self.plan.machine().filter(|_| !to_come.is_empty());
         let stage = machine.map(|(_, stage)| stage);
-        let rows = state.rows.clone();
-        let journal =
-            Journal::new(&rig.setup, presses, comment.clone(), rows, DepthKnowledge::for_stage(stage))?;
-        let calibration = Calibration::new(&rig.setup, stage, from.columns(), to_come, journal)?;
+        let (rows, comment) = (state.rows.clone(), self.plan.comment(&state.statements));
+        let journal = Journal::new(&rig.setup, presses, comment, rows, DepthKnowledge::for_stage(stage))?
+            .with_traces(state.traces.clone());
         let machine = machine.map(|(url, stage)| MachineRun {
             url: url.clone(),
             stage: stage.clone(),
             stop: self.new_stop(),
             attendance: Arc::clone(&self.attendance),
         });
+        // Many sources have room for one.
+        free_source();
+        let running = self.run(Purpose::Press, to_come, journal, machine, folder, clock)?;
+        (state.phase, state.problem) = (Phase::Pressing, None);
+        state.running = Some(running);
+        Ok(())
+    }
+
+    /// Shows readings before it begins, where a person presses and the source can be opened.
+    pub fn preview(&self, folder: &Path, clock: HostClock) {
+        let mut state = self.lock();
+        let waits = state.phase == Phase::Ready && state.running.is_none() && state.problem.is_none();
+        if !waits || state.outcome.is_some() || self.plan.machine().is_some() {
+            return;
+        }
+        let CalibrationPlan { rig, presses, comment, .. } = &self.plan;
+        let journal = Journal::new(&rig.setup, presses, comment.clone(), Vec::new(), DepthKnowledge::Unknown);
+        let running = journal
+            .map_err(CalibratorError::from)
+            .and_then(|journal| self.run(Purpose::Preview, Vec::new(), journal, None, folder, clock));
+        match running {
+            Ok(running) => state.running = Some(running),
+            Err(error) => state.problem = Some(error.to_string()),
+        }
+    }
+
+    /// Asks for presses at fresh places, which check the locator on disk. `free_source` ends the session that has the source.
+    ///
+    /// # Errors
+    /// [`CalibratorError`] where there is nothing to check, the source cannot be opened, or a machine presses.
+    pub fn begin_check(
+        &self,
+        folder: &Path,
+        clock: HostClock,
+        free_source: impl FnOnce(),
+    ) -> Result<(), CalibratorError> {
+        let mut state = self.lock();
+        if !self.can_check(&state) {
+            return Err(CalibratorError::NothingToCheck);
+        }
+        let CalibrationPlan { rig, presses, force_n, .. } = &self.plan;
+        let to_press = check_presses(rig, &state.rows, state.statements.weights(*force_n));
+        if to_press.is_empty() {
+            return Err(CalibratorError::NothingToCheck);
+        }
+        let (path, comment) = (check_path(presses), self.plan.comment(&state.statements));
+        let journal = Journal::new(&rig.setup, &path, comment, Vec::new(), DepthKnowledge::Unknown)?;
+        free_source();
+        let running = self.run(Purpose::Check, to_press, journal, None, folder, clock)?;
+        (state.phase, state.problem, state.check) = (Phase::Checking, None, None);
+        state.running = Some(running);
+        Ok(())
+    }
+
+    fn can_check(&self, state: &State) -> bool {
+        state.phase == Phase::Done && state.running.is_none() && self.plan.machine().is_none()
+    }
+
+    /// Ends a check whose presses are all taken, and measures the locator by them; false where none has come to its end. The session may
+    /// have the source again then.
+    pub fn finish_check(&self) -> bool {
+        let mut state = self.lock();
+        let is_over = |running: &Running| {
+            running.purpose == Purpose::Check
+                && locked(&running.shared).calibration.guide().waiting() == Waiting::Nothing
+        };
+        let Some(running) = state.running.as_ref().filter(|running| is_over(running)) else { return false };
+        let path = locked(&running.shared).calibration.journal().path().to_owned();
+        state.end_running();
+        match self.measure(&path, &state.statements) {
+            Ok(check) => state.check = check,
+            Err(problem) => state.problem = Some(problem),
+        }
+        true
+    }
+
+    fn measure(&self, path: &Path, statements: &Statements) -> Result<Option<CheckRecord>, String> {
+        let CalibrationPlan { rig, out, .. } = &self.plan;
+        let read = |path: &Path| {
+            std::fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))
+        };
+        let Ok(presses) = read(path) else { return Ok(None) };
+        let name = path.display().to_string();
+        let recording =
+            rig.setup.read_recording(&name, presses.as_slice()).map_err(|error| error.to_string())?;
+        let locator = String::from_utf8(read(out)?).map_err(|error| error.to_string())?;
+        let locator = Locator::from_json(&locator).map_err(|error| error.to_string())?;
+        let check = Check::new(&locator, &recording).map_err(|error| error.to_string())?;
+        let extent = rig.setup.surface().extent();
+        Ok(check.map(|check| CheckRecord::new(&name, &check, statements.placement_sd_m, extent)))
+    }
+
+    /// Opens the source, and begins a thread that takes what it brings.
+    fn run(
+        &self,
+        purpose: Purpose,
+        to_come: Vec<Press>,
+        journal: Journal,
+        machine: Option<MachineRun>,
+        folder: &Path,
+        clock: HostClock,
+    ) -> Result<Running, CalibratorError> {
+        let CalibrationPlan { rig, from, .. } = &self.plan;
+        let stage = machine.as_ref().map(|machine| &machine.stage);
+        let calibration = Calibration::new(&rig.setup, stage, from.columns(), to_come, journal)?;
         let by_machine = machine.is_some();
         let shared = Shared {
             calibration,
@@ -266,8 +437,6 @@ impl Calibrator {
         };
         let shared = Arc::new(Mutex::new(shared));
         let (inputs, received) = sync_channel(WAITING);
-        // Many sources have room for one.
-        free_source();
         let source = Source::open(from, folder, clock, inputs.clone())?;
         let heard = Arc::clone(&shared);
         let run = move || match machine {
@@ -275,9 +444,7 @@ impl Calibrator {
             None => listen(&received, &heard),
         };
         let thread = std::thread::Builder::new().name("calibration".to_owned()).spawn(run)?;
-        (state.phase, state.problem) = (Phase::Pressing, None);
-        state.running = Some(Running { shared, inputs, thread, by_machine, _source: source });
-        Ok(())
+        Ok(Running { shared, inputs, thread, purpose, by_machine, _source: source })
     }
 
     /// Stops the machine at once, whatever it does and whatever is waited for.
@@ -342,6 +509,61 @@ impl Calibrator {
         })
     }
 
+    /// Strikes out a press, counted from 1, which is asked for again.
+    ///
+    /// # Errors
+    /// [`CalibratorError::NoSuchPress`], or where a machine presses, a fit or a check goes on, or the file cannot be written.
+    pub fn strike(&self, press: usize) -> Result<(), CalibratorError> {
+        let mut state = self.lock();
+        if state.machine_presses() {
+            return Err(CalibratorError::MachinePresses);
+        }
+        if matches!(state.phase(), Phase::Fitting | Phase::Assessing | Phase::Checking) {
+            return Err(CalibratorError::GoesOn);
+        }
+        let index = press.wrapping_sub(1);
+        let statements = state.statements;
+        let no_such = |presses| CalibratorError::NoSuchPress { press, presses };
+        if let Some(running) = state.running.as_ref().filter(|running| running.purpose == Purpose::Press) {
+            let calibration = &mut locked(&running.shared).calibration;
+            if !calibration.strike(index)? {
+                return Err(no_such(calibration.journal().presses()));
+            }
+            let to_come = self.plan.to_come(&statements, calibration.journal().rows())?;
+            calibration.replan(to_come);
+        } else {
+            let CalibrationPlan { rig, presses, .. } = &self.plan;
+            let stage = self.plan.machine().map(|(_, stage)| stage);
+            let (rows, comment) = (state.rows.clone(), self.plan.comment(&statements));
+            let mut journal =
+                Journal::new(&rig.setup, presses, comment, rows, DepthKnowledge::for_stage(stage))?
+                    .with_traces(state.traces.clone());
+            if !journal.strike(index)? {
+                return Err(no_such(journal.presses()));
+            }
+            (state.rows, state.traces) = (journal.rows().to_vec(), journal.traces().to_vec());
+            state.phase = Phase::Ready;
+        }
+        if index < state.errors_m.len() {
+            state.errors_m.remove(index);
+        }
+        Ok(())
+    }
+
+    /// The presses so far, each with its trace and how it agrees with the others.
+    pub fn presses(&self) -> Vec<PressRecord> {
+        let state = self.lock();
+        let extent = self.plan.rig.setup.surface().extent();
+        match state.running.as_ref().filter(|running| running.purpose == Purpose::Press) {
+            Some(running) => {
+                let shared = locked(&running.shared);
+                let journal = shared.calibration.journal();
+                press_records(journal.rows(), journal.traces(), &state.errors_m, extent)
+            }
+            None => press_records(&state.rows, &state.traces, &state.errors_m, extent),
+        }
+    }
+
     /// Acts where a person presses: a machine is on its way to the press that was next.
     fn with_hand(
         &self,
@@ -358,7 +580,8 @@ impl Calibrator {
         act: impl FnOnce(&mut Calibration) -> Result<(), CalibratorError>,
     ) -> Result<(), CalibratorError> {
         let state = self.lock();
-        let running = state.running.as_ref().ok_or(CalibratorError::NotBegun)?;
+        let running = state.running.as_ref().filter(|running| running.purpose != Purpose::Preview);
+        let running = running.ok_or(CalibratorError::NotBegun)?;
         act(&mut locked(&running.shared).calibration)
     }
 
@@ -368,7 +591,7 @@ impl Calibrator {
     /// [`CalibratorError::NoPress`], or [`CalibratorError::GoesOn`] where they are fitted already.
     pub fn begin_fit(&self) -> Result<(), CalibratorError> {
         let mut state = self.lock();
-        if matches!(state.phase(), Phase::Fitting | Phase::Assessing) {
+        if matches!(state.phase(), Phase::Fitting | Phase::Assessing | Phase::Checking) {
             return Err(CalibratorError::GoesOn);
         }
         if state.machine_presses() {
@@ -388,15 +611,20 @@ impl Calibrator {
         let outcome = self.try_to_fit(begin);
         let mut state = self.lock();
         match outcome {
-            Ok(outcome) => {
-                (state.phase, state.outcome) = (Phase::Done, Some(outcome));
+            Ok((outcome, errors_m)) => {
+                (state.phase, state.outcome, state.check) = (Phase::Done, Some(outcome), None);
+                state.errors_m = errors_m;
             }
             Err(problem) => (state.phase, state.problem) = (Phase::Ready, Some(problem)),
         }
     }
 
-    fn try_to_fit(&self, begin: impl FnOnce(Locator) -> Result<(), String>) -> Result<OutcomeRecord, String> {
-        let CalibrationPlan { rig, presses, seed, out, .. } = &self.plan;
+    fn try_to_fit(
+        &self,
+        begin: impl FnOnce(Locator) -> Result<(), String>,
+    ) -> Result<(OutcomeRecord, Vec<Option<f64>>), String> {
+        let CalibrationPlan { rig, presses, seed, out, force_n, .. } = &self.plan;
+        let rig = &self.lock().statements.applied_to(rig, *force_n);
         let name = presses.display().to_string();
         let bytes = std::fs::read(presses).map_err(|error| format!("cannot read {name}: {error}"))?;
         let recording =
@@ -411,7 +639,7 @@ impl Calibrator {
         let assessment =
             Assessment::new(rig, &recording, *seed, Watch::NONE).map_err(|error| error.to_string())?;
         let held_out = assessment.held_out;
-        Ok(OutcomeRecord {
+        let outcome = OutcomeRecord {
             locator: out.display().to_string(),
             presses: recording.touched().rows.len(),
             folds: held_out.map(|held_out| held_out.folds),
@@ -420,7 +648,8 @@ impl Calibrator {
             gain_percent: assessment.gain.map(|gain| gain.percent),
             stop_percent: assessment.gain.map(|gain| gain.stop_percent),
             remarks: assessment.remarks,
-        })
+        };
+        Ok((outcome, assessment.errors_m))
     }
 
     /// Ends it, where it runs; its presses are on disk. A machine is stopped at once.
@@ -446,38 +675,58 @@ impl Calibrator {
             reading: Vec::new(),
             bad_frames: 0,
             presses: self.plan.presses.display().to_string(),
+            placement_mm: state.statements.placement_sd_m.map(|sd_m| sd_m * 1e3),
+            single_weight_n: match self.plan.machine() {
+                None => state.statements.single_weight_n(&self.plan.rig, self.plan.force_n),
+                Some(_) => None,
+            },
             problem: state.problem.clone(),
             hint: None,
             machine: None,
             outcome: state.outcome.clone(),
+            check: state.check.clone(),
+            can_check: self.can_check(&state),
         };
-        match &state.running {
-            Some(running) => self.tell_running(&locked(&running.shared), &mut record, extent),
+        let running = state.running.as_ref();
+        match running.filter(|running| running.purpose != Purpose::Preview) {
+            Some(running) => self.write_running(&locked(&running.shared), &mut record, extent),
             None => {
                 let to_come = match state.phase {
-                    Phase::Ready => self.plan.to_come(&state.rows),
+                    Phase::Ready => self.plan.to_come(&state.statements, &state.rows),
                     _ => Ok(Vec::new()),
                 };
                 let to_come = to_come.unwrap_or_default();
-                tell_places(&state.rows, &to_come, extent, &mut record);
+                write_places(&state.rows, &to_come, extent, &mut record);
                 record.machine = self.machine_record(&state.rows, &to_come);
+                if let Some(preview) = running {
+                    self.write_readings(&locked(&preview.shared), &mut record);
+                }
             }
         }
         record
     }
 
-    fn tell_running(&self, shared: &Shared, record: &mut CalibrationRecord, extent: Extent) {
+    fn write_running(&self, shared: &Shared, record: &mut CalibrationRecord, extent: Extent) {
         let calibration = &shared.calibration;
         let guide = calibration.guide();
         record.waiting = guide.waiting();
         let next = guide.next_press();
         let to_come = &guide.plan()[next.map_or(guide.plan().len(), |(number, _)| number)..];
-        tell_places(calibration.journal().rows(), to_come, extent, record);
+        write_places(calibration.journal().rows(), to_come, extent, record);
         record.next = next.map(|(_, press)| PlaceRecord {
             force_n: press.force_n,
             ..PlaceRecord::of_position(press.position, extent)
         });
         record.last_percent = shared.last_percent;
+        record.presses = calibration.journal().path().display().to_string();
+        self.write_readings(shared, record);
+        record.machine = self
+            .machine_record(calibration.journal().rows(), to_come)
+            .map(|machine| machine.running(&shared.machine, calibration, extent, record.left));
+    }
+
+    fn write_readings(&self, shared: &Shared, record: &mut CalibrationRecord) {
+        let calibration = &shared.calibration;
         record.source.clone_from(&shared.source);
         record.readings = calibration.readings();
         let values = calibration.last_reading().iter().zip(&self.channels);
@@ -485,9 +734,6 @@ impl Calibrator {
         record.bad_frames = calibration.bad_frames().values().sum();
         record.hint.clone_from(&shared.hint);
         record.problem = record.problem.take().or_else(|| shared.problem.clone());
-        record.machine = self
-            .machine_record(calibration.journal().rows(), to_come)
-            .map(|machine| machine.running(&shared.machine, calibration, extent, record.left));
     }
 
     fn machine_record(&self, rows: &[Row], to_come: &[Press]) -> Option<MachineRecord> {
@@ -508,16 +754,26 @@ impl Calibrator {
 }
 
 impl State {
-    /// The phase, which a calibration that runs tells.
+    /// The phase, that of a calibration that runs.
     fn phase(&self) -> Phase {
-        match &self.running {
-            Some(running) if running.by_machine => Phase::Pressing,
-            Some(running) if locked(&running.shared).calibration.guide().waiting() == Waiting::Nothing => {
-                Phase::Pressed
-            }
-            Some(_) => Phase::Pressing,
-            None => self.phase,
+        let Some(running) = &self.running else { return self.phase };
+        match running.purpose {
+            Purpose::Preview => self.phase,
+            Purpose::Check => Phase::Checking,
+            Purpose::Press if running.by_machine => Phase::Pressing,
+            Purpose::Press => match locked(&running.shared).calibration.guide().waiting() {
+                Waiting::Nothing => Phase::Pressed,
+                _ => Phase::Pressing,
+            },
         }
+    }
+
+    /// Takes what the operator states; what he leaves out stays.
+    fn state(&mut self, stated: Statements) {
+        let now = &mut self.statements;
+        now.placement_sd_m = stated.placement_sd_m.or(now.placement_sd_m);
+        now.second_force_n = stated.second_force_n.or(now.second_force_n);
+        now.force_is_known |= stated.force_is_known;
     }
 
     fn machine_presses(&self) -> bool {
@@ -526,7 +782,8 @@ impl State {
 
     /// Ends the thread and the source, and keeps the rows and what is wrong.
     fn end_running(&mut self) {
-        let Some(Running { shared, inputs, thread, _source: source, .. }) = self.running.take() else {
+        let Some(Running { shared, inputs, thread, purpose, _source: source, .. }) = self.running.take()
+        else {
             return;
         };
         drop(source);
@@ -534,9 +791,20 @@ impl State {
         let _ = inputs.send(Input::Stop);
         let _ = thread.join();
         let shared = locked(&shared);
-        self.rows = shared.calibration.journal().rows().to_vec();
-        self.problem.clone_from(&shared.problem);
-        self.phase = Phase::Ready;
+        let journal = shared.calibration.journal();
+        match purpose {
+            Purpose::Preview => {}
+            Purpose::Press => {
+                (self.rows, self.traces) = (journal.rows().to_vec(), journal.traces().to_vec());
+                self.errors_m.truncate(journal.presses());
+                self.problem.clone_from(&shared.problem);
+                self.phase = Phase::Ready;
+            }
+            Purpose::Check => {
+                self.problem.clone_from(&shared.problem);
+                self.phase = Phase::Done;
+            }
+        }
     }
 }
 
@@ -547,7 +815,7 @@ impl PlaceRecord {
     }
 }
 
-fn tell_places(rows: &[Row], to_come: &[Press], extent: Extent, record: &mut CalibrationRecord) {
+fn write_places(rows: &[Row], to_come: &[Press], extent: Extent, record: &mut CalibrationRecord) {
     record.taken = rows.iter().filter(|row| row.touches()).count();
     record.left = to_come.len();
     let places = places(rows, to_come).into_iter();
@@ -559,4 +827,86 @@ fn tell_places(rows: &[Row], to_come: &[Press], extent: Extent, record: &mut Cal
             ..PlaceRecord::of_position(place.position, extent)
         })
         .collect();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn row(x_m: f64, force_n: f64, value: f64) -> Row {
+        let position = Position::along(x_m);
+        Row {
+            position,
+            force_n: Some(force_n),
+            nuisances: Vec::new(),
+            time_s: None,
+            reading: vec![value, 0.5],
+        }
+    }
+
+    fn calibrator(folder: &Path) -> Calibrator {
+        let rig = include_str!("../../../../examples/fsi-like.toml");
+        let rig = Rig::from_toml(&rig.replace("count = 9\nrepeats = 3", "count = 2\nrepeats = 2")).unwrap();
+        Calibrator::new(CalibrationPlan {
+            rig,
+            from: "tcp://127.0.0.1:9".parse().unwrap(),
+            presses: folder.join("presses.csv"),
+            out: folder.join("locator.json"),
+            comment: "palpate 0.1.0, pressed for a test".to_owned(),
+            force_n: None,
+            machine: None,
+            before: vec![
+                row(0.0, 0.0, 0.0),
+                row(0.025, 1.0, 0.7),
+                row(0.025, 1.0, 0.9),
+                row(0.0, 0.0, 0.0),
+                row(0.075, 1.0, 0.3),
+            ],
+            statements: Statements { placement_sd_m: Some(1e-3), ..Statements::default() },
+            seed: 0,
+        })
+    }
+
+    fn record(calibrator: &Calibrator) -> Value {
+        serde_json::to_value(calibrator.record()).unwrap()
+    }
+
+    #[test]
+    fn presses_are_listed_and_struck_out_before_it_begins() {
+        let folder = tempfile::tempdir().unwrap();
+        let calibrator = calibrator(folder.path());
+        let state = record(&calibrator);
+        assert_eq!((&state["taken"], &state["left"]), (&json!(3), &json!(1)));
+        assert_eq!((&state["placement_mm"], &state["single_weight_n"]), (&json!(1.0), &Value::Null));
+        let presses = serde_json::to_value(calibrator.presses()).unwrap();
+        assert_eq!((&presses[1]["press"], &presses[1]["x_mm"]), (&json!(2), &json!(25.0)));
+        assert!(presses[1]["deviation_percent"].as_f64().unwrap() > 10.0, "{presses}");
+        assert_eq!(presses[2]["deviation_percent"], Value::Null);
+        calibrator.strike(2).unwrap();
+        let state = record(&calibrator);
+        assert_eq!(
+            (&state["phase"], &state["taken"], &state["left"]),
+            (&json!("ready"), &json!(2), &json!(2))
+        );
+        let file = std::fs::read_to_string(folder.path().join("presses.csv")).unwrap();
+        assert!(file.contains("0.7") && !file.contains("0.9") && file.contains("; placement 1 mm"), "{file}");
+        for press in [0, 3, usize::MAX] {
+            assert!(matches!(calibrator.strike(press), Err(CalibratorError::NoSuchPress { presses: 2, .. })));
+        }
+    }
+
+    #[test]
+    fn nothing_is_checked_before_a_fit_and_no_statement_is_taken_that_is_no_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let calibrator = calibrator(folder.path());
+        let clock = HostClock::new();
+        let checked = calibrator.begin_check(folder.path(), clock, || panic!("the session goes on"));
+        assert!(matches!(checked, Err(CalibratorError::NothingToCheck)));
+        let stated = Statements { second_force_n: Some(f64::NAN), ..Statements::default() };
+        let begun = calibrator.begin(stated, folder.path(), clock, || panic!("the session goes on"));
+        assert!(matches!(begun, Err(CalibratorError::Statement(_))));
+        assert!(!calibrator.finish_check());
+        assert_eq!(record(&calibrator)["can_check"], json!(false));
+    }
 }

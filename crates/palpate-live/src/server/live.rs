@@ -6,6 +6,7 @@ use super::lock::locked;
 use super::rig_maker::{MadeRig, MadeRigRecord, RigForm, RigFormError};
 use super::session_info::SessionInfo;
 use super::web_sink::{Hub, WebSink};
+use crate::calibration::Statements;
 use crate::frame::{Channel, ColumnsError};
 use crate::input::{Command, Input};
 use crate::pipeline::{self, PaceError};
@@ -435,6 +436,7 @@ impl Live {
             presses: made.presses,
             out: made.out,
             force_n: None,
+            statements: Statements::default(),
             machine: None,
             before: Vec::new(),
             seed: 0,
@@ -449,7 +451,12 @@ impl Live {
     /// # Errors
     /// [`LiveError::NotCalibrating`].
     pub(super) fn calibration(&self) -> Result<CalibrationRecord, LiveError> {
-        Ok(self.calibrator()?.record())
+        let calibrator = self.calibrator()?;
+        if calibrator.finish_check() {
+            self.begin(&calibrator.plan().from)?;
+        }
+        calibrator.preview(&self.folder, self.clock);
+        Ok(calibrator.record())
     }
 
     pub(super) fn calibrator(&self) -> Result<&Calibrator, LiveError> {
@@ -472,8 +479,16 @@ impl Live {
     ///
     /// # Errors
     /// [`LiveError`] where the source cannot be opened, or the presses cannot be kept.
-    pub(super) fn begin_calibration(&self) -> Result<(), LiveError> {
-        Ok(self.calibrator()?.begin(&self.folder, self.clock, || self.end_session())?)
+    pub(super) fn begin_calibration(&self, stated: Statements) -> Result<(), LiveError> {
+        Ok(self.calibrator()?.begin(stated, &self.folder, self.clock, || self.end_session())?)
+    }
+
+    /// Asks for presses at fresh places, which check the locator.
+    ///
+    /// # Errors
+    /// [`LiveError`] where there is nothing to check, or the source cannot be opened.
+    pub(super) fn begin_check(&self) -> Result<(), LiveError> {
+        Ok(self.calibrator()?.begin_check(&self.folder, self.clock, || self.end_session())?)
     }
 
     /// Fits the presses in a thread of its own; a session with the locator begins as soon as there is one.

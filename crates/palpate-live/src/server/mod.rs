@@ -13,6 +13,7 @@ mod lock;
 mod machine;
 mod page;
 mod past;
+mod press_records;
 mod pressing;
 mod rig_maker;
 mod routes;

@@ -1,6 +1,6 @@
 //! A first rig for a board whose surface has no model, made from what a person fills in.
 
-use crate::calibration::{PlanError, plan};
+use crate::calibration::{PlanError, Weights, plan};
 use crate::source::{SourceUrl, SourceUrlError};
 use crate::whole_file;
 use palpate_rig::{Rig, RigError};
@@ -158,7 +158,7 @@ impl MadeRig {
         let from = if *named { from.clone() } else { with_columns(from, form)? };
         let text = text_of(form, &used)?;
         let rig = Rig::from_toml(&text)?;
-        plan(&rig, None, &[], &[])?;
+        plan(&rig, Weights::default(), &[], &[])?;
         let names = [form.file.clone(), format!("{stem}-presses.csv"), format!("{stem}.locator.json")];
         let [path, presses, out] = names.clone().map(|name| folder.join(name));
         let [file, presses_name, out_name] = names;
@@ -322,7 +322,7 @@ mod tests {
         let labels: Vec<&str> = channels.iter().map(|channel| channel.label.as_str()).collect();
         assert_eq!(labels, ["left", "right \"b\""]);
         assert_eq!(made.from.columns(), ["left", "unused-2", "right \"b\""]);
-        assert_eq!(plan(&made.rig, None, &[], &[]).unwrap().len(), 20);
+        assert_eq!(plan(&made.rig, Weights::default(), &[], &[]).unwrap().len(), 20);
         assert_eq!(made.rig.setup.force_n(), None);
         assert!(made.record.command.contains("--from 'serial:///dev/ttyACM0?"), "{}", made.record.command);
     }
@@ -338,7 +338,7 @@ mod tests {
         };
         let named = (vec!["a".to_owned(), "b".to_owned()], true);
         let made = MadeRig::new(&plane, &serial(), &named, Path::new("")).unwrap();
-        assert_eq!(plan(&made.rig, None, &[], &[]).unwrap().len(), 30);
+        assert_eq!(plan(&made.rig, Weights::default(), &[], &[]).unwrap().len(), 30);
         assert_eq!((made.rig.setup.force_n(), made.from), (Some(2.0), serial()));
     }
 

@@ -5,9 +5,11 @@ use super::bring_up::{BringUpError, BringUpRecord};
 use super::calibration::{CalibrationRecord, CalibratorError};
 use super::guard::{Access, EMERGENCY_STOP, Guard, guarded};
 use super::live::{Live, LiveError};
+use super::press_records::PressRecord;
 use super::rig_maker::{MadeRigRecord, RigForm, RigFormError};
 use super::session_info::SessionInfo;
 use super::{page, stream};
+use crate::calibration::Statements;
 use crate::input::Command;
 use crate::recording::{Excerpt, RecordingError, RecordingSummary};
 use axum::extract::rejection::{PathRejection, QueryRejection};
@@ -43,6 +45,7 @@ pub fn router(access: Access, live: Arc<Live>) -> Router {
         .route("/api/bring-up", get(bring_up).post(choose_port))
         .route("/api/rig", post(make_rig))
         .route("/api/calibration", get(calibration).post(calibrate))
+        .route("/api/calibration/presses", get(calibration_presses))
         .route(EMERGENCY_STOP, post(emergency_stop))
         .route("/api/recordings", get(recordings))
         .route("/api/recordings/{name}", get(recording))
@@ -167,6 +170,11 @@ async fn calibration(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Calibra
     .map(JsonAnswer)
 }
 
+/// The presses so far; apart from the state, as their traces are long.
+async fn calibration_presses(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Vec<PressRecord>>, Refusal> {
+    blocking(move || Ok(live.calibrator()?.presses())).await.map(JsonAnswer)
+}
+
 /// Stops the machine of a calibration before anything else is waited for, be it the rest of the request.
 async fn emergency_stop(State(live): State<Arc<Live>>) -> Answer {
     done(live.calibrator().and_then(|calibrator| Ok(calibrator.halt()?)))
@@ -182,23 +190,44 @@ enum Step {
     Untouched,
     Stop,
     Finish,
+    Strike,
+    Check,
 }
 
 #[derive(Deserialize)]
 struct Calibrate {
     step: Step,
+    /// Of `strike`: the number of the press.
+    press: Option<usize>,
+    /// Of `begin`: what the operator states.
+    placement_mm: Option<f64>,
+    second_force_n: Option<f64>,
+    #[serde(default)]
+    force_is_known: bool,
+}
+
+impl Calibrate {
+    fn statements(&self) -> Statements {
+        Statements {
+            placement_sd_m: self.placement_mm.map(|sd_mm| sd_mm * 1e-3),
+            second_force_n: self.second_force_n,
+            force_is_known: self.force_is_known,
+        }
+    }
 }
 
 /// Does a step; the answer is the state after it.
 async fn calibrate(
     State(live): State<Arc<Live>>,
-    JsonBody(Calibrate { step }): JsonBody<Calibrate>,
+    JsonBody(wish): JsonBody<Calibrate>,
 ) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
     // A source that ends is waited for, and presses are written to the disk.
     blocking(move || {
         live.attend();
-        match step {
-            Step::Begin => live.begin_calibration()?,
+        match wish.step {
+            Step::Begin => live.begin_calibration(wish.statements())?,
+            Step::Strike => live.calibrator()?.strike(wish.press.unwrap_or_default())?,
+            Step::Check => live.begin_check()?,
             Step::Redo => live.calibrator()?.redo()?,
             Step::Skip => live.calibrator()?.skip()?,
             Step::Untouched => live.calibrator()?.relearn_untouched()?,
@@ -227,6 +256,12 @@ fn refusal(error: &LiveError) -> Refusal {
         }
         LiveError::Calibrator(CalibratorError::MachinePresses) => {
             (StatusCode::CONFLICT, "end it early, or wait until it has ended")
+        }
+        LiveError::Calibrator(CalibratorError::Statement(_)) => {
+            (StatusCode::BAD_REQUEST, "give a length in mm and a force in N, greater than 0")
+        }
+        LiveError::Calibrator(CalibratorError::NoSuchPress { .. }) => {
+            (StatusCode::BAD_REQUEST, "GET /api/calibration/presses lists them")
         }
         LiveError::Calibrator(_) => (StatusCode::CONFLICT, "GET /api/calibration says how far it is"),
         LiveError::NoSession => (StatusCode::CONFLICT, "choose a source first"),

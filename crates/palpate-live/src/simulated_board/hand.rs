@@ -1,11 +1,21 @@
 //! A hand that does what a guided calibration asks for, as people do it: beside the place, slowly, hovering, tapping, lifting early.
 
-use crate::calibration::{Press, Waiting};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Instruction to a hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Instruction {
+    /// Press here, with this force.
+    Press(Contact),
+    /// Go on as it is.
+    Hold,
+    /// Let go.
+    Lift,
+}
 
 /// Manner in which a hand presses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,41 +94,30 @@ impl Hand {
         }
     }
 
-    /// Contact at a time in seconds, which never goes back, of a hand that is asked for a step; presses without a force have `force_n`.
-    pub fn contact_at(
-        &mut self,
-        time_s: f64,
-        waiting: Waiting,
-        press: Option<Press>,
-        force_n: f64,
-    ) -> Option<Contact> {
-        let has_stopped = self.is_over(time_s);
-        match (waiting, press) {
-            (Waiting::Press, Some(press)) if !self.presses && has_stopped => {
-                self.begin(time_s);
-                self.presses = true;
-                self.position = self.beside(press.position);
-                self.force_n = press.force_n.unwrap_or(force_n);
-                self.motion = self.pressing();
+    /// Contact at a time in seconds, which never goes back, of a hand that has this instruction.
+    pub fn contact_at(&mut self, time_s: f64, instruction: Instruction) -> Option<Contact> {
+        if self.is_over(time_s) {
+            let share = self.share_at(time_s);
+            match instruction {
+                Instruction::Press(contact) if !self.presses => {
+                    self.presses = true;
+                    self.begun_s = time_s;
+                    self.position = self.beside(contact.position);
+                    self.force_n = contact.force_n;
+                    self.motion = self.pressing();
+                }
+                // A hand that lifted early is asked for the press again.
+                Instruction::Press(_) if share <= 0.0 => self.presses = false,
+                Instruction::Lift if self.presses => {
+                    self.presses = false;
+                    self.begun_s = time_s;
+                    self.motion = if share > 0.0 { self.lifting(share) } else { Vec::new() };
+                }
+                _ => {}
             }
-            // A hand that was lifted early is asked for the press again.
-            (Waiting::Press, _) if self.presses && has_stopped && self.share_at(time_s) <= 0.0 => {
-                self.presses = false;
-            }
-            (Waiting::Release | Waiting::Untouched | Waiting::Nothing, _) if self.presses && has_stopped => {
-                let share = self.share_at(time_s);
-                self.begin(time_s);
-                self.presses = false;
-                self.motion = if share > 0.0 { self.lifting(share) } else { Vec::new() };
-            }
-            _ => {}
         }
         let share = self.share_at(time_s);
         (share > 0.0).then_some(Contact { position: self.position, force_n: self.force_n * share })
-    }
-
-    fn begin(&mut self, time_s: f64) {
-        self.begun_s = time_s;
     }
 
     fn pressing(&mut self) -> Vec<Leg> {

@@ -8,7 +8,7 @@ mod link;
 
 pub use faults::FaultConfig;
 pub use finger::{Finger, ScriptError};
-pub use hand::{Hand, HandStyle};
+pub use hand::{Hand, HandStyle, Instruction};
 pub use link::{Link, LinkError, LinkUrl, LinkUrlError};
 
 use crate::frame::{self, Channel};

@@ -1,6 +1,7 @@
 //! Calibrations by a machine, started and stopped by requests: a simulated board whose finger a simulated machine moves.
 
 use crate::client::{get, post};
+use palpate_live::calibration::Statements;
 use palpate_live::server::{Access, CalibrationPlan, Live, Server};
 use palpate_live::simulated_board::{BoardConfig, Finger, Link, LoadCell, SimulatedBoard};
 use palpate_live::stage::{Firmware, MachineConfig, SimulatedMachine};
@@ -106,6 +107,7 @@ fn served(folder: &Path, from: &str, stage: Option<&str>) -> (Arc<Live>, Server)
         force_n: None,
         machine: stage.map(|stage| stage.parse().unwrap()),
         before: Vec::new(),
+        statements: Statements::default(),
         seed: 0,
     };
     let live = Arc::new(Live::calibrating(plan, PathBuf::new()));

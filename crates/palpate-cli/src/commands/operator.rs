@@ -1,0 +1,147 @@
+//! Questions to the person who presses in `palpate calibrate`, and what he is shown of the presses and of a check.
+
+use crate::failure::Failure;
+use crate::remark::remark;
+use crate::{input, output, progress};
+use palpate_estimators::recording::Row;
+use palpate_live::calibration::{Check, Press, Statements, deviation_percent};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::format_length_mm;
+use palpate_rig::Rig;
+use std::io::IsTerminal;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::Duration;
+
+/// Asks for what is not known yet, where a person is at the terminal.
+pub fn ask(
+    known: Statements,
+    rig: &Rig,
+    force_n: Option<f64>,
+    keys: &Receiver<String>,
+) -> Result<Statements, Failure> {
+    let mut stated = known;
+    if !std::io::stdin().is_terminal() {
+        return Ok(stated);
+    }
+    if stated.placement_sd_m.is_none() {
+        remark!(
+            "how far off the asked place do you press, as a standard deviation? as in 2 mm; Enter: unknown"
+        );
+        stated.placement_sd_m = answer(keys, |text| input::length(text).map(Some))?;
+    }
+    if let Some(force_n) = stated.single_weight_n(rig, force_n) {
+        remark!("{}", single_weight(force_n));
+        remark!(
+            "second weight? as in {} N; `known`: contacts in use have {force_n} N; Enter: go on with one",
+            2.0 * force_n
+        );
+        let parse = |text: &str| match text {
+            "known" => Ok(Some(None)),
+            text => input::force(text).map(|second_n| Some(Some(second_n))),
+        };
+        match answer(keys, parse)? {
+            Some(Some(second_n)) => stated.second_force_n = Some(second_n),
+            Some(None) => stated.force_is_known = true,
+            None => {}
+        }
+    }
+    Ok(stated)
+}
+
+/// Warning of a calibration by one weight.
+pub fn single_weight(force_n: f64) -> String {
+    format!(
+        "all presses have {force_n} N, and the force in use is unknown: one weight cannot tell how readings grow with the force"
+    )
+}
+
+/// True where a person at the terminal wishes a check.
+pub fn wants_check(keys: &Receiver<String>) -> bool {
+    if !std::io::stdin().is_terminal() {
+        return false;
+    }
+    remark!("check the locator at five fresh places? y and Enter: yes; Enter: no");
+    let parse = |text: &str| match text {
+        "y" | "yes" => Ok(Some(())),
+        "n" | "no" => Ok(None),
+        _ => Err("y or n".to_owned()),
+    };
+    matches!(answer(keys, parse), Ok(Some(())))
+}
+
+/// The next line that can be parsed; `None` for an empty one, and at the end of the input.
+fn answer<T>(
+    keys: &Receiver<String>,
+    parse: impl Fn(&str) -> Result<Option<T>, String>,
+) -> Result<Option<T>, Failure> {
+    const LOOK_EVERY: Duration = Duration::from_millis(50);
+    loop {
+        match keys.recv_timeout(LOOK_EVERY) {
+            Ok(line) if line.trim().is_empty() => return Ok(None),
+            Ok(line) => match parse(line.trim()) {
+                Ok(parsed) => return Ok(parsed),
+                Err(problem) => remark!("{problem}"),
+            },
+            Err(RecvTimeoutError::Timeout) if progress::interrupted() => {
+                return Err(Failure::Interrupted("stopped before the first press".to_owned()));
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return Ok(None),
+        }
+    }
+}
+
+/// Lists the presses with how far each is off the others of its place.
+pub fn list(rows: &[Row], extent: Extent) {
+    let touched = rows.iter().enumerate().filter(|(_, row)| row.touches());
+    if touched.clone().next().is_none() {
+        remark!("no press was taken yet");
+    }
+    for (press, (at, row)) in touched.enumerate() {
+        let place = place(Press { position: row.position, force_n: row.force_n, depth_m: None }, extent);
+        let off = deviation_percent(rows, at).map_or_else(
+            || "no other at its place".to_owned(),
+            |off| format!("{off:.2} % off the others of its place"),
+        );
+        remark!("press {}: {place}, {off}", press + 1);
+    }
+}
+
+/// Says how far off the locator is at the places of a check.
+pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Extent) -> Result<(), Failure> {
+    let Some(check) = check else {
+        remark!("no place was checked");
+        return Ok(());
+    };
+    let at = |position: Position| place(Press { position, force_n: None, depth_m: None }, extent);
+    for checked in &check.places {
+        let covered = match checked.covered {
+            Some(true) => ", within the 95 % interval",
+            Some(false) => ", outside the 95 % interval",
+            None => "",
+        };
+        let (place, estimate) = (at(checked.position), at(checked.estimate));
+        output::say(format!(
+            "pressed at {place}: located at {estimate}, {} off{covered}",
+            format_length_mm(checked.error_m)
+        ))?;
+    }
+    let (median, mean) = (format_length_mm(check.median_m), format_length_mm(check.mean_m));
+    let covered = check.covered.map_or_else(String::new, |covered| {
+        format!("; {covered} of {} within their 95 % intervals", check.places.len())
+    });
+    let placement = placement_sd_m
+        .map_or_else(String::new, |sd_m| format!("; your placement of {} is in it", format_length_mm(sd_m)));
+    output::say(format!("error at fresh places: median {median}, mean {mean}{covered}{placement}"))
+}
+
+/// A press in words.
+pub fn place(press: Press, extent: Extent) -> String {
+    let mm = |at_m: f64| format_length_mm(at_m);
+    let place = match extent {
+        Extent::Line { .. } => mm(press.position.x_m),
+        Extent::Plane { .. } => format!("{}, {}", mm(press.position.x_m), mm(press.position.y_m)),
+    };
+    press.force_n.map_or_else(|| place.clone(), |force_n| format!("{place} with {force_n} N"))
+}

@@ -1,0 +1,94 @@
+//! A hand that calibrates a simulated strip in virtual time, strikes a press out and checks at fresh places.
+
+use super::*;
+use crate::input::{Arrival, Arrived};
+use crate::stamp::Stamp;
+use palpate_estimators::fit::{Fit, FitTask};
+use palpate_estimators::recording::{Recording, comment_with_placement};
+use palpate_estimators::simulate::SimulatedBench;
+use palpate_mechanics::contact::Contact;
+use palpate_rig::Rig;
+use std::path::Path;
+use std::time::Duration;
+
+const RIG: &str = include_str!("../../../../examples/fsi-like.toml");
+const EVERY: Duration = Duration::from_millis(10);
+
+struct Hand<'a> {
+    bench: SimulatedBench<'a>,
+    at: Duration,
+}
+
+impl Hand<'_> {
+    /// Does what is asked for until `until` holds of the calibration, or nothing is waited for.
+    fn obey(&mut self, calibration: &mut Calibration, until: impl Fn(&Calibration) -> bool) {
+        for _ in 0..20_000 {
+            if until(calibration) || calibration.guide().waiting() == Waiting::Nothing {
+                return;
+            }
+            let contact = match calibration.guide().waiting() {
+                Waiting::Press | Waiting::Rest => {
+                    let press = calibration.guide().next_press().map(|(_, press)| press);
+                    let force_n = |press: Press| press.force_n.unwrap_or(1.0);
+                    press.map(|press| Contact { position: press.position, force_n: force_n(press) })
+                }
+                Waiting::Untouched | Waiting::Release | Waiting::Nothing => None,
+            };
+            let clean = self.bench.clean(contact.as_slice());
+            let reading: Vec<String> = self.bench.measure(&clean).iter().map(f64::to_string).collect();
+            self.at += EVERY;
+            let arrival = Arrival::Bytes((reading.join(",") + "\n").into_bytes());
+            let at = Stamp { elapsed: self.at, unix_ns: 0 };
+            calibration.receive(&Arrived { at, arrival }, &mut Vec::new()).unwrap();
+        }
+        panic!("the calibration does not go on from {:?}", calibration.guide().waiting());
+    }
+}
+
+fn begun(rig: &Rig, path: &Path, plan: Vec<Press>) -> Calibration {
+    let comment = comment_with_placement("palpate 0.1.0, pressed for rig.toml", Some(2e-3));
+    let journal = Journal::new(&rig.setup, path, comment, Vec::new(), DepthKnowledge::Unknown).unwrap();
+    Calibration::new(&rig.setup, None, &[], plan, journal).unwrap()
+}
+
+fn read(rig: &Rig, path: &Path) -> Recording {
+    rig.setup.read_recording("presses.csv", std::fs::read(path).unwrap().as_slice()).unwrap()
+}
+
+#[test]
+fn presses_are_struck_out_redone_fitted_and_checked() {
+    let rig = Rig::from_toml(&RIG.replace("count = 9\nrepeats = 3", "count = 7\nrepeats = 2")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("presses.csv");
+    let to_come = |rows: &[_]| plan(&rig, Weights::default(), &[], rows).unwrap();
+    let mut hand = Hand { bench: SimulatedBench::new(&rig.setup, 3).unwrap(), at: Duration::ZERO };
+    let mut calibration = begun(&rig, &path, to_come(&[]));
+    hand.obey(&mut calibration, |calibration| calibration.journal().presses() == 6);
+    let struck = calibration.guide().plan()[2];
+    assert!(calibration.strike(2).unwrap() && !calibration.strike(5).unwrap());
+    let missing = to_come(calibration.journal().rows());
+    assert_eq!((missing.len(), missing[0]), (14 - 5, struck));
+    calibration.replan(missing);
+    hand.obey(&mut calibration, |_| false);
+    let (journal, recording) = (calibration.journal(), read(&rig, &path));
+    assert_eq!((journal.presses(), recording.touched().rows.len()), (14, 14));
+    assert!(places(journal.rows(), &[]).iter().all(|place| place.taken == 2));
+    let traces = journal.rows().iter().zip(journal.traces()).filter(|(row, _)| row.touches());
+    for (row, trace) in traces {
+        let points = &trace.as_ref().unwrap_or_else(|| panic!("a trace of {row:?}")).points;
+        assert!(points.len() > 20 && points.last() == Some(&(0.0, 100.0)), "{points:?}");
+        assert!(points[0].1 < 20.0, "it begins untouched: {points:?}");
+    }
+    assert_eq!(recording.provenance.placement_sd_m, Some(2e-3));
+    let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
+    assert_eq!(locator.provenance.recording.placement_sd_m, Some(2e-3));
+    // Fresh places, in a file of their own.
+    let checked = check_path(&path);
+    let mut check = begun(&rig, &checked, check_presses(&rig, &recording.rows, Weights::default()));
+    hand.obey(&mut check, |_| false);
+    let recording = read(&rig, &checked);
+    let check = Check::new(&locator, &recording).unwrap().unwrap();
+    assert_eq!(check.places.len(), CHECK_PLACES);
+    assert!(check.median_m < 1e-3 && check.covered >= Some(4), "{check:?}");
+    assert_eq!(read(&rig, &path).touched().rows.len(), 14);
+}
