@@ -3,6 +3,8 @@
 //! A [`source`] brings bytes, each with the instant of its arrival. A [`session`] turns them into readings, estimates and events; it touches no
 //! device, file or clock, so that the same bytes at the same instants give the same answers, in a test, a replay or on the bench.
 
+mod address;
+mod broker;
 pub mod calibration;
 pub mod commander;
 pub mod device_clock;

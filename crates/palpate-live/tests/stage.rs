@@ -365,7 +365,7 @@ fn a_machine_calibrates_by_itself_to_the_limit() {
         let at = Duration::from_millis(10) * reading_number;
         match guide.add(at, &bench.measure(&clean)) {
             Progress::Pressed { untouched, press } => {
-                rows.extend(untouched.into_iter().chain([press]).map(|row| row.row))
+                rows.extend(untouched.into_iter().chain([press]).map(|row| row.row));
             }
             Progress::Untouched(untouched) => rows.push(untouched.row),
             Progress::Waits(_) | Progress::None => {}

@@ -15,6 +15,14 @@ fn field(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/field").join(name)
 }
 
+/// The bytes of a recording that another writer wrote, which is kept as hexadecimal digits.
+fn recording_of_another_writer(name: &str) -> Vec<u8> {
+    let text = fs::read_to_string(field(&format!("{name}.hex"))).unwrap();
+    let digits: Vec<u8> =
+        text.bytes().filter_map(|byte| char::from(byte).to_digit(16)).map(|digit| digit as u8).collect();
+    digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect()
+}
+
 /// A folder with the locator of a strip of 100 mm with the channels S1 to S4.
 static BENCH: LazyLock<TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
@@ -125,7 +133,8 @@ fn piped_readings_have_the_times_of_the_board() {
 #[test]
 fn recordings_of_other_writers_are_replayed() {
     for name in ["zstd.mcap", "nochunk.mcap"] {
-        let output = run(BENCH.path(), &["replay", field(name).to_str().unwrap()]);
+        fs::write(BENCH.path().join(name), recording_of_another_writer(name)).unwrap();
+        let output = run(BENCH.path(), &["replay", name]);
         assert_eq!(said(&output).lines().count(), 60, "{name}");
         let words = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(words.contains("59 estimates, each as recorded to the last bit"), "{name}: {words}");
@@ -134,7 +143,7 @@ fn recordings_of_other_writers_are_replayed() {
 
 #[test]
 fn blocks_that_cannot_be_read_are_counted_with_the_fault() {
-    let bytes = fs::read(field("zstd.mcap")).unwrap();
+    let bytes = recording_of_another_writer("zstd.mcap");
     let at = bytes.windows(4).position(|window| window == b"zstd").unwrap();
     let path = BENCH.path().join("other.mcap");
     let replay = |bytes: &[u8]| {
@@ -158,7 +167,7 @@ fn blocks_that_cannot_be_read_are_counted_with_the_fault() {
     damaged[at + 40..at + 60].fill(0xFF);
     complained(&replay(&damaged), 3);
     // Of messages outside chunks the checksum is that of the file, in the record before the summary; 0 stands for none.
-    let mut loose = fs::read(field("nochunk.mcap")).unwrap();
+    let mut loose = recording_of_another_writer("nochunk.mcap");
     let end = loose.windows(9).rposition(|window| window == [0x0F, 4, 0, 0, 0, 0, 0, 0, 0]).unwrap();
     loose[end + 9..end + 13].copy_from_slice(&0xE13C_A399_u32.to_le_bytes());
     said_ok(&replay(&loose));

@@ -233,6 +233,10 @@ fn inspect_reads_a_spreadsheet_export_as_init_does() {
 /// Presses of a strip as loggers and spreadsheets write them.
 fn field_file(name: &str) -> Vec<u8> {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../palpate-estimators/tests/data/field");
+    if name == "utf16.txt" {
+        let text = fs::read_to_string(data.join("tabs.txt")).unwrap().replace('\n', "\r\n");
+        return format!("\u{feff}{text}").encode_utf16().flat_map(u16::to_le_bytes).collect();
+    }
     fs::read(data.join(name)).unwrap()
 }
 

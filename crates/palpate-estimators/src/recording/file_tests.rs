@@ -9,7 +9,7 @@ const BASE: &str = include_str!("../../tests/data/field/base.csv");
 const DUPLICATES: &[u8] = include_bytes!("../../tests/data/field/dup.csv");
 const UNITS_ROW: &[u8] = include_bytes!("../../tests/data/field/units-row.csv");
 const LABVIEW: &[u8] = include_bytes!("../../tests/data/field/press.lvm");
-const UTF16: &[u8] = include_bytes!("../../tests/data/field/utf16.txt");
+const TABS: &str = include_str!("../../tests/data/field/tabs.txt");
 const ZERO_NOISE: &[u8] = include_bytes!("../../tests/data/field/zero-noise.csv");
 const NEGATIVE: &[u8] = include_bytes!("../../tests/data/field/negforce.csv");
 
@@ -48,6 +48,12 @@ fn dressed(above: &str, heading: &str, separator: char, below: &str) -> String {
     format!("{above}{}{rows}{below}", separated(heading))
 }
 
+/// The table with tabs as Windows writes Unicode text.
+fn utf16() -> Vec<u8> {
+    let text = format!("\u{feff}{}", TABS.replace('\n', "\r\n"));
+    text.encode_utf16().flat_map(u16::to_le_bytes).collect()
+}
+
 #[test]
 fn files_of_loggers_are_the_plain_file() {
     let plain = read_as(&own(), BASE.as_bytes()).unwrap().0.rows;
@@ -55,7 +61,7 @@ fn files_of_loggers_are_the_plain_file() {
     for (name, columns, text) in [
         ("units row", titled(), UNITS_ROW),
         ("LabVIEW", titled(), LABVIEW),
-        ("UTF-16", titled(), UTF16),
+        ("UTF-16", titled(), &utf16()),
         ("numbers for duplicates", numbered.clone(), DUPLICATES),
         ("numbers below a preamble", numbered.clone(), LABVIEW),
         ("numbers and a units row", numbered, UNITS_ROW),
@@ -73,7 +79,7 @@ fn lines_that_are_no_rows_are_said() {
     let cases = [
         read_as(&titled(), UNITS_ROW).unwrap().1,
         read_as(&titled(), LABVIEW).unwrap().1,
-        read_as(&titled(), UTF16).unwrap().1,
+        read_as(&titled(), &utf16()).unwrap().1,
         of("", HEADING, '|', ""),
         of("", HEADING, ',', "Total,,7000,8000,9000,9900\n"),
         of("", HEADING, ',', "\nEnd of file\n"),
@@ -296,7 +302,7 @@ fn warnings_have_all_digits_of_a_reading() {
 #[test]
 fn tables_of_loggers_are_the_plain_table() {
     let base = Table::read("base.csv", BASE.as_bytes(), None, None).unwrap();
-    for text in [UNITS_ROW, LABVIEW, UTF16] {
+    for text in [UNITS_ROW, LABVIEW, &utf16()] {
         let table = Table::read("press.csv", text, None, None).unwrap();
         assert_eq!(table.rows, base.rows);
         assert!(table.columns[0].heading.starts_with("Position"), "{:?}", table.columns[0]);

@@ -1,13 +1,14 @@
 //! Estimates and events as messages of MQTT.
 
 use super::{Batch, Sink};
+use crate::address::Address;
+use crate::broker::{broker_and_login, explain};
 use crate::frame::Channel;
 use crate::input::{Command, Input};
 use crate::login::{Login, LoginError, without_passwords};
 use crate::rules::{Action, Rule, RuleWatch, Rules};
 use crate::sample::SampleRecord;
 use crate::session::Output;
-use crate::source::{Address, broker_and_login, explain};
 use palpate_mechanics::surface::Extent;
 use rumqttc::{Client, Connection, ConnectionError, Event, LastWill, MqttOptions, Packet, QoS};
 use serde::Serialize;

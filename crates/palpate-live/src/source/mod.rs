@@ -10,11 +10,10 @@ mod tcp;
 mod udp;
 mod url;
 
+pub use crate::address::Address;
 pub use crate::commander::{Commander, SendError};
 pub use file::line;
-pub(crate) use mqtt::explain;
-pub(crate) use url::broker_and_login;
-pub use url::{Address, SourceUrl, SourceUrlError};
+pub use url::{SourceUrl, SourceUrlError};
 
 use crate::input::{Arrival, Arrived, Input};
 use crate::simulated_board::BoardConfig;

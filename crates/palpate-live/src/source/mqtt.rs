@@ -1,12 +1,12 @@
 //! `mqtt://host/topic`: messages of an MQTT broker.
 
 use super::{Address, BackOff, CONNECT, LOOK, Outlet, forget};
+use crate::broker::explain;
 use crate::frame::LONGEST_MESSAGE;
 use crate::input::Arrival;
-use crate::login::PASSWORD_VARIABLE;
 use rumqttc::{
-    AsyncClient, ConnectReturnCode, ConnectionError, Event, EventLoop, MqttOptions, NetworkOptions, Packet,
-    QoS, SubscribeReasonCode,
+    AsyncClient, ConnectionError, Event, EventLoop, MqttOptions, NetworkOptions, Packet, QoS,
+    SubscribeReasonCode,
 };
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;
@@ -98,27 +98,6 @@ async fn bring(
             said = why;
             outlet.pause(back_off.next());
         }
-    }
-}
-
-/// The failure of a connection to a broker, in words.
-pub fn explain(broker: &str, error: &ConnectionError) -> String {
-    match error {
-        ConnectionError::ConnectionRefused(
-            code @ (ConnectReturnCode::BadUserNamePassword | ConnectReturnCode::NotAuthorized),
-        ) => {
-            format!(
-                "the broker {broker} refuses: {code:?}; give `mqtt://user@host/topic` and the password in {PASSWORD_VARIABLE}"
-            )
-        }
-        ConnectionError::ConnectionRefused(code) => format!("the broker {broker} refuses: {code:?}"),
-        ConnectionError::Io(error) => {
-            format!("the broker {broker} cannot be reached: {error}; see that it runs there")
-        }
-        ConnectionError::NetworkTimeout | ConnectionError::FlushTimeout => {
-            format!("the broker {broker} does not answer")
-        }
-        other => format!("the connection to the broker {broker} broke: {other}"),
     }
 }
 

@@ -1,5 +1,7 @@
 //! URLs of sources.
 
+use crate::address::Address;
+use crate::broker::broker_and_login;
 use crate::login::{Login, without_passwords};
 use std::fmt;
 use std::path::PathBuf;
@@ -62,30 +64,12 @@ pub enum SourceUrl {
     },
 }
 
-/// A host and a port.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Address {
-    /// Name or address of the host; an address of IPv6 without brackets.
-    pub host: String,
-    /// The port, from 1.
-    pub port: u16,
-}
-
-impl fmt::Display for Address {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { host, port } = self;
-        if host.contains(':') { write!(f, "[{host}]:{port}") } else { write!(f, "{host}:{port}") }
-    }
-}
-
 /// Bits a second of a serial port, unless the URL says others.
 const BAUD: u32 = 115_200;
 /// Greatest number of bits a second.
 const GREATEST_BAUD: u32 = 20_000_000;
 /// Greatest pace of a recording.
 const FASTEST: f64 = 1e6;
-/// Port of MQTT, unless the URL says another.
-const MQTT_PORT: u16 = 1883;
 
 /// Text that is no URL of a source.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -139,11 +123,11 @@ impl SourceUrl {
             Self::Serial { port: port.into(), baud, columns: query.columns()? }
         } else if let Some(server) = body.strip_prefix("tcp://") {
             Self::Tcp {
-                server: address(server, None, Some("`tcp://192.168.1.20:5000`"))?,
+                server: Address::read(server, None, Some("`tcp://192.168.1.20:5000`"))?,
                 columns: query.columns()?,
             }
         } else if let Some(at) = body.strip_prefix("udp://") {
-            Self::Udp { at: address(at, None, None)?, columns: query.columns()? }
+            Self::Udp { at: Address::read(at, None, None)?, columns: query.columns()? }
         } else if let Some(rest) = body.strip_prefix("mqtt://") {
             let missing = "the topic is missing; write `mqtt://host/topic`";
             let (broker, topic) = rest.split_once('/').ok_or(missing)?;
@@ -240,66 +224,6 @@ impl<'a> Query<'a> {
         let known = url.parameters();
         self.0.first().map_or(Ok(()), |pair| Err(format!("`{pair}` is no parameter; known are {known}")))
     }
-}
-
-/// Reads `user:password@host:port` before the topic of a broker; all but the host may be left out.
-pub fn broker_and_login(
-    text: &str,
-    topic: &str,
-    password_file: Option<&str>,
-) -> Result<(Address, Option<Login>), String> {
-    let example = Some("`mqtt://192.168.1.20/topic`");
-    let Some((login, broker)) = text.rsplit_once('@') else {
-        if let Some((_, port)) = text.rsplit_once(':')
-            && topic.contains('@')
-            && port.parse::<u16>().is_err()
-        {
-            return Err("in user name and password write `%2F` for `/`".to_owned());
-        }
-        if password_file.is_some() {
-            return Err("password-file needs a user name, as in `mqtt://user@host/topic`".to_owned());
-        }
-        return Ok((address(text, Some(MQTT_PORT), example)?, None));
-    };
-    let login = Login::parse(login, password_file)?;
-    Ok((address(broker, Some(MQTT_PORT), example)?, Some(login)))
-}
-
-/// Reads `host:port`; without a default the port is needed, and with an example the host.
-fn address(text: &str, port: Option<u16>, example: Option<&str>) -> Result<Address, String> {
-    let ends = text.rfind(']').map_or(0, |end| end + 1);
-    let (host, given) = match text[ends..].rfind(':') {
-        Some(colon) => (&text[..ends + colon], Some(&text[ends + colon + 1..])),
-        None => (text, None),
-    };
-    let port = match given {
-        Some(given) => {
-            let number = given
-                .parse()
-                .ok()
-                .filter(|port| *port > 0 && given.bytes().all(|byte| byte.is_ascii_digit()));
-            number.ok_or_else(|| format!("port `{given}` must be a whole number of 1 to 65535"))?
-        }
-        None => port.ok_or_else(|| format!("`{text}` has no port; write `{text}:5000`"))?,
-    };
-    let bare = host.strip_prefix('[').and_then(|host| host.strip_suffix(']'));
-    let host = match bare {
-        Some(bare) if bare.parse::<std::net::Ipv6Addr>().is_err() => {
-            return Err(format!("`{bare}` must be an address of IPv6, as it stands in brackets"));
-        }
-        Some(bare) => bare,
-        None => host,
-    };
-    if let (true, Some(example)) = (host.is_empty(), example) {
-        return Err(format!("the host is missing; write {example}"));
-    }
-    let odd = |c: char| !(c.is_alphanumeric() || matches!(c, '.' | '-' | '_'));
-    if let (None, Some(odd)) = (bare, host.chars().find(|c| odd(*c))) {
-        return Err(format!(
-            "host `{host}` has `{odd}`; a host is a name, or an address, of IPv6 in brackets"
-        ));
-    }
-    Ok(Address { host: host.to_owned(), port })
 }
 
 /// A topic filter by section 4.7 of MQTT 3.1.1.

@@ -1,7 +1,7 @@
 //! A client of an MQTT broker that publishes frames.
 
+use crate::broker::explain;
 use crate::sink::MqttUrl;
-use crate::source::explain;
 use rumqttc::{Client, Connection, ConnectionError, Event, Packet, QoS};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
