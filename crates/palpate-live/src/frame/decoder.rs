@@ -466,7 +466,7 @@ mod tests {
         received(&mut decoder, &vec![b'7'; 2 * LONGEST_LINE]);
         assert_eq!(decoder.last_bad().unwrap().chars().count(), 80);
         decoder.receive_message(&vec![b'8'; LONGEST_MESSAGE + 1], |frame| {
-            assert_eq!(frame, Err(BadFrame::TooLong))
+            assert_eq!(frame, Err(BadFrame::TooLong));
         });
         assert!(decoder.last_bad().unwrap().starts_with("888"));
     }

@@ -31,7 +31,7 @@ impl Logger {
         // Channels whose runs are alike repeat together, as those of one sensor board do.
         for i in 0..self.contacts * self.rows_per_contact {
             let contact = i / self.rows_per_contact;
-            let touched = contact % 4 != 0;
+            let touched = !contact.is_multiple_of(4);
             let mut board: Option<([usize; 2], usize)> = None;
             for c in 0..4 {
                 if left[c] == 0 {
