@@ -14,10 +14,10 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_with(path, |file| file.write_all(bytes))
 }
 
-/// Writes a file by a function, as [`write`] does.
+/// Writes a file by a function, as [`write()`] does.
 ///
 /// # Errors
-/// As of [`write`], and the function's own.
+/// As of [`write()`], and the function's own.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<()> {
     let place = place(path)?;
     let mut file = temporary(folder_of(&place))?;

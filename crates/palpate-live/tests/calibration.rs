@@ -310,3 +310,30 @@ fn a_press_far_off_its_repeats_is_asked_for_again_and_confirmed_by_a_second_one(
         "{doubts:?}"
     );
 }
+
+#[test]
+fn a_press_during_a_pause_of_the_readings_is_no_drift() {
+    let mut guide = Guide::new(presses_at(1));
+    let pressed = |s: f64| if s > 2.5 { 3000.0 } else { 0.0 };
+    let readings = course(7, 6.0, |s| [pressed(s), pressed(s)]);
+    let progress: Vec<Progress> = readings
+        .into_iter()
+        .filter(|(at, _)| !(1.5..3.0).contains(&at.as_secs_f64()))
+        .map(|(at, reading)| guide.add(at, &reading))
+        .collect();
+    assert!(progress.iter().any(|progress| matches!(progress, Progress::Pressed { .. })));
+}
+
+#[test]
+fn a_quick_repeat_of_a_press_is_no_drift() {
+    let mut guide = Guide::new(presses_at(4));
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
+    // A finger without any delay.
+    for i in 0..2000 {
+        let mean = if matches!(guide.waiting(), Waiting::Press | Waiting::Rest) { 3000.0 } else { 0.0 };
+        let reading = [(); 2].map(|()| mean + Distribution::<f64>::sample(&StandardNormal, &mut rng));
+        let progress = guide.add(Duration::from_millis(10 * i), &reading);
+        assert!(!matches!(progress, Progress::AskedAgain(_)), "{progress:?}");
+    }
+    assert_eq!(guide.waiting(), Waiting::Nothing);
+}

@@ -183,7 +183,8 @@ fn fault_of_a_machine_ends_the_calibration_with_its_words() {
         let bench = Bench::with(folder.path(), "tcp://:0", &["--firmware", firmware, "--machine", config]);
         let said = complained(&bench.calibrate(folder.path(), &[]).output().unwrap(), 3);
         assert!(said.contains(words), "{config}: {said}");
-        assert!(said.contains("--resume goes on"), "{config}: {said}");
+        let kept = if taken_presses(folder.path()) > 0 { "--resume goes on" } else { "no press was taken" };
+        assert!(said.contains(kept), "{config}: {said}");
         assert!(!folder.path().join("locator.json").exists(), "{config}");
         if config != "soft-limit-x=80mm" {
             assert_eq!(taken_presses(folder.path()), taken, "{config}");
@@ -342,7 +343,7 @@ fn statements_of_the_operator_are_checked() {
         complaint(&[&begin, more].concat())
     };
     for wrong in ["2", "-1 mm", "2 N", "0 mm"] {
-        let words = complaint(&["calibrate", "rig.toml", "--placement", wrong]);
+        let words = complaint(&["calibrate", "rig.toml", &format!("--placement={wrong}")]);
         assert!(words.contains("--placement"), "{wrong}: {words}");
     }
     let words = calibrating(&["--second-force", "2 N", "--force-is-known"]);

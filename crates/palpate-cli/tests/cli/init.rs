@@ -150,7 +150,7 @@ fn what_cannot_be_guessed_is_asked_for() {
         &["init", "missing.csv"],
         &["init", "nameless.csv", "--position", "d"],
         &["init", "nameless.csv", "--position", "a", "-o", "rig.toml"],
-        &["init", "nameless.csv", "--position", "a", "--separator", "pipe"],
+        &["init", "nameless.csv", "--position", "a", "--separator", "colon"],
     ];
     let complaints: Vec<String> = cases
         .iter()

@@ -3,7 +3,7 @@
 //! Readings are taken beyond what the channels read untouched, and brought to one force; where the force is unknown in use, to one amplitude.
 
 use super::design::PositionError;
-use palpate_estimators::recording::{Recording, Row};
+use palpate_estimators::recording::{Recording, Row, is_one_force};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
@@ -179,8 +179,7 @@ fn by_position(presses: &[&Row]) -> Vec<Vec<usize>> {
 
 /// True where presses have forces, and not all the same.
 fn forces_differ(presses: &[&Row]) -> bool {
-    let mut forces = presses.iter().filter_map(|row| row.force_n);
-    forces.next().is_some_and(|first_n| forces.any(|force_n| force_n != first_n))
+    !is_one_force(presses.iter().filter_map(|row| row.force_n))
 }
 
 /// Offsets of the channels by presses of one position at several forces: least squares of reading = offset + force × g(position), with a g of its own

@@ -8,7 +8,7 @@ use super::channels::Channels;
 use super::config::{Influence, InfluenceFitError, InfluenceSource};
 use super::prior::{Hyperparameters, Mean, Parts, Prior, Remainders};
 use crate::fit::FitTask;
-use crate::recording::Recording;
+use crate::recording::{Recording, is_one_force};
 use crate::thinning::thinned;
 use ndarray::{Array1, Array2, ArrayView1};
 use palpate_mechanics::contact::Position;
@@ -135,7 +135,7 @@ impl<'a> Learning<'a> {
             priors.iter().zip(living).map(|sensor| with(sensor, &few)).collect();
         let noise_is_told = living.iter().all(|s| presses.noise_variance(layout, *s).is_some());
         // A reaction of presses of one force may be an offset as well as an influence, which no support holds at 0 everywhere.
-        let has_one_force = presses.presses.windows(2).all(|pair| pair[0].force_n == pair[1].force_n);
+        let has_one_force = is_one_force(presses.presses.iter().map(|press| press.force_n));
         let is_reaction_alone = mean == Mean::Zero && kind == SensorKind::Reaction && has_one_force;
         let told = Told { noise: noise_is_told, offset: is_reaction_alone };
         let mut hyper = most_probable(&searched, mean, surface.length_m(), told, watch)?;

@@ -6,6 +6,7 @@ mod csv_error;
 mod csv_in;
 mod csv_out;
 mod dialect;
+mod forces;
 mod grouping;
 mod heading;
 mod lines;
@@ -29,6 +30,7 @@ pub use csv_in::{
 };
 pub use csv_out::{csv_row, write, write_as, write_timed};
 pub use dialect::{Dialect, Notes, Preamble};
+pub use forces::{is_one_force, is_same_force};
 pub use heading::Heading;
 pub use lines::LineProgress;
 pub use marks::{Decimal, Separator};

@@ -379,10 +379,12 @@ fn group_line(group: &[&Warning]) -> String {
     let Some(worst) = group.iter().rev().max_by_key(|warning| warning.extent()) else { return String::new() };
     let others = group.iter().filter_map(|warning| warning.channel());
     let others: Vec<&str> = others.filter(|channel| Some(*channel) != worst.channel()).collect();
+    // A question ends a sentence.
+    let (end, channel) = if worst.to_string().ends_with('?') { ("", "Channel") } else { (";", "channel") };
     match others.len() {
         0 => worst.to_string(),
-        1 => format!("{worst}; channel {} too", channel_list(&others)),
-        count => format!("{worst}; {count} more channels too: {}", channel_list(&others)),
+        1 => format!("{worst}{end} {channel} {} too", channel_list(&others)),
+        count => format!("{worst}{end} {count} more channels too: {}", channel_list(&others)),
     }
 }
 

@@ -107,7 +107,7 @@ struct Touch {
     peak: f64,
     /// Deviations of the last two readings.
     recent: [f64; 2],
-    /// Largest change within a second.
+    /// Largest growth within a second, in standard deviations of the noise.
     fastest: f64,
     /// Instant from which on its reading rests and is doubtful.
     doubtful_since: Option<Duration>,
@@ -237,7 +237,7 @@ impl Guide {
             }
             (Waiting::Untouched, _) | (_, None) => self.learn_baseline(at),
             (waiting, Some(mut baseline)) => {
-                self.touch.follow(&baseline, reading, self.stretch.second_ago());
+                self.touch.follow(&baseline, reading, &self.stretch);
                 let progress = match waiting {
                     Waiting::Press => self.await_press(at, &mut baseline),
                     Waiting::Rest => self.await_rest(at, &mut baseline),
@@ -281,6 +281,7 @@ impl Guide {
         if self.waiting != Waiting::Nothing {
             self.baseline = None;
             self.untouched = None;
+            self.reference.clear();
             self.waiting = Waiting::Untouched;
         }
     }
@@ -335,7 +336,9 @@ impl Guide {
 
     fn learn_baseline(&mut self, at: Duration) -> Progress {
         let Some(baseline) = Baseline::learn(&self.stretch) else { return Progress::None };
-        self.reference.clone_from(&baseline.mean);
+        if self.reference.is_empty() {
+            self.reference.clone_from(&baseline.mean);
+        }
         self.untouched = Some(self.untouched_row(baseline.mean.clone()));
         self.baseline = Some(baseline);
         self.begin_press(at)
@@ -398,7 +401,10 @@ impl Guide {
             return self.return_to_untouched(at, mean, baseline);
         }
         if self.touch.fastest < ONSET_SHARE * size {
+            // Where the touch was one after all, its lift leads back to the reference.
+            let reference = std::mem::take(&mut self.reference);
             self.relearn();
+            self.reference = reference;
             return Progress::AskedAgain(Doubt::Drift);
         }
         self.take_press(at, mean, baseline)
@@ -522,21 +528,17 @@ impl Guide {
 }
 
 impl Touch {
-    /// Follows the deviation of a reading; `second_ago` is the reading of a second ago.
-    fn follow(&mut self, baseline: &Baseline, reading: &[f64], second_ago: Option<&[f64]>) {
+    /// Follows the deviation of a reading, the last of a stretch.
+    fn follow(&mut self, baseline: &Baseline, reading: &[f64], stretch: &Stretch) {
         let size = baseline.size(reading);
         self.peak = self.peak.max(size.min(self.recent[0]).min(self.recent[1]));
         self.recent = [self.recent[1], size];
-        // After a machine moved, the first reading is all that there is: it is compared with the untouched one.
-        let change = match second_ago {
-            Some(before) if before != reading => {
-                let change: Vec<f64> =
-                    reading.iter().zip(before).map(|(value, before)| value - before).collect();
-                baseline.size_of(&change)
-            }
-            _ => size,
-        };
-        self.fastest = self.fastest.max(change);
+        if size > NOISE_LIMIT_SD {
+            let least = stretch.last_second().map(|reading| baseline.size(reading)).fold(size, f64::min);
+            // After a machine moved, the first reading is all that there is: it is compared with the untouched one.
+            let growth = if stretch.has_one_reading() { size } else { size - least };
+            self.fastest = self.fastest.max(growth);
+        }
     }
 
     /// True once [`ONSET_READINGS`] readings in a row deviate by more than `least` standard deviations.

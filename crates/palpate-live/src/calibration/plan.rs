@@ -51,7 +51,7 @@ pub(super) fn is_same_force(a_n: f64, b_n: f64) -> bool {
 /// a row is its nuisance coordinate ([`Journal`](super::Journal)).
 ///
 /// The force is the first weight; presses of several depths have none. Every other place is pressed with a second weight too, where there
-/// is one, after all presses with the first. A person is asked for places that a ruler shows ([`Ruler`]).
+/// is one, after all presses with the first. A person is asked for places that a ruler shows (`Ruler`).
 ///
 /// # Errors
 /// [`PlanError`] where the rig has no positions, or they cannot be laid out.

@@ -34,6 +34,11 @@ impl Stretch {
         self.readings.clear();
     }
 
+    /// True for a single reading, as after a machine moved.
+    pub fn has_one_reading(&self) -> bool {
+        self.readings.len() == 1
+    }
+
     /// Instant of the last reading.
     pub fn last_at(&self) -> Option<Duration> {
         self.readings.back().map(|(at, _)| *at)
@@ -77,11 +82,11 @@ impl Stretch {
         (span >= NOISE_SPAN && readings.len() >= NOISE_READINGS).then_some(readings)
     }
 
-    /// The reading of about a second ago, or the oldest one.
-    pub fn second_ago(&self) -> Option<&[f64]> {
-        let begin = self.last_at()?.saturating_sub(NOISE_SPAN);
-        let index = self.readings.partition_point(|(at, _)| *at < begin);
-        self.readings.get(index).map(|(_, reading)| reading.as_slice())
+    /// The readings of the last second, and the one before them, which is older after a pause.
+    pub fn last_second(&self) -> impl Iterator<Item = &[f64]> {
+        let begin = self.last_at().unwrap_or_default().saturating_sub(NOISE_SPAN);
+        let later = self.readings.partition_point(|(at, _)| *at <= begin);
+        self.readings.range(later.saturating_sub(1)..).map(|(_, reading)| reading.as_slice())
     }
 }
 

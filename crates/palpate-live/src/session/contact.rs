@@ -23,7 +23,8 @@ pub struct ContactWatch {
     state: State,
     /// State that the last estimates have had, and how many in a row.
     recent: (State, u32),
-    since: Duration,
+    /// When the touch began; `None` before its touch-down and after its lift-off.
+    since: Option<Duration>,
     told: (Position, Duration),
 }
 
@@ -42,7 +43,7 @@ impl ContactWatch {
             extent,
             state: State::Untouched,
             recent: (State::Untouched, 0),
-            since: Duration::ZERO,
+            since: None,
             told: (Position::default(), Duration::ZERO),
         }
     }
@@ -72,22 +73,25 @@ impl ContactWatch {
         let before = std::mem::replace(&mut self.state, next);
         match next {
             State::Untouched => {
-                tell(Event::LiftOff { seconds: now.saturating_sub(self.since).as_secs_f64() });
+                // What no contact explains has no touch-down, and no lift-off.
+                if let Some(since) = self.since.take() {
+                    tell(Event::LiftOff { seconds: now.saturating_sub(since).as_secs_f64() });
+                }
             }
             State::OutsideModel => tell(Event::OutsideModel),
             State::Touched { contacts } => {
-                if before == State::Untouched {
-                    self.since = now;
+                if self.since.is_none() {
+                    self.since = Some(now);
                     tell(Event::TouchDown { contact: self.record(&estimate.contact) });
                 }
-                if let (true, Some(second)) = (contacts > 1, estimate.further.as_slice().first()) {
+                let had_second = matches!(before, State::Touched { contacts } if contacts > 1);
+                if let (true, false, Some(second)) =
+                    (contacts > 1, had_second, estimate.further.as_slice().first())
+                {
                     tell(Event::SecondContact { contact: self.record(second) });
                 }
                 self.told = (estimate.contact.position, now);
             }
-        }
-        if before == State::Untouched {
-            self.since = now;
         }
     }
 
@@ -106,5 +110,31 @@ impl ContactWatch {
 
     fn record(&self, contact: &ContactEstimate) -> ContactRecord {
         ContactRecord::new(contact, self.extent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lift_off_has_a_touch_down_before_it() {
+        let mut watch = ContactWatch::new(Extent::new(0.3, None).unwrap());
+        let mut kinds = Vec::new();
+        let mut add = |status: Status| {
+            for i in 0..5 {
+                let estimate = Estimate::of_position(Position::along(0.1), status);
+                watch.add(Duration::from_millis(i), &estimate, |event| kinds.push(event.name()));
+            }
+        };
+        [Status::OutsideModel, Status::NoContact, Status::OutsideModel, Status::Located]
+            .into_iter()
+            .for_each(&mut add);
+        [Status::OutsideModel, Status::Located, Status::OutsideModel, Status::NoContact]
+            .into_iter()
+            .for_each(&mut add);
+        let expected =
+            ["outside_model", "outside_model", "touch_down", "outside_model", "outside_model", "lift_off"];
+        assert_eq!(kinds, expected);
     }
 }

@@ -136,7 +136,7 @@ fn a_broker_that_begins_anew_is_subscribed_to_again() {
     let port = free_port();
     let bench = Bench::open(&format!("mqtt://127.0.0.1:{port}/bench/values"));
     let why = bench.lost();
-    assert!(why.contains("the broker 127.0.0.1") && why.contains("is not there"), "{why}");
+    assert!(why.contains("the broker 127.0.0.1") && why.contains("cannot be reached"), "{why}");
     for _ in 0..2 {
         let broker = Broker::start(folder.path(), port);
         bench.opened();

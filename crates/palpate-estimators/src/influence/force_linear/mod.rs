@@ -8,6 +8,7 @@ mod condensed;
 mod drift;
 mod drift_fit;
 mod evidence;
+mod force_prior;
 mod learning;
 mod left_out;
 mod locator;
@@ -34,10 +35,11 @@ use crate::fit::FitTask;
 use crate::offset_course::OffsetCourse;
 use crate::recording::Recording;
 use crate::status::FalseAlarmRate;
+use force_prior::ForcePrior;
 use learning::Learnt;
 use locator::{Stored, Tables};
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::{mean, mean_and_variance};
+use palpate_numerics::mean;
 pub(crate) use presses::FEW;
 use presses::{Presses, shares};
 use prior::Prior;
@@ -55,9 +57,6 @@ pub(crate) const fn most_nodes(extent: Extent) -> usize {
         Extent::Plane { .. } => MOST_OF_PLANE * MOST_OF_PLANE,
     }
 }
-
-/// Forces up to this many times the greatest of the calibration are looked for.
-const HARDEST: f64 = 3.0;
 
 /// Learns the influence functions and offsets of a surface without a model; `None` where the presses do not tell them apart, as
 /// they have no forces or all the same one, and unless the structure is force-linear by demand, where they speak against it.
@@ -92,8 +91,7 @@ fn fit_condensed(
         })
         .collect();
     let functions = learnt.functions(&places_m, watch)?;
-    let pressed = presses.force_n.iter().filter(|force_n| **force_n != 0.0);
-    let forces = mean_and_variance(pressed.map(|force_n| prior.response_n(*force_n)));
+    let force = ForcePrior::of_presses(presses, prior);
     let positions_m = presses.positions_m();
     let outermost_m = |k: usize| {
         let coordinates = || positions_m.iter().map(|position_m| position_m[k]);
@@ -106,13 +104,12 @@ fn fit_condensed(
         outermost_m: (0..extent.dimensions()).map(outermost_m).collect(),
         channels: recording.channels.len(),
         live: learnt.live.clone(),
-        shared_errors: if functions.are_open(forces.0) { learnt.shared_errors()? } else { Vec::new() },
+        shared_errors: if functions.are_open(force.mean_n) { learnt.shared_errors()? } else { Vec::new() },
         functions,
         known_force_n: setup.force_n(),
-        mean_force_n: forces.0,
-        // Presses of one force alone, beside untouched rows, say nothing of others.
-        force_sd_n: if forces.1 > 0.0 { forces.1.sqrt() } else { forces.0.abs() },
-        hardest_n: prior.response_n(HARDEST * presses.greatest_force_n()),
+        mean_force_n: force.mean_n,
+        force_sd_n: force.sd_n,
+        hardest_n: force.hardest_n,
         residual_limit: f64::INFINITY,
         spread_limit: None,
         prior: prior.clone(),

@@ -1,6 +1,6 @@
 //! Presses of recorded force, as the learning of influence functions takes them: repeats averaged, readings about their mean.
 
-use crate::recording::{LEAST_FREEDOM, Recording};
+use crate::recording::{LEAST_FREEDOM, Recording, is_same_force};
 use crate::setup::Setup;
 use crate::thinning::thinned;
 use ndarray::{Array2, Axis as Dimension};
@@ -147,7 +147,7 @@ impl Presses {
     pub fn distinct_forces(&self) -> usize {
         let mut forces = self.force_n.clone();
         forces.sort_by(f64::total_cmp);
-        forces.dedup();
+        forces.dedup_by(|a, b| is_same_force(*a, *b));
         forces.len()
     }
 

@@ -33,6 +33,7 @@ mod edges;
 mod ends;
 mod few;
 mod noise;
+mod one_weight;
 mod scatter;
 
 const STRIP_M: f64 = 0.3;
