@@ -77,7 +77,7 @@ pub struct Monitor {
     lines: VecDeque<RawLine>,
     partial: Vec<u8>,
     bytes: u64,
-    found: Option<Found>,
+    detected: Option<DetectedFrames>,
     /// Names of the last line that may be a header.
     header: Option<Vec<u8>>,
     /// Last bytes while no channels were found.
@@ -88,9 +88,9 @@ pub struct Monitor {
     unexplained: u32,
 }
 
-/// Channels that were found in the frames.
+/// Frames of a known form, with their channels.
 #[derive(Debug)]
-struct Found {
+struct DetectedFrames {
     channels: Vec<ChannelValues>,
     decoder: Decoder,
     named: bool,
@@ -121,7 +121,7 @@ impl Monitor {
 
     fn receive_bytes(&mut self, bytes: &[u8], time_s: f64, at: Duration) {
         self.bytes += bytes.len() as u64;
-        if self.found.as_ref().is_some_and(|found| found.is_binary) {
+        if self.detected.as_ref().is_some_and(|detected| detected.is_binary) {
             return self.receive_binary(bytes, time_s, at);
         }
         for byte in bytes {
@@ -133,7 +133,7 @@ impl Monitor {
                 self.partial.push(*byte);
             }
         }
-        if self.found.is_none() {
+        if self.detected.is_none() {
             self.sample.extend_from_slice(&bytes[bytes.len().saturating_sub(BINARY_SAMPLE)..]);
             if self.sample.len() >= BINARY_SAMPLE {
                 self.find_binary();
@@ -144,8 +144,8 @@ impl Monitor {
 
     fn receive_binary(&mut self, bytes: &[u8], time_s: f64, at: Duration) {
         let mut frames = Vec::new();
-        if let Some(found) = &mut self.found {
-            found.decoder.receive(bytes, |frame| frames.push(frame));
+        if let Some(detected) = &mut self.detected {
+            detected.decoder.receive(bytes, |frame| frames.push(frame));
         }
         let reads = frames.iter().any(Result::is_ok);
         self.keep_line(bytes, time_s, reads);
@@ -158,12 +158,12 @@ impl Monitor {
         if line.trim_ascii().is_empty() {
             return;
         }
-        if self.found.is_none() || self.unexplained >= UNEXPLAINED {
+        if self.detected.is_none() || self.unexplained >= UNEXPLAINED {
             self.find_text(&line);
         }
         let mut frames = Vec::new();
-        if let Some(found) = &mut self.found {
-            found.decoder.receive_message(&line, |frame| frames.push(frame));
+        if let Some(detected) = &mut self.detected {
+            detected.decoder.receive_message(&line, |frame| frames.push(frame));
         }
         let reads = frames.iter().any(Result::is_ok);
         self.keep_line(&line, time_s, reads);
@@ -190,7 +190,7 @@ impl Monitor {
                     _ => self.arrivals.push_back((at, 1)),
                 }
                 self.forget_arrivals(at);
-                let channels = self.found.iter_mut().flat_map(|found| &mut found.channels);
+                let channels = self.detected.iter_mut().flat_map(|detected| &mut detected.channels);
                 for (channel, value) in channels.zip(frame.reading) {
                     let [low, high] = channel.range.unwrap_or([value; 2]);
                     (channel.now, channel.range) = (Some(value), Some([low.min(value), high.max(value)]));
@@ -227,7 +227,7 @@ impl Monitor {
         if let Some(header) = self.header.as_deref().filter(|_| uses_header) {
             decoder.receive_message(header, |_| {});
         }
-        self.found = Some(Found::new(&names, decoder, named, false));
+        self.detected = Some(DetectedFrames::new(&names, decoder, named, false));
         self.unexplained = 0;
     }
 
@@ -240,7 +240,7 @@ impl Monitor {
             let mut frames = 0;
             decoder.receive(&self.sample, |frame| frames += usize::from(frame.is_ok()));
             if frames >= BINARY_FRAMES {
-                self.found = Some(Found::new(&names, decoder, false, true));
+                self.detected = Some(DetectedFrames::new(&names, decoder, false, true));
                 self.unexplained = 0;
                 return;
             }
@@ -260,8 +260,8 @@ impl Monitor {
             readings: self.readings,
             rate_hz: count as f64 / span_s,
             bad_frames: self.bad_frames.clone(),
-            channels: self.found.as_ref().map_or_else(Vec::new, |found| found.channels.clone()),
-            named: self.found.as_ref().is_some_and(|found| found.named),
+            channels: self.detected.as_ref().map_or_else(Vec::new, |detected| detected.channels.clone()),
+            named: self.detected.as_ref().is_some_and(|detected| detected.named),
             lines: self.lines.iter().cloned().collect(),
         }
     }
@@ -276,7 +276,7 @@ impl Monitor {
                 "the board sends nothing: see that it runs, and that the port is its own".to_owned(),
             );
         }
-        if self.found.is_some() && self.unexplained < UNEXPLAINED {
+        if self.detected.is_some() && self.unexplained < UNEXPLAINED {
             return None;
         }
         let is_text =
@@ -293,16 +293,20 @@ impl Monitor {
 
     /// Names of the channels that were found, in their order; none before that.
     pub fn channel_names(&self) -> Vec<String> {
-        self.found.iter().flat_map(|found| &found.channels).map(|channel| channel.name.clone()).collect()
+        self.detected
+            .iter()
+            .flat_map(|detected| &detected.channels)
+            .map(|channel| channel.name.clone())
+            .collect()
     }
 
     /// True where the board names its values.
     pub fn is_named(&self) -> bool {
-        self.found.as_ref().is_some_and(|found| found.named)
+        self.detected.as_ref().is_some_and(|detected| detected.named)
     }
 }
 
-impl Found {
+impl DetectedFrames {
     fn new(names: &[String], decoder: Decoder, named: bool, is_binary: bool) -> Self {
         let channel = |name: &String| ChannelValues { name: name.clone(), now: None, range: None };
         Self { channels: names.iter().map(channel).collect(), decoder, named, is_binary }
