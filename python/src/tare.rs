@@ -2,7 +2,6 @@
 
 use numpy::{PyArray1, PyArrayMethods};
 use palpate::estimators::estimator::{Locator, Tare, TareError};
-use palpate::estimators::fit::Locate;
 use palpate::estimators::recording::Recording;
 use palpate::numerics::watch::{Cancelled, Watch};
 use pyo3::prelude::*;
@@ -53,7 +52,7 @@ pub fn tare<'py>(
                 watch.round()?;
             }
             if follows {
-                tare.follow(reading, tared, |tared| locator.method.locate(tared))?;
+                locator.locate_following(&mut tare, reading, tared)?;
             } else {
                 tare.apply(reading, tared)?;
             }
@@ -100,7 +99,7 @@ pub fn tared_recording(
                     if i.is_multiple_of(READINGS_EACH) {
                         watch.round()?;
                     }
-                    taring.follow(&row.reading, &mut tared.reading, |tared| locator.method.locate(tared))?;
+                    locator.locate_following(&mut taring, &row.reading, &mut tared.reading)?;
                 }
                 Ok::<(), Stopped>(())
             })?;

@@ -7,7 +7,7 @@ use crate::progress::Observer;
 use crate::remark::remark;
 use palpate_estimators::estimator::{Locator, Status, Tare, TareError, take_off_drift};
 use palpate_estimators::evaluation::Split;
-use palpate_estimators::fit::{FitTask, Locate};
+use palpate_estimators::fit::FitTask;
 use palpate_estimators::influence::Influence;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
@@ -164,8 +164,7 @@ impl<'a> Taring<'a> {
             }
             Source::First(_) | Source::File(_) => self.tare.apply(reading, &mut self.tared)?,
             Source::Auto => {
-                let method = &self.locator.method;
-                let estimate = self.tare.follow(reading, &mut self.tared, |tared| method.locate(tared))?;
+                let estimate = self.locator.locate_following(&mut self.tare, reading, &mut self.tared)?;
                 self.count += u64::from(estimate.status == Status::NoContact);
                 self.unexplained += u64::from(estimate.status == Status::OutsideModel);
             }

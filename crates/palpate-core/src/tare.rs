@@ -4,7 +4,10 @@
 //! reading, b its baseline (what the channel reads untouched today) and o what calibration learnt that it reads untouched, the tared
 //! reading is r − b + o.
 
+mod rest;
+
 use crate::{Estimate, LARGEST_READING, Status};
+use rest::{Course, RestWatch};
 
 /// Baseline of the channels of a surface, kept in arrays, vectors or slices `B` of the caller's.
 ///
@@ -38,12 +41,22 @@ pub struct Tare<B> {
     let_go: u32,
     /// Readings in a row that are untouched by what calibration learnt, and `outside_model` by the baseline.
     as_learnt: u32,
+    /// Watch for the rest after a touch.
+    rest: RestWatch<B>,
+    /// Whether the rest after a touch becomes the baseline.
+    takes_rests: bool,
 }
 
 /// A baseline, and what is known for it.
 #[derive(Clone, Debug, PartialEq)]
 struct Baseline<B> {
     values: B,
+    /// Drift of each channel, a reading.
+    drift: B,
+    /// Readings since the last untouched one, over which the drift was carried on.
+    carried: u32,
+    /// Readings since the baseline was put to a rest.
+    since_rest: u32,
     /// Readings that it is the mean of, at most the time constant; 0 while it is what calibration learnt.
     weight: u32,
     /// Readings in a row that are a contact by it; kept once they are a touch.
@@ -103,6 +116,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         check(learnt.as_ref(), learnt.as_ref().len())?;
         Ok(Self {
             current: Baseline::new(learnt.clone(), 0),
+            rest: RestWatch::new(&learnt),
+            takes_rests: true,
             learnt,
             time_constant: Self::TIME_CONSTANT,
             is_confirmed: false,
@@ -117,6 +132,12 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     #[must_use]
     pub fn with_time_constant(self, readings: u32) -> Self {
         Self { time_constant: readings.max(Self::SETTLED), ..self }
+    }
+
+    /// The same, which leaves the residue of a touch in the tared readings: for a caller that takes creep off by itself.
+    #[must_use]
+    pub fn without_rests(self) -> Self {
+        Self { takes_rests: false, ..self }
     }
 
     /// Untouched reading of each channel today, as far as is known.
@@ -164,9 +185,11 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// Locates a tared reading, and follows the drift of the baseline while nothing touches. `tared` holds the tared reading afterwards.
     ///
     /// The status that `locate` gives says what a reading is to the baseline:
-    /// - `no_contact`: the baseline moves towards it, by a mean over the last [`Tare::TIME_CONSTANT`] such readings;
-    /// - a contact, whether held for a second or an hour: the baseline stays. It is not tared away, and the drift in the meantime is not
-    ///   made up for;
+    /// - `no_contact`: the baseline moves towards it, by a straight line through the last [`Tare::TIME_CONSTANT`] such readings, whose slope is the drift;
+    /// - a contact, whether held for a second or an hour: the baseline is not moved by it. It drifts on as before for as many readings as the drift was
+    ///   learnt from;
+    /// - after a touch, readings that stay and are `no_contact`, or small beside the touch: hysteresis, creep or drift have left them, and their mean is the new
+    ///   baseline;
     /// - `outside_model`, which no contact explains: while the baseline is not yet the mean of [`Tare::SETTLED`] readings the surface has
     ///   moved since its calibration, and the reading is the new baseline, unless a value of it is beyond ±[`LARGEST_READING`]. Later the
     ///   baseline stays, as a palm is no contact of the model either, but for three cases, each of [`Tare::LET_GO`] readings in a row:
@@ -179,8 +202,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// A baseline is confirmed where calibration learnt the same, where readings known to be untouched made it, or once a contact has come and gone
     /// by it. So a board that is touched while it starts is right from the moment it is let go; where it has moved and what touched it is no contact
     /// (a palm, another force than the known one), it is right from the end of the first touch that is one. Contacts lighter than
-    /// those that are told from noise go into the baseline. A drift of d a reading is d times the time constant ahead of the baseline, which
-    /// has to be less than the noise.
+    /// those that are told from noise go into the baseline.
     ///
     /// # Errors
     /// [`TareError`] as for [`Tare::apply`].
@@ -190,10 +212,29 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         tared: &mut [f64],
         mut locate: impl FnMut(&[f64]) -> Estimate,
     ) -> Result<Estimate, TareError> {
+        check(reading, self.learnt.as_ref().len())?;
+        self.current.carry_drift_on();
         self.apply(reading, tared)?;
         let estimate = locate(tared);
         let status = estimate.status;
+        let course =
+            match self.takes_rests && self.current.weight >= Self::SETTLED && self.is_possible(reading) {
+                true => self.rest.add(reading, self.current.values.as_ref(), status, self.time_constant),
+                false => Course::Steady,
+            };
+        if course == Course::AtRest {
+            if status != Status::NoContact || self.rest.has_moved(self.current.values.as_ref()) {
+                self.current.put_to(self.rest.rest(), self.rest.rested());
+            } else {
+                self.current.since_rest = DRIFT_FROM;
+            }
+            self.rest.forget_touch();
+            (self.let_go, self.as_learnt, self.strange) = (0, 0, 0);
+        }
         if status == Status::OutsideModel {
+            if course == Course::AtRest {
+                return Ok(estimate);
+            }
             if self.current.weight >= Self::SETTLED {
                 self.doubt(reading, tared, &mut locate);
             } else {
@@ -210,7 +251,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             self.current.weight = Self::SETTLED;
             self.is_confirmed = true;
         }
-        self.current.add(reading, status, self.time_constant);
+        let averages = course == Course::Steady;
+        self.current.add(reading, status, averages, self.time_constant);
         if !self.is_confirmed && self.current.saw_a_whole_touch() {
             self.is_confirmed = true;
             self.other = None;
@@ -233,10 +275,12 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         if self.as_learnt >= LET_GO {
             self.current = Baseline::new(self.learnt.clone(), Self::SETTLED);
             (self.is_confirmed, self.other) = (true, None);
+            self.rest.forget_touch();
             self.as_learnt = 0;
             return;
         }
-        if self.let_go >= LET_GO {
+        // A touch that begins may look like it too, but does not stay.
+        if self.let_go >= LET_GO && self.rest.stays() {
             self.begin_at(reading);
             return;
         }
@@ -251,10 +295,11 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     fn weigh_other(&mut self, reading: &[f64], status: Status) {
         if let Some(other) = &mut self.other {
             self.strange = next_in_row(self.strange, status == Status::OutsideModel);
-            other.add(reading, status, self.time_constant);
+            other.add(reading, status, true, self.time_constant);
             if other.saw_a_whole_touch() {
                 core::mem::swap(&mut self.current, other);
                 other.forget_touch();
+                self.rest.forget_touch();
                 (self.is_confirmed, self.let_go, self.as_learnt) = (true, 0, 0);
             }
         }
@@ -274,6 +319,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         }
         self.current = self.baseline_at(reading);
         (self.is_confirmed, self.other) = (false, None);
+        self.rest.forget_touch();
         (self.let_go, self.as_learnt) = (0, 0);
     }
 
@@ -291,9 +337,32 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
 /// [`Tare::LET_GO`], whatever the baselines are kept in.
 const LET_GO: u32 = Tare::<[f64; 0]>::LET_GO;
 
-impl<B: AsRef<[f64]> + AsMut<[f64]>> Baseline<B> {
+/// Readings from which on the drift of a baseline is learnt: a level with a drift is then known by 4/50 of the variance of a reading.
+const DRIFT_FROM: u32 = 50;
+/// Readings from which on a drift is carried on while something touches: over as many readings again its error is a quarter of the noise, √(12/200).
+const DRIFT_KNOWN: u32 = 200;
+
+impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
     fn new(values: B, weight: u32) -> Self {
-        Self { values, weight, touched: 0, untouched: 0 }
+        let mut drift = values.clone();
+        drift.as_mut().fill(0.0);
+        Self { values, drift, carried: 0, since_rest: u32::MAX, weight, touched: 0, untouched: 0 }
+    }
+
+    /// Moves the baseline by its drift for the time of a reading; without untouched readings over no more than the drift was learnt from.
+    fn carry_drift_on(&mut self) {
+        let is_known = self.weight >= DRIFT_KNOWN && self.carried < self.weight;
+        if is_known || (self.weight > 0 && self.carried == 0) {
+            self.carried += 1;
+            let drift = self.drift.as_ref().iter();
+            self.values.as_mut().iter_mut().zip(drift).for_each(|(value, drift)| *value += drift);
+        }
+    }
+
+    /// Puts the baseline to the mean of so many readings at rest. It drifts on as before.
+    fn put_to(&mut self, rest: &[f64], readings: u32) {
+        self.values.as_mut().copy_from_slice(rest);
+        (self.since_rest, self.carried) = (readings, 0);
     }
 
     /// Writes the reading less the baseline, and what calibration learnt added, over `tared`.
@@ -304,10 +373,10 @@ impl<B: AsRef<[f64]> + AsMut<[f64]>> Baseline<B> {
         }
     }
 
-    /// Adds a reading that has a status by this baseline.
-    fn add(&mut self, reading: &[f64], status: Status, time_constant: u32) {
-        if status == Status::NoContact {
-            self.average(reading, time_constant);
+    /// Adds a reading that has a status by this baseline, which it moves if it is untouched and `averages`.
+    fn add(&mut self, reading: &[f64], status: Status, averages: bool, time_constant: u32) {
+        if status == Status::NoContact && averages {
+            self.follow(reading, time_constant);
         }
         self.untouched = next_in_row(self.untouched, status == Status::NoContact);
         if self.touched < LET_GO {
@@ -325,11 +394,34 @@ impl<B: AsRef<[f64]> + AsMut<[f64]>> Baseline<B> {
     }
 
     /// Adds a reading to the mean that the baseline is.
-    fn average(&mut self, reading: &[f64], time_constant: u32) {
-        self.weight = self.weight.saturating_add(1).min(time_constant);
+    fn average(&mut self, reading: &[f64], most: u32) {
+        self.weight = self.weight.saturating_add(1).min(most);
         let share = 1.0 / f64::from(self.weight);
         for (baseline, value) in self.values.as_mut().iter_mut().zip(reading) {
             *baseline += share * (value - *baseline);
+        }
+    }
+
+    /// Moves the baseline and its drift towards a reading: a straight line through the last readings by least squares, whose memory grows to the
+    /// time constant (Morrison, *Introduction to Sequential Smoothing and Prediction*, 1969: the expanding-memory filter of degree 1). Of the first
+    /// readings, and after a rest, it is their mean.
+    fn follow(&mut self, reading: &[f64], time_constant: u32) {
+        self.carried = 0;
+        self.since_rest = self.since_rest.saturating_add(1);
+        if self.weight < DRIFT_FROM.min(time_constant) {
+            self.average(reading, time_constant);
+            return;
+        }
+        self.weight = self.weight.saturating_add(1).min(time_constant);
+        let count = f64::from(self.weight);
+        let of_line = 2.0 * (2.0 * count - 1.0) / (count * (count + 1.0));
+        let of_drift = 6.0 / (count * (count + 1.0));
+        let of_level = of_line.max(1.0 / f64::from(self.since_rest));
+        let channels = self.values.as_mut().iter_mut().zip(self.drift.as_mut()).zip(reading);
+        for ((baseline, drift), value) in channels {
+            let error = value - *baseline;
+            *baseline += of_level * error;
+            *drift += of_drift * error;
         }
     }
 }
@@ -439,6 +531,65 @@ mod tests {
             assert_eq!(estimate.status == Status::NoContact, !touched, "{i}");
         }
         assert!(is_right(&tare, moved(100_000)), "{:?}", tare.baseline());
+    }
+
+    /// The locator of [`locate`] for a known force of 1.5.
+    fn locate_known(reading: &[f64]) -> Estimate {
+        let d: [f64; 4] = core::array::from_fn(|c| reading[c] - LEARNT[c]);
+        let square: f64 = d.iter().map(|d| d * d).sum();
+        let misfit = |x: f64| {
+            let f = influence(x);
+            f.iter().zip(&d).map(|(f, d)| (d - 15.0 * f) * (d - 15.0 * f)).sum::<f64>()
+        };
+        let places = (0..=2000).map(|i| f64::from(i) / 2000.0);
+        let x = places.min_by(|a, b| misfit(*a).total_cmp(&misfit(*b))).unwrap();
+        let status = match misfit(x) {
+            _ if square < 20.0 => Status::NoContact,
+            misfit if misfit < 40.0 => Status::Located,
+            _ => Status::OutsideModel,
+        };
+        Estimate::of_position(Position::along(x), status)
+    }
+
+    /// Presses of a force by hand on a board that drifts and leaves a residue, whose untouched readings are known within a second at
+    /// 100 readings a second after each. Drift in counts a reading.
+    fn presses_end(locate: fn(&[f64]) -> Estimate, drift: f64, residue: f64) {
+        let mut tare = Tare::new(LEARNT).unwrap();
+        let mut number = 0;
+        let mut next = |tare: &mut Tare<[f64; 4]>, force: f64, x: f64, left: f64| {
+            number += 1;
+            let moved = core::array::from_fn(|c| {
+                let way = if c % 2 == 0 { 1.0 } else { -0.6 };
+                MOVED[c] + drift * way * f64::from(number) + left * way
+            });
+            let mut tared = [0.0; 4];
+            tare.follow(&reading(number, moved, force, x), &mut tared, locate).unwrap().status
+        };
+        for _ in 0..300 {
+            next(&mut tare, 0.0, 0.0, 0.0);
+        }
+        for press in 0..20 {
+            let x = f64::from(press * 7 % 20) / 20.0;
+            let left = if press % 3 == 0 { -residue } else { residue };
+            let hold = 100 + press * 15;
+            for i in 0..hold + 100 {
+                let share = f64::from((i + 1).min(50).min(hold + 100 - i)) / 50.0;
+                next(&mut tare, 15.0 * share, x, left);
+            }
+            let rest: [Status; 150] = core::array::from_fn(|_| next(&mut tare, 0.0, 0.0, left));
+            let late = rest[100..].iter().filter(|status| **status != Status::NoContact).count();
+            assert!(late == 0, "press {press}: {late} of 50 readings are no rest");
+            for _ in 0..press * 23 {
+                next(&mut tare, 0.0, 0.0, left);
+            }
+        }
+    }
+
+    #[test]
+    fn a_press_ends_within_a_second_on_a_board_that_drifts_and_leaves_a_residue() {
+        presses_end(locate_known, 0.02, 0.0);
+        presses_end(locate, 0.02, 0.0);
+        presses_end(locate, 0.01, 6.0);
     }
 
     #[test]

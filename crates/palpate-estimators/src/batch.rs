@@ -167,7 +167,7 @@ impl<M: Locate> Fitted<M> {
             check.check_batch(readings, channels, estimates, extent);
         }
         for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
-            *estimate = told(*estimate, reading, &self.setup);
+            *estimate = self.by_scatter(told(*estimate, reading, &self.setup), reading);
         }
         Ok(())
     }

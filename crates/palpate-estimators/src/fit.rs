@@ -13,7 +13,9 @@ use palpate_numerics::watch::{Cancelled, Watch};
 
 use crate::recording::{Provenance, Recording};
 use crate::setup::Setup;
-use crate::status::unless_left_open;
+use crate::status::{FalseAlarmRate, unless_left_open};
+use crate::thinning::thinned;
+use crate::untouched_scatter::{Rests, UntouchedScatter};
 
 /// Task of a fit: setup, recording and seed.
 #[derive(Clone, Copy, Debug)]
@@ -164,7 +166,7 @@ pub trait Fit {
     /// # Errors
     /// When the recording does not suit the setup or the method, or the watch stopped it.
     fn fit_task(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
-        self.fit_alone(task)
+        Ok(self.fit_alone(task)?.with_scatter_of(task.recording))
     }
 
     /// Fits with a seed, watched, without a check of the estimates: what studies of a method need.
@@ -230,6 +232,11 @@ pub trait Locate {
         None
     }
 
+    /// Share of untouched readings that may be taken for a contact; `None` of a method that tells no untouched reading.
+    fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
+        None
+    }
+
     /// Checks what a file may have got wrong.
     ///
     /// # Errors
@@ -239,6 +246,11 @@ pub trait Locate {
 
 /// A check of estimates by other means than those of the method that made them.
 pub trait CheckEstimate: Clone + Debug + PartialEq + Serialize + DeserializeOwned {
+    /// Share of untouched readings that may be taken for a contact; `None` of a check that tells no untouched reading.
+    fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
+        None
+    }
+
     /// An estimate of a reading on a surface as the check leaves it.
     fn checked(&self, reading: &[f64], estimate: Estimate, extent: Extent) -> Estimate;
 
@@ -283,6 +295,9 @@ pub struct Fitted<M: Locate> {
     /// Mean reading of the recording's rows without contact, where it has some.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub untouched: Option<Vec<f64>>,
+    /// Scatter of the untouched surface from one rest to the next, where noise alone does not explain it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub untouched_scatter: Option<UntouchedScatter>,
     /// The check of its estimates, where it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub check: Option<Box<M::Check>>,
@@ -309,13 +324,20 @@ impl<M: Locate> Fitted<M> {
             recording: task.recording.provenance.clone(),
         };
         let untouched = task.recording.untouched_mean();
-        Self { setup: task.setup.clone(), provenance, method, untouched, check: None }
+        Self {
+            setup: task.setup.clone(),
+            provenance,
+            method,
+            untouched,
+            untouched_scatter: None,
+            check: None,
+        }
     }
 
     /// The same locator with its method as another type, without a check.
     pub fn map<N: Locate>(self, convert: impl FnOnce(M) -> N) -> Fitted<N> {
-        let Self { setup, provenance, method, untouched, check: _ } = self;
-        Fitted { setup, provenance, method: convert(method), untouched, check: None }
+        let Self { setup, provenance, method, untouched, untouched_scatter, check: _ } = self;
+        Fitted { setup, provenance, method: convert(method), untouched, untouched_scatter, check: None }
     }
 
     /// The sensors, a channel of a reading each.
@@ -337,7 +359,57 @@ impl<M: Locate> Fitted<M> {
             Some(check) => check.checked(reading, estimate, extent),
             None => estimate,
         };
-        Ok(told(estimate, reading, &self.setup))
+        Ok(self.by_scatter(told(estimate, reading, &self.setup), reading))
+    }
+
+    /// The estimate of a reading that no contact explains.
+    pub(crate) fn anywhere(&self) -> Estimate {
+        anywhere_on(self.setup.surface().extent())
+    }
+
+    /// The estimate with the status `no_contact` where the reading is within the scatter of the untouched surface.
+    pub(crate) fn by_scatter(&self, estimate: Estimate, reading: &[f64]) -> Estimate {
+        match &self.untouched_scatter {
+            Some(scatter) if estimate.status != Status::NoContact && scatter.contains(reading) => {
+                Estimate::of_contact(estimate.contact, Status::NoContact)
+            }
+            _ => estimate,
+        }
+    }
+
+    /// The locator with the scatter of the untouched rows of the recording that it was fitted to, where its noise does not explain it: where more of these
+    /// rows are contacts by noise alone than the false-alarm rate allows, at the 5 % level. A scatter that hides most
+    /// presses is not that of an untouched surface, and is left out.
+    #[must_use]
+    pub fn with_scatter_of(mut self, recording: &Recording) -> Self {
+        /// Rows that are located, at most.
+        const MOST: usize = 400;
+        const MOST_HIDDEN: f64 = 0.5;
+        /// Of the test that noise does not explain the untouched rows.
+        const SIGNIFICANCE: f64 = 0.05;
+        let of_check = || self.check.as_ref()?.false_alarm_rate();
+        let Some(rate) = self.method.false_alarm_rate().or_else(of_check) else { return self };
+        let Some(centre) = self.method.offsets().or_else(|| self.untouched.clone()) else { return self };
+        let Some(rests) = Rests::of_recording(recording) else { return self };
+        let is_contact = |reading: &[f64]| self.locate(reading).is_ok_and(|e| e.status != Status::NoContact);
+        if is_contact(&centre) {
+            // Offsets that presses leave open do not tell untouched readings from contacts.
+            return self;
+        }
+        let readings: Vec<Vec<f64>> = rests.readings(&centre).collect();
+        let located: Vec<usize> = thinned(readings.len(), MOST).collect();
+        let contacts = located.iter().filter(|i| is_contact(&readings[**i])).count();
+        if binomial_tail(located.len(), contacts, rate.share()) > SIGNIFICANCE {
+            return self;
+        }
+        let scatter = rests.scatter(centre, rate);
+        let presses = || recording.rows.iter().filter(|row| row.touches());
+        let hidden = presses().filter(|row| scatter.contains(&row.reading)).count();
+
+        if hidden as f64 <= MOST_HIDDEN * presses().count() as f64 {
+            self.untouched_scatter = Some(scatter);
+        }
+        self
     }
 
     /// Checks what a file may have got wrong.
@@ -349,11 +421,25 @@ impl<M: Locate> Fitted<M> {
             LocatorFault::check_count("untouched channels", self.setup.layout().len(), untouched.len())?;
             LocatorFault::check_numbers("untouched reading", untouched, |_| true, "a finite number")?;
         }
+        if let Some(scatter) = &self.untouched_scatter {
+            scatter.check(self.setup.layout().len())?;
+        }
         if let Some(check) = &self.check {
             check.check(&self.setup)?;
         }
         self.method.check(&self.setup)
     }
+}
+
+/// Probability of at least `least` events in so many trials, each of probability `share`.
+fn binomial_tail(trials: usize, least: usize, share: f64) -> f64 {
+    let mut term = (trials as f64 * (-share).ln_1p()).exp();
+    let mut fewer = 0.0;
+    for k in 0..least {
+        fewer += term;
+        term *= (trials - k) as f64 / (k + 1) as f64 * share / (1.0 - share);
+    }
+    (1.0 - fewer).max(0.0)
 }
 
 /// Largest size of a number of a locator, as of a reading.

@@ -55,3 +55,4 @@ mod thinning;
 pub mod track_errors;
 pub mod tracking;
 mod trade_off;
+pub mod untouched_scatter;

@@ -192,6 +192,10 @@ impl ReadingCheck {
 }
 
 impl CheckEstimate for ReadingCheck {
+    fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
+        self.false_alarm_rate()
+    }
+
     fn checked(&self, reading: &[f64], estimate: Estimate, extent: Extent) -> Estimate {
         let explained = match &self.by {
             Forward::Influence(influence) => influence.locate(reading),

@@ -251,6 +251,10 @@ enum Noise {
 impl Locate for ClosedFormLocator {
     type Check = NoCheck;
 
+    fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
+        self.knows_noise().then_some(self.false_alarm_rate)
+    }
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         let channels = self.seeing();
         let (weights, noise) = self.weights(&channels);

@@ -30,6 +30,11 @@ pub fn locator(locator: &Locator) -> Vec<String> {
         });
     }
     lines.push(match locator.false_alarm_rate() {
+        Some(rate) if locator.untouched_scatter.is_some() => {
+            format!(
+                "untouched readings taken for a contact: {rate}, by noise and scatter of the untouched rows"
+            )
+        }
         Some(rate) => format!("untouched readings taken for a contact: {rate}, by the noise of the channels"),
         None => "untouched readings are not told from contacts: it does not know what the board reads then"
             .to_owned(),

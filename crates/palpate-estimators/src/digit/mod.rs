@@ -270,6 +270,10 @@ fn contact(piece: &Piece, x_95_m: (f64, f64)) -> ContactEstimate {
 impl Locate for DigitLocator {
     type Check = NoCheck;
 
+    fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
+        Some(self.false_alarm_rate)
+    }
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         let gauges = gauges(&self.layout, reading);
         let size: f64 = gauges.iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum();

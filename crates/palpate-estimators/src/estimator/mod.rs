@@ -128,7 +128,8 @@ macro_rules! estimators {
                 if method.knows_its_errors() && let Some(by) = check {
                     check = Some(by.keeping_intervals(task, |reading| method.locate(reading))?);
                 }
-                Ok(Fitted { check: check.map(Box::new), ..Fitted::new(task, method) })
+                let locator = Fitted { check: check.map(Box::new), ..Fitted::new(task, method) };
+                Ok(locator.with_scatter_of(task.recording))
             }
 
             fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Locator>) -> Result<(), FitError> {
@@ -282,6 +283,10 @@ impl Locate for Method {
         self.as_locate().offsets()
     }
 
+    fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
+        self.as_locate().false_alarm_rate()
+    }
+
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         self.as_locate().check(setup)
     }
@@ -418,16 +423,23 @@ impl Locator {
         Tare::new(self.untouched_reading()?).map_err(|_| NoBaseline { kind: self.kind() })
     }
 
+    /// Locates a reading by a tare of its own, which follows the baseline as [`Tare::follow`] does. `tared` is the tared reading afterwards.
+    ///
+    /// # Errors
+    /// [`TareError`] for another number of channels or a value that is not finite.
+    pub fn locate_following(
+        &self,
+        tare: &mut Tare<Vec<f64>>,
+        reading: &[f64],
+        tared: &mut [f64],
+    ) -> Result<Estimate, TareError> {
+        // A locator refuses no tared reading: its channels and values were checked by the tare.
+        tare.follow(reading, tared, |tared| self.locate(tared).unwrap_or_else(|_| self.anywhere()))
+    }
+
     /// Share of untouched readings that may be taken for a contact; `None` of a method that tells no untouched reading.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
-        match &self.method {
-            Method::Influence(influence) => influence.false_alarm_rate(),
-            Method::ClosedForm(closed_form) => {
-                closed_form.knows_noise().then_some(closed_form.false_alarm_rate)
-            }
-            Method::Digit(digit) => Some(digit.false_alarm_rate),
-            _ => self.check.as_ref()?.false_alarm_rate(),
-        }
+        self.method.false_alarm_rate().or_else(|| self.check.as_ref()?.false_alarm_rate())
     }
 
     /// True of a locator whose estimates have a force: one that is known, or that it tells.

@@ -1,7 +1,7 @@
 //! Features of a reading for inverse methods: its channels, or what of them does not depend on the load.
 
 use crate::fit::LocatorFault;
-use crate::recording::Recording;
+use crate::recording::{Recording, is_one_force};
 use crate::setup::Setup;
 use palpate_numerics::mean_and_variance;
 
@@ -38,9 +38,9 @@ impl FeatureKind {
 
     /// Features that the load does not change: with the size of a reading, unless all presses have one force and contacts may have others.
     pub fn load_invariant(setup: &Setup, recording: &Recording) -> Self {
-        let mut forces = recording.rows.iter().map(|row| row.force_n);
-        let first = forces.next().flatten();
-        let has_one_force = first.is_some() && forces.all(|force_n| force_n == first);
+        let forces_n: Option<Vec<f64>> =
+            recording.rows.iter().filter(|row| row.touches()).map(|row| row.force_n).collect();
+        let has_one_force = forces_n.is_some_and(is_one_force);
         if setup.force_n().is_none() && has_one_force { Self::Direction } else { Self::LoadInvariant }
     }
 }

@@ -238,6 +238,10 @@ impl Locate for InfluenceLocator {
         }
     }
 
+    fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
+        self.false_alarm_rate()
+    }
+
     fn offsets(&self) -> Option<Vec<f64>> {
         match self {
             Self::Beam(beam) => Some(beam.offsets().to_vec()),

@@ -102,7 +102,7 @@ impl<'a> Session<'a> {
             extent,
             decoder: Decoder::new(&channels),
             timeline: Timeline::default(),
-            taring: Taring::new(locator, config.tare),
+            taring: Taring::new(locator, config.tare, &config.estimation),
             estimation: EstimationState::new(&config.estimation, locator)?,
             contact: ContactWatch::new(extent),
             health: HealthWatch::new(locator.setup.layout()),
@@ -323,3 +323,6 @@ impl<'a> Session<'a> {
 fn touches(status: Status) -> bool {
     matches!(status, Status::Located | Status::Ambiguous)
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,6 @@
 //! The baseline of a session, and estimates by it.
 
-use super::TareMode;
+use super::{Estimation, TareMode};
 use palpate_core::Estimate;
 use palpate_core::Tare;
 use palpate_estimators::estimator::Locator;
@@ -14,21 +14,28 @@ pub struct Taring {
     /// The tare; `None` where the locator has not learnt what its channels read untouched.
     tare: Option<Tare<Vec<f64>>>,
     follows: bool,
+    /// Whether the rest after a touch becomes the baseline; not where a tracker takes creep off.
+    takes_rests: bool,
     /// A baseline that is being taken, and the readings it still lacks.
     taken: Option<(Tare<Vec<f64>>, u32)>,
 }
 
 impl Taring {
     /// The tare of a session that begins.
-    pub fn new(locator: &Locator, mode: TareMode) -> Self {
+    pub fn new(locator: &Locator, mode: TareMode, estimation: &Estimation) -> Self {
         let follows = mode == TareMode::Auto && locator.false_alarm_rate().is_some();
-        Self { tare: locator.tare().ok(), follows, taken: None }
+        let takes_rests = !matches!(estimation, Estimation::Track { creep: Some(_), .. });
+        let tare = locator.tare().ok().map(|tare| if takes_rests { tare } else { tare.without_rests() });
+        Self { tare, follows, takes_rests, taken: None }
     }
 
     /// Begins to take a baseline.
     pub fn begin(&mut self) {
         if let Some(tare) = &self.tare {
-            self.taken = Tare::new(tare.learnt().to_vec()).ok().map(|tare| (tare, READINGS));
+            let takes_rests = self.takes_rests;
+            let fresh = Tare::new(tare.learnt().to_vec()).ok();
+            let fresh = fresh.map(|tare| if takes_rests { tare } else { tare.without_rests() });
+            self.taken = fresh.map(|tare| (tare, READINGS));
         }
     }
 
@@ -43,18 +50,7 @@ impl Taring {
         let tares = self.take(reading);
         let Some(tare) = &mut self.tare else { return Some((locator.locate(reading).ok()?, tares)) };
         if self.follows {
-            // A locator refuses no tared reading: its channels and values were checked by the tare.
-            let mut refused = false;
-            let estimate = tare.follow(reading, tared, |tared| {
-                locator.locate(tared).unwrap_or_else(|_| {
-                    refused = true;
-                    Estimate::of_position(
-                        palpate_core::Position::along(0.0),
-                        palpate_core::Status::OutsideModel,
-                    )
-                })
-            });
-            return estimate.ok().filter(|_| !refused).map(|estimate| (estimate, tares));
+            return Some((locator.locate_following(tare, reading, tared).ok()?, tares));
         }
         tare.apply(reading, tared).ok()?;
         Some((locator.locate(tared).ok()?, tares))

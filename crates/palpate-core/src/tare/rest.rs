@@ -1,0 +1,165 @@
+//! The rest after a touch: readings at which an untouched surface settles again.
+//!
+//! A surface that is let go does not read what it read before: hysteresis and creep leave a residue, and the offsets have drifted meanwhile. A
+//! reading is a rest where it stays, and is small beside the touch.
+
+use super::{LET_GO, next_in_row};
+use crate::Status;
+
+/// Readings in a row that stay, by which a surface is at rest.
+const AT_REST: u32 = 2 * LET_GO;
+/// Untouched readings after a touch by which it is at rest, whether they stay or not.
+const UNTOUCHED: u32 = 10 * AT_REST;
+/// Untouched readings from which on the noise is known.
+const NOISE_KNOWN: u32 = 20;
+/// Largest size of a residue, as a share of the touch before it. Gauges on elastic surfaces leave up to 3 % by hysteresis, and as much by creep.
+const RESIDUE: f64 = 0.05;
+/// Largest change of a reading at rest, as a share of the touch: a tenth of the residue.
+const CHANGE: f64 = 0.1 * RESIDUE;
+
+/// State of the surface after a reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Course {
+    /// No touch has ended.
+    Steady,
+    /// A touch has ended, and readings have not yet come to rest.
+    Settling,
+    /// A touch has ended, and readings are at rest: their mean is [`RestWatch::rest`].
+    AtRest,
+}
+
+/// Watch for the rest after a touch.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct RestWatch<B> {
+    /// Variance of the noise of each channel about the baseline, of untouched readings.
+    noise: B,
+    /// Readings that it is the mean of, at most a time constant.
+    readings: u32,
+    /// Squared sizes of the last readings of a touch over the variance of the noise, in turn.
+    sizes: [f64; LET_GO as usize],
+    /// Readings of the touch.
+    touched: u32,
+    /// Greatest squared size that [`LET_GO`] readings in a row had.
+    touch_size: f64,
+    /// Mean of the last readings that stayed.
+    rest: B,
+    /// Readings that it is the mean of.
+    rested: u32,
+    /// Untouched readings since the touch.
+    untouched: u32,
+}
+
+impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
+    pub fn new(zero: &B) -> Self {
+        let mut noise = zero.clone();
+        noise.as_mut().fill(0.0);
+        Self {
+            rest: noise.clone(),
+            noise,
+            readings: 0,
+            sizes: [0.0; LET_GO as usize],
+            touched: 0,
+            touch_size: 0.0,
+            rested: 0,
+            untouched: 0,
+        }
+    }
+
+    /// Mean of the readings at rest.
+    pub fn rest(&self) -> &[f64] {
+        self.rest.as_ref()
+    }
+
+    /// True where the rest is further from a baseline than one reading is by noise.
+    pub fn has_moved(&self, baseline: &[f64]) -> bool {
+        self.distance(self.rest(), baseline) > baseline.len() as f64
+    }
+
+    /// Readings that the rest is the mean of.
+    pub fn rested(&self) -> u32 {
+        self.rested
+    }
+
+    /// True unless the last readings are known to change.
+    pub fn stays(&self) -> bool {
+        self.readings < NOISE_KNOWN || self.rested >= LET_GO
+    }
+
+    /// Forgets the touch.
+    pub fn forget_touch(&mut self) {
+        (self.touched, self.touch_size, self.rested, self.untouched) = (0, 0.0, 0, 0);
+    }
+
+    /// Takes a reading that has a status by the baseline.
+    pub fn add(&mut self, reading: &[f64], baseline: &[f64], status: Status, time_constant: u32) -> Course {
+        let is_untouched = status == Status::NoContact;
+        if is_untouched && self.touched == 0 {
+            self.learn_noise(reading, baseline, time_constant);
+        }
+        if self.readings < NOISE_KNOWN {
+            return Course::Steady;
+        }
+        let size = self.distance(reading, baseline);
+        if is_untouched {
+            if self.touched < LET_GO {
+                // Noise that was taken for a contact.
+                self.forget_touch();
+                return Course::Steady;
+            }
+            self.untouched = self.untouched.saturating_add(1);
+        } else {
+            self.untouched = 0;
+            self.sizes[(self.touched % LET_GO) as usize] = size;
+            self.touched = self.touched.saturating_add(1);
+            if self.touched >= LET_GO {
+                self.touch_size =
+                    self.sizes.iter().copied().fold(f64::INFINITY, f64::min).max(self.touch_size);
+            }
+        }
+        self.follow_rest(reading);
+        let is_residue = is_untouched || size <= RESIDUE * RESIDUE * self.touch_size;
+        if (is_residue && self.rested >= AT_REST) || self.untouched >= UNTOUCHED {
+            Course::AtRest
+        } else if is_untouched {
+            Course::Settling
+        } else {
+            Course::Steady
+        }
+    }
+
+    /// Adds a reading to the rest, or begins another one with it.
+    fn follow_rest(&mut self, reading: &[f64]) {
+        let channels = reading.len() as f64;
+        // Noise of any number of channels is within 2·channels + 8 in 99.7 % of readings.
+        let by_noise = (2.0 * channels + 8.0) * (1.0 + 1.0 / f64::from(self.rested.max(1)));
+        let stays =
+            self.distance(reading, self.rest.as_ref()) <= by_noise.max(CHANGE * CHANGE * self.touch_size);
+        self.rested = next_in_row(self.rested, self.rested > 0 && stays).max(1);
+        let share = 1.0 / f64::from(self.rested);
+        for (rest, value) in self.rest.as_mut().iter_mut().zip(reading) {
+            *rest += share * (value - *rest);
+        }
+    }
+
+    fn learn_noise(&mut self, reading: &[f64], baseline: &[f64], time_constant: u32) {
+        self.readings = self.readings.saturating_add(1).min(time_constant);
+        let share = 1.0 / f64::from(self.readings);
+        for ((noise, value), baseline) in self.noise.as_mut().iter_mut().zip(reading).zip(baseline) {
+            let deviation = value - baseline;
+            *noise += share * (deviation * deviation - *noise);
+        }
+    }
+
+    /// Σ (a − b)² over the variances of the noise; a channel without noise, as of a coarse converter, counts as one of mean noise.
+    fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
+        let noise = self.noise.as_ref();
+        let mean = noise.iter().sum::<f64>() / noise.len().max(1) as f64;
+        let variance = |own: f64| match (own > 0.0, mean > 0.0) {
+            (true, _) => own,
+            (false, true) => mean,
+            (false, false) => 1.0,
+        };
+        let channels = a.iter().zip(b).zip(noise);
+        channels.map(|((a, b), noise)| (a - b) * (a - b) / variance(*noise)).sum()
+    }
+}

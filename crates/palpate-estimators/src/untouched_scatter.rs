@@ -1,0 +1,152 @@
+//! Scatter of an untouched surface from one rest to the next: the residue that hysteresis, creep and drift leave after a touch, with the noise.
+//!
+//! Noise is learnt from repeats, and hardly shows what a touch leaves behind. The untouched rows of a recording do, where presses are between
+//! them. Each run of untouched rows is a rest. About a straight line in time, which takes a steady drift off, the rests have the variance s² in each
+//! channel; a reading less a baseline, which is a rest too, has 2·s².
+//!
+//! Symbols: d reading less the untouched reading, n channels, ν degrees of freedom of the rests, R correlation matrix of the channels.
+//!
+//! T = Σ d²/(2·s²) is Σ λ·χ²₁ with the eigenvalues λ of R. With c₁ = n, c₂ = tr R² and c₃ = tr R³ it is about n − g·b + g·χ²_b with g = c₃/c₂ and
+//! b = c₂³/c₃², which has its first three moments (Imhof, *Biometrika* 48, 1961). So channels whose residues go together count as fewer. As s² is estimated, the
+//! critical value c of χ²_b becomes that of b·F with b and ν degrees of freedom, about ν·(e^(c/(ν + b/2 − 1)) − 1) (Bartlett, *Journal of the Royal
+//! Statistical Society B* 9, 1947). R is the sample's, whose eigenvalues scatter more than those of the
+//! surface: with few rests of unrelated channels the test is conservative.
+
+use crate::fit::LocatorFault;
+use crate::recording::Recording;
+use crate::status::FalseAlarmRate;
+use palpate_numerics::{chi_squared_critical_value, mean};
+use serde::{Deserialize, Serialize};
+
+/// Scatter of an untouched surface from one rest to the next; see [the module](self).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UntouchedScatter {
+    /// Untouched reading of each channel that the scatter is about.
+    pub centre: Vec<f64>,
+    /// Standard deviation of each channel about it, from one rest to the next; 0 of a channel that never changes untouched.
+    pub sd: Vec<f64>,
+    /// Critical value of Σ d²/sd² of an untouched surface at the false-alarm rate.
+    pub bound: f64,
+}
+
+/// Rests of a recording about their slow course.
+pub(crate) struct Rests {
+    /// Deviation of each untouched row from the course, with the share that the row has of its rest.
+    deviations: Vec<(Vec<f64>, f64)>,
+    /// ν.
+    freedom: f64,
+}
+
+impl Rests {
+    /// Fewer rests do not tell a scatter: the bound would be that of a t with hardly any freedom.
+    const LEAST: usize = 5;
+    /// Parameters of a line.
+    const OF_LINE: usize = 2;
+
+    /// The rests of a recording; `None` where it has too few, or its rows have no order in time.
+    pub fn of_recording(recording: &Recording) -> Option<Self> {
+        let by_row = || (0..recording.rows.len()).map(|row| row as f64).collect();
+        let times_s: Vec<f64> = recording.times_s().unwrap_or_else(by_row);
+        let indices: Vec<usize> = (0..recording.rows.len()).collect();
+        let touches = |row: &usize| recording.rows[*row].touches();
+        let rests: Vec<&[usize]> =
+            indices.chunk_by(|a, b| touches(a) == touches(b)).filter(|run| !touches(&run[0])).collect();
+        if rests.len() < Self::LEAST {
+            return None;
+        }
+        let channels = recording.channels.len();
+        let time_of = |rest: &[usize]| mean(rest.iter().map(|row| times_s[*row]));
+        let rest_times_s: Vec<f64> = rests.iter().map(|rest| time_of(rest)).collect();
+        let lines: Vec<[f64; 2]> = (0..channels)
+            .map(|c| {
+                let value = |rest: &&[usize]| mean(rest.iter().map(|row| recording.rows[*row].reading[c]));
+                line(&rest_times_s, &rests.iter().map(value).collect::<Vec<f64>>())
+            })
+            .collect();
+        let deviations = rests.iter().flat_map(|rest| rest.iter().map(|row| (*row, 1.0 / rest.len() as f64)));
+        let deviations = deviations.map(|(row, share)| {
+            let values = recording.rows[row].reading.iter().zip(&lines);
+            (values.map(|(value, [level, slope])| value - level - slope * times_s[row]).collect(), share)
+        });
+        Some(Self { deviations: deviations.collect(), freedom: (rests.len() - Self::OF_LINE) as f64 })
+    }
+
+    /// Untouched readings as the rows would have been without a slow course, about `centre`.
+    pub fn readings<'a>(&'a self, centre: &'a [f64]) -> impl Iterator<Item = Vec<f64>> + 'a {
+        self.deviations
+            .iter()
+            .map(move |(row, _)| row.iter().zip(centre).map(|(d, centre)| centre + d).collect())
+    }
+
+    /// Their scatter about `centre`.
+    pub fn scatter(&self, centre: Vec<f64>, rate: FalseAlarmRate) -> UntouchedScatter {
+        let channels = centre.len();
+        let product = |a: usize, b: usize| {
+            self.deviations.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.freedom
+        };
+        let variances: Vec<f64> = (0..channels).map(|c| product(c, c)).collect();
+        let changing: Vec<usize> = (0..channels).filter(|c| variances[*c] > 0.0).collect();
+        let correlation = |a: usize, b: usize| product(a, b) / (variances[a] * variances[b]).sqrt();
+        let correlations: Vec<Vec<f64>> =
+            changing.iter().map(|a| changing.iter().map(|b| correlation(*a, *b)).collect()).collect();
+        let bound = critical_value(&correlations, self.freedom, rate);
+        let sd = variances.iter().map(|variance| (2.0 * variance).sqrt()).collect();
+        UntouchedScatter { centre, sd, bound }
+    }
+}
+
+/// Critical value of Σ d²/(2·s²) for channels of a correlation matrix whose variances were estimated with so many degrees of freedom.
+fn critical_value(correlations: &[Vec<f64>], freedom: f64, rate: FalseAlarmRate) -> f64 {
+    let n = correlations.len();
+    if n == 0 {
+        return 0.0;
+    }
+    let squared =
+        |a: usize, b: usize| -> f64 { (0..n).map(|k| correlations[a][k] * correlations[k][b]).sum() };
+    let second: f64 = (0..n).map(|a| squared(a, a)).sum();
+    let pairs = (0..n).flat_map(|a| (0..n).map(move |b| (a, b)));
+    let third: f64 = pairs.map(|(a, b)| squared(a, b) * correlations[b][a]).sum();
+    let scale = third / second;
+    // At least 1, but for rounding where all channels go together.
+    let effective = (second.powi(3) / third.powi(2)).max(1.0);
+    // Critical values are nearly linear in the degrees of freedom.
+    let below = effective.floor();
+    let of_whole = |whole: f64| chi_squared_critical_value(rate.share(), whole as usize);
+    let critical = of_whole(below) + (effective - below) * (of_whole(below + 1.0) - of_whole(below));
+    let exponent = critical / (freedom + 0.5 * effective - 1.0);
+    n as f64 - scale * effective + scale * freedom * (exponent.exp() - 1.0)
+}
+
+/// Level and slope of the straight line through values at some times by least squares; no slope where all times are one.
+fn line(times_s: &[f64], values: &[f64]) -> [f64; 2] {
+    let (time_s, value) = (mean(times_s.iter().copied()), mean(values.iter().copied()));
+    let products = times_s.iter().zip(values).map(|(t, y)| (t - time_s) * (y - value));
+    let squares: f64 = times_s.iter().map(|t| (t - time_s).powi(2)).sum();
+    let slope = if squares > 0.0 { products.sum::<f64>() / squares } else { 0.0 };
+    [value - slope * time_s, slope]
+}
+
+impl UntouchedScatter {
+    /// True for a reading that an untouched surface has at the false-alarm rate. Channels that never change untouched say nothing.
+    pub fn contains(&self, reading: &[f64]) -> bool {
+        let channels = reading.iter().zip(&self.centre).zip(&self.sd).filter(|(_, sd)| **sd > 0.0);
+        channels.map(|((value, centre), sd)| ((value - centre) / sd).powi(2)).sum::<f64>() <= self.bound
+    }
+
+    /// Checks what a file may have got wrong.
+    ///
+    /// # Errors
+    /// [`LocatorFault`], naming what does not fit together.
+    pub fn check(&self, channels: usize) -> Result<(), LocatorFault> {
+        LocatorFault::check_count("untouched channels", channels, self.centre.len())?;
+        LocatorFault::check_count("scatters of untouched channels", channels, self.sd.len())?;
+        LocatorFault::check_numbers("untouched reading", &self.centre, |_| true, "a finite number")?;
+        LocatorFault::check_numbers("untouched scatter", &self.sd, |sd| sd >= 0.0, "finite and at least 0")?;
+        let bound = [self.bound];
+        LocatorFault::check_numbers("untouched bound", bound, |bound| bound >= 0.0, "finite and at least 0")
+    }
+}
+
+#[cfg(test)]
+mod tests;

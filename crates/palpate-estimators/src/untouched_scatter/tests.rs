@@ -1,0 +1,91 @@
+use super::*;
+use crate::recording::Row;
+use crate::setup::Setup;
+use palpate_core::Position;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+const CHANNELS: usize = 6;
+
+/// Presses with an untouched row after each, whose residue has one part of its own and one that all channels share.
+fn recording(rng: &mut Xoshiro256PlusPlus, rests: usize, [own, shared]: [f64; 2], drift: f64) -> Recording {
+    let mut rows = Vec::new();
+    for i in 0..rests {
+        for force_n in [2.0, 0.0] {
+            let together: f64 = StandardNormal.sample(rng);
+            let reading = (0..CHANNELS).map(|_| {
+                let alone: f64 = StandardNormal.sample(rng);
+                1000.0 * force_n + own * alone + shared * together + drift * i as f64
+            });
+            rows.push(Row {
+                position: Position::along(0.1),
+                force_n: Some(force_n),
+                nuisances: Vec::new(),
+                time_s: None,
+                reading: reading.collect(),
+            });
+        }
+    }
+    let setup = Setup::measured(0.3, &["a", "b", "c", "d", "e", "f"]).unwrap();
+    Recording::new(setup.layout(), "rests", rows)
+}
+
+/// Share of changes from one rest to the next that are beyond the scatter, over many recordings.
+fn false_alarms(rests: usize, parts: [f64; 2], drift: f64, rate: f64) -> f64 {
+    const RECORDINGS: usize = 400;
+    const ASKED: usize = 100;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    let mut beyond = 0;
+    for _ in 0..RECORDINGS {
+        let recording = recording(&mut rng, rests, parts, drift);
+        let found = Rests::of_recording(&recording).unwrap();
+        let scatter = found.scatter(vec![0.0; CHANNELS], FalseAlarmRate::new(rate).unwrap());
+        let [own, shared] = parts;
+        for _ in 0..ASKED {
+            let mut change = |sd: f64| -> f64 {
+                let normal: f64 = StandardNormal.sample(&mut rng);
+                2f64.sqrt() * sd * normal
+            };
+            let together = change(shared);
+            let reading: Vec<f64> = (0..CHANNELS).map(|_| together + change(own)).collect();
+            beyond += usize::from(!scatter.contains(&reading));
+        }
+    }
+    beyond as f64 / (RECORDINGS * ASKED) as f64
+}
+
+#[test]
+fn false_alarms_of_rests_are_at_most_about_the_rate() {
+    for (rests, most) in [(8, 0.015), (12, 0.015), (40, 0.015)] {
+        for parts in [[10.0, 0.0], [3.0, 10.0], [7.0, 7.0]] {
+            let found = false_alarms(rests, parts, 5.0, 0.01);
+            assert!((0.0005..most).contains(&found), "{rests} {parts:?}: {found}");
+        }
+    }
+}
+
+#[test]
+fn a_steady_drift_is_no_scatter() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let scatter = |drift: f64, rng: &mut Xoshiro256PlusPlus| {
+        let rests = Rests::of_recording(&recording(rng, 200, [3.0, 0.0], drift)).unwrap();
+        rests.scatter(vec![0.0; CHANNELS], FalseAlarmRate::DEFAULT).sd
+    };
+    for drift in [0.0, 50.0] {
+        for sd in scatter(drift, &mut rng) {
+            assert!((sd / (3.0 * 2f64.sqrt()) - 1.0).abs() < 0.25, "{drift}: {sd}");
+        }
+    }
+}
+
+#[test]
+fn few_rests_or_one_long_one_tell_no_scatter() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut few = recording(&mut rng, 4, [3.0, 0.0], 0.0);
+    assert!(Rests::of_recording(&few).is_none());
+    few.rows.sort_by(|a, b| a.force_n.unwrap().total_cmp(&b.force_n.unwrap()));
+    few.rows = few.rows.iter().cycle().take(4 * few.rows.len()).cloned().collect();
+    few.rows.sort_by(|a, b| a.force_n.unwrap().total_cmp(&b.force_n.unwrap()));
+    assert!(Rests::of_recording(&few).is_none());
+}
