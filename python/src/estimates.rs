@@ -1,9 +1,12 @@
 //! Estimates: of one reading with its numbers, of many with their columns.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
+use numpy::ndarray::ArrayView1;
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, ToPyArray};
+use palpate::estimators::estimate_record::ContactRecord;
 use palpate::estimators::estimator::{self, ContactEstimate, Mode, Status, Uncertainty};
 use palpate::mechanics::contact::Position;
 use palpate::mechanics::surface::Extent;
+use palpate::numerics::normal_interval_95;
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -68,10 +71,10 @@ impl Estimate {
         self.contact().uncertainty.and_then(|uncertainty| self.extent.if_plane(uncertainty.y_95_m))
     }
 
-    /// Ends of the 95 % interval of the force in newtons, where force and place trade off; None elsewhere.
+    /// Ends of the 95 % interval of the force in newtons; None where the force is known or not estimated.
     #[getter]
     fn force_95(&self) -> Option<(f64, f64)> {
-        self.contact().uncertainty.and_then(|uncertainty| uncertainty.force_95_n)
+        ContactRecord::new(self.contact(), self.extent).force_interval_95_n().map(<(f64, f64)>::from)
     }
 
     /// Covariance of (x, y, force), in m², m·N and N²: of the shape (3, 3); None where the method cannot tell. What is not estimated has
@@ -79,8 +82,7 @@ impl Estimate {
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let Some(uncertainty) = self.contact().uncertainty else { return Ok(None) };
-        let [xx, xy, xf, yy, yf, ff] = uncertainty.covariance;
-        Ok(Some([xx, xy, xf, xy, yy, yf, xf, yf, ff].to_pyarray(py).reshape([3, 3])?))
+        Ok(Some(square(uncertainty.covariance).to_pyarray(py).reshape([3, 3])?))
     }
 
     /// Status: "located", "no_contact", "ambiguous", "outside_model" or "outside_surface".
@@ -218,6 +220,19 @@ impl Rows<'_> {
     }
 }
 
+/// Covariance of (x, y, force), row by row, from its upper triangle xx, xy, xf, yy, yf, ff.
+fn square([xx, xy, xf, yy, yf, ff]: [f64; 6]) -> [f64; 9] {
+    [xx, xy, xf, xy, yy, yf, xf, yf, ff]
+}
+
+/// Upper triangle of a covariance from a row of the column: six entries on a plane, those of [`ON_LINE`] on a line.
+fn upper_triangle(row: ArrayView1<'_, f64>) -> [f64; 6] {
+    match row.len() {
+        6 => std::array::from_fn(|i| row[i]),
+        _ => whole(std::array::from_fn(|i| row[i])),
+    }
+}
+
 /// The six entries of a covariance on a line; all unknown where those are.
 fn whole(on_line: [f64; 3]) -> [f64; 6] {
     let mut all = [if on_line[0].is_nan() { UNKNOWN } else { 0.0 }; 6];
@@ -234,8 +249,7 @@ fn whole(on_line: [f64; 3]) -> [f64; 6] {
 /// force : ndarray of float64
 ///     Forces in newtons, NaN where neither known nor estimated: of the shape (readings).
 /// x_95, y_95, force_95 : ndarray of float64
-///     Ends of the 95 % intervals: of the shape (readings, 2); NaN where the method cannot tell. `force_95` is there where force and place
-///     trade off.
+///     Ends of the 95 % intervals: of the shape (readings, 2); NaN where the method cannot tell, and of a force that is known.
 /// status : ndarray of str
 ///     "located", "no_contact", "ambiguous", "outside_model" or "outside_surface": of the shape (readings).
 #[pyclass(frozen, module = "palpate")]
@@ -245,7 +259,8 @@ pub struct Estimates {
     force: Py<PyArray1<f64>>,
     x_95: Py<PyArray2<f64>>,
     y_95: Option<Py<PyArray2<f64>>>,
-    force_95: Py<PyArray2<f64>>,
+    /// Ends of the forces' intervals where force and place trade off; NaN elsewhere.
+    trade_off_95: Py<PyArray2<f64>>,
     /// All six entries on a plane, those of [`ON_LINE`] on a line.
     covariance: Py<PyArray2<f64>>,
     status: Py<PyArray1<u8>>,
@@ -298,7 +313,7 @@ impl Estimates {
             force: force.unbind(),
             x_95: x_95.unbind(),
             y_95: y_95.map(Bound::unbind),
-            force_95: force_95.unbind(),
+            trade_off_95: force_95.unbind(),
             covariance: covariance.unbind(),
             status: status.unbind(),
             several,
@@ -339,22 +354,36 @@ impl Estimates {
         self.y_95.as_ref().map(|y_95| y_95.clone_ref(py))
     }
 
-    /// Ends of the 95 % intervals of the forces in newtons where force and place trade off, NaN elsewhere: of the shape (readings, 2).
+    /// Ends of the 95 % intervals of the forces in newtons, NaN where the force is known or not estimated: of the shape (readings, 2).
     #[getter]
-    fn force_95(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
-        self.force_95.clone_ref(py)
+    fn force_95(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f64>>> {
+        let (own, force) = (self.trade_off_95.bind(py).readonly(), self.force.bind(py).readonly());
+        let covariance = self.covariance.bind(py).readonly();
+        let variances = covariance.as_array();
+        let forces = force.as_array();
+        let rows = own.as_array().outer_iter().zip(forces.iter()).zip(variances.outer_iter());
+        let ends: Vec<[f64; 2]> = rows
+            .map(|((own, force_n), variances)| {
+                // The variance of the force is the last entry, on a line as on a plane.
+                let sd_n = variances[variances.len() - 1].sqrt();
+                match (own[0].is_nan(), sd_n > 0.0 && sd_n.is_finite() && !force_n.is_nan()) {
+                    (false, _) => [own[0], own[1]],
+                    (true, true) => normal_interval_95(*force_n, sd_n).into(),
+                    (true, false) => [UNKNOWN; 2],
+                }
+            })
+            .collect();
+        Ok(PyArray1::from_vec(py, ends.into_flattened()).reshape([forces.len(), 2])?.unbind())
     }
 
-    /// Covariances of (x, y, force), in m², m·N and N², as upper triangles xx, xy, xf, yy, yf, ff: of the shape (readings, 6).
+    /// Covariances of (x, y, force), in m², m·N and N²: of the shape (readings, 3, 3). What is not estimated has zeros; NaN where the method cannot tell.
     #[getter]
-    fn covariance(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f64>>> {
-        if self.y.is_some() {
-            return Ok(self.covariance.clone_ref(py));
-        }
-        let told = self.covariance.bind(py).readonly();
-        let rows: Vec<[f64; 6]> =
-            told.as_array().outer_iter().map(|row| whole([row[0], row[1], row[2]])).collect();
-        Ok(PyArray1::from_vec(py, rows.into_flattened()).reshape([told.as_array().nrows(), 6])?.unbind())
+    fn covariance(&self, py: Python<'_>) -> PyResult<Py<PyArray3<f64>>> {
+        let entries = self.covariance.bind(py).readonly();
+        let rows: Vec<[f64; 9]> =
+            entries.as_array().outer_iter().map(|row| square(upper_triangle(row))).collect();
+        let count = rows.len();
+        Ok(PyArray1::from_vec(py, rows.into_flattened()).reshape([count, 3, 3])?.unbind())
     }
 
     /// Statuses: of the shape (readings).
@@ -438,10 +467,10 @@ impl Estimates {
         several: Vec<PackedSeveral>,
         size_m: (f64, Option<f64>),
     ) -> PyResult<Self> {
-        let (x, y, force, x_95, y_95, force_95, covariance, status) = columns;
+        let (x, y, force, x_95, y_95, trade_off_95, covariance, status) = columns;
         let extent = Extent::new(size_m.0, size_m.1).map_err(refused)?;
         let several = several.into_iter().map(unpacked).collect::<PyResult<_>>()?;
-        Ok(Self { x, y, force, x_95, y_95, force_95, covariance, status, several, extent })
+        Ok(Self { x, y, force, x_95, y_95, trade_off_95, covariance, status, several, extent })
     }
 }
 
@@ -508,7 +537,7 @@ impl Estimates {
             self.force(py),
             self.x_95(py),
             self.y_95(py),
-            self.force_95(py),
+            self.trade_off_95.clone_ref(py),
             self.covariance.clone_ref(py),
             status,
         )
@@ -526,12 +555,9 @@ impl Estimates {
             (row[[at, 0]], row[[at, 1]])
         };
         let covariance = self.covariance.bind(py).readonly();
-        let covariance = match self.y {
-            Some(_) => std::array::from_fn(|i| covariance.as_array()[[at, i]]),
-            None => whole(std::array::from_fn(|i| covariance.as_array()[[at, i]])),
-        };
+        let covariance = upper_triangle(covariance.as_array().row(at));
         let force_n = Some(number(&self.force)).filter(|force_n| !force_n.is_nan());
-        let force_95_n = Some(ends(&self.force_95)).filter(|(low_n, _)| !low_n.is_nan());
+        let force_95_n = Some(ends(&self.trade_off_95)).filter(|(low_n, _)| !low_n.is_nan());
         let y_95_m = self.y_95.as_ref().map_or((0.0, 0.0), ends);
         let uncertainty = Uncertainty { covariance, x_95_m: ends(&self.x_95), y_95_m, force_95_n };
         let position = Position { x_m: number(&self.x), y_m: self.y.as_ref().map_or(0.0, number) };

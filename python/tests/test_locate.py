@@ -55,6 +55,27 @@ def test_estimates_are_the_command_s(tmp_path, command, examples, estimator):
     assert len(told) == np.isfinite(ours.x_95[:, 0]).sum()
 
 
+def test_intervals_of_the_force_are_the_command_s(tmp_path, command, beam, presses, locator):
+    path, readings = tmp_path / "locator.json", tmp_path / "readings.csv"
+    locator.save(path)
+    presses.to_csv(readings)
+    table = pd.read_csv(io.StringIO(command("locate", path, readings, "--all")))
+    ours = locator.locate(presses.readings)
+    assert np.isfinite(ours.force_95).all()
+    assert np.allclose(table[["force_low_n", "force_high_n"]], ours.force_95, atol=1e-4)
+    assert np.allclose([one.force_95 for one in ours], ours.force_95)
+
+
+def test_covariances_are_matrices(presses, plate, locator):
+    on_plate = plate.simulate(pp.grid(6, 4), repeats=3, seed=1)
+    for estimates in [
+        locator.locate(presses.readings),
+        pp.Influence(source="mechanics").fit(on_plate).locate(on_plate.readings),
+    ]:
+        assert estimates.covariance.shape == (len(estimates), 3, 3)
+        assert np.allclose(estimates.covariance, [one.covariance for one in estimates])
+
+
 def test_a_fit_by_the_command_is_ours(tmp_path, command, examples):
     rig = pp.Rig.load(examples / "noisy-beam.toml")
     command("fit", examples / "noisy-beam.toml", "--seed", 5, "-o", tmp_path / "theirs.json")

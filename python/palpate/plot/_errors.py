@@ -348,7 +348,8 @@ def calibration(estimates: Estimates, truth: Recording, *, ax: Axes | None = Non
 
 def _region_probabilities(estimates: Estimates, truth: Recording) -> Floats:
     """Probability of the smallest region about each estimate that holds its contact, in rising order."""
-    xx, xy, _, yy, _, _ = estimates.covariance.T
+    covariance = estimates.covariance
+    xx, xy, yy = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
     touched = truth.touches & (estimates.status != "no_contact")
     off_x = truth.x - estimates.x
     if estimates.y is None:

@@ -70,15 +70,14 @@ def contacts(setup: Setup | Locator, estimates: Estimates, *, truth: Recording |
     canvas = Canvas(ax)
     canvas.along(setup.length)
     _sensor_ticks(canvas, setup)
-    has_force = np.isfinite(estimates.force) & (estimates.covariance[:, 5] > 0)
+    has_force = np.isfinite(estimates.force) & (estimates.covariance[:, 2, 2] > 0)
     return (_with_force if has_force.any() else _in_order)(canvas, estimates, truth)
 
 
 def _over(canvas: Canvas, estimates: Estimates, truth: Recording | None) -> Axes:
     """Contacts over a plane."""
     x, y = 1e3 * estimates.x, 1e3 * (estimates.y if estimates.y is not None else estimates.x)
-    xx, xy, _, yy, _, _ = 1e6 * estimates.covariance.T
-    _ellipses(canvas, x, y, xx, xy, yy)
+    _ellipses(canvas, x, y, 1e6 * estimates.covariance[:, :2, :2])
     if truth is not None:
         _truth(canvas, *(1e3 * truth.positions[truth.touches].T))
     _by_status(canvas, x, y, estimates)
@@ -89,8 +88,8 @@ def _over(canvas: Canvas, estimates: Estimates, truth: Recording | None) -> Axes
 def _with_force(canvas: Canvas, estimates: Estimates, truth: Recording | None) -> Axes:
     """Contacts on a line, with their forces."""
     x, force = 1e3 * estimates.x, estimates.force
-    xx, _, xf, _, _, ff = estimates.covariance.T
-    _ellipses(canvas, x, force, 1e6 * xx, 1e3 * xf, ff)
+    to_mm_and_n = np.array([[1e6, 1e3], [1e3, 1.0]])
+    _ellipses(canvas, x, force, estimates.covariance[:, ::2, ::2] * to_mm_and_n)
     if truth is not None:
         known = truth.touches & np.isfinite(truth.force)
         _truth(canvas, 1e3 * truth.x[known], truth.force[known])
@@ -132,15 +131,16 @@ def _truth(canvas: Canvas, x: Floats, y: Any) -> None:
     canvas.markers(x, y, 0, "true", "+", color=canvas.ink, markersize=1.8 * canvas.marker_size, zorder=3.5)
 
 
-def _ellipses(canvas: Canvas, x: Floats, y: Floats, xx: Floats, xy: Floats, yy: Floats) -> None:
+def _ellipses(canvas: Canvas, x: Floats, y: Floats, covariances: Floats) -> None:
     """95 % regions of normal distributions, in the units of the axes."""
-    known = np.isfinite(x + y + xx + xy + yy) & (xx > 0)
+    known = np.isfinite(x + y + covariances.sum((1, 2))) & (np.trace(covariances, axis1=1, axis2=2) > 0)
     if not known.any():
         return
-    matrices = np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -2)[known]
     turn = np.linspace(0, 2 * np.pi, 61)
     circle = _OF_95_OF_TWO * np.stack([np.cos(turn), np.sin(turn)])
-    roots = np.linalg.cholesky(matrices + 1e-12 * np.trace(matrices, axis1=-2, axis2=-1)[:, None, None] * np.eye(2))
+    # By eigenvalues, as a covariance may be singular, or indefinite by rounding.
+    variances, axes = np.linalg.eigh(covariances[known])
+    roots = axes * np.sqrt(np.maximum(variances, 0.0))[:, None, :]
     outlines = np.einsum("nij,jk->nki", roots, circle) + np.stack([x[known], y[known]], -1)[:, None, :]
     colour = canvas.colour(0)
     regions = PolyCollection(list(outlines), facecolor=colors.to_rgba(colour, 0.25), edgecolor=colour, linewidth=0.8, label="95 % region")

@@ -7,7 +7,7 @@ use crate::tare::{Taken, TareOption, Taring};
 use crate::{input, output};
 use palpate_estimators::digit::{DigitShape, ShapePoint};
 use palpate_estimators::estimate_record::{ContactRecord, EstimateRecord};
-use palpate_estimators::estimator::{Estimate, Locator, Uncertainty};
+use palpate_estimators::estimator::{Estimate, Locator, Status};
 use palpate_estimators::recording::csv_row;
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
@@ -29,7 +29,10 @@ pub struct Arguments {
     dead: Vec<usize>,
     #[command(flatten)]
     tare: TareOption,
-    /// Print one JSON object a line instead of CSV
+    /// Print the best guess of readings that are `no_contact` or `outside_model`, too; their cells are empty otherwise
+    #[arg(long, conflicts_with = "json")]
+    all: bool,
+    /// Print one JSON object a line instead of CSV; it has the best guess of every reading
     #[arg(long)]
     json: bool,
     /// Add the shape of a flexible digit to every estimate, at so many points from clamp to tip
@@ -53,9 +56,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let records = if arguments.json { Records::Json } else { Records::None };
     let mut readings = Readings::new(Lines::open(path, records)?, &locator.setup, arguments.no_header);
     let extent = locator.setup.surface().extent();
+    let columns = Columns { extent, contacts: locator.most_contacts(), has_all: arguments.all };
     let mut out = std::io::stdout().lock();
     if !arguments.json {
-        output::print(&mut out, heading(extent).as_bytes())?;
+        output::print(&mut out, columns.heading().as_bytes())?;
     }
     while let Some(mut reading) = readings.next()? {
         let estimate = match locate(&locator, taring.as_mut(), &mut reading) {
@@ -68,13 +72,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let line = readings.lines.count;
         let text = match &estimate {
             None if arguments.json => untouched_json(line)?,
-            None => untouched_csv(line, extent),
+            None => columns.untouched_csv(line),
             Some(estimate) if arguments.json => {
                 let shape =
                     arguments.shape.and_then(|points| locator.shape(estimate, usize::from(points) - 1));
                 json(estimate, line, extent, shape.as_ref())?
             }
-            Some(estimate) => csv(estimate, line, extent),
+            Some(estimate) => columns.csv(estimate, line),
         };
         output::print(&mut out, text.as_bytes())?;
         // A reader at the other end of a pipe wants each estimate now.
@@ -107,53 +111,79 @@ fn locate(
 /// The status of a reading that is taken for an untouched one, and is not located.
 const TARE: &str = "tare";
 
-fn untouched_csv(line: u64, extent: Extent) -> String {
-    let empty = std::iter::repeat_n(String::new(), heading(extent).matches(',').count() - 1);
-    csv_row(std::iter::once(line.to_string()).chain(empty).chain([TARE.to_owned()]))
-}
-
 fn untouched_json(line: u64) -> Result<String, Failure> {
     json_line(&object! { "line": line, "status": TARE })
 }
 
-/// The columns of [`csv`].
-fn heading(extent: Extent) -> &'static str {
-    match extent {
-        Extent::Line { .. } => {
-            "line,position_mm,force_n,low_mm,high_mm,force_low_n,force_high_n,trade_off,status\n"
-        }
-        Extent::Plane { .. } => {
-            "line,x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,force_low_n,force_high_n,trade_off,status\n"
-        }
+/// Columns of the CSV. Cells of what a locator does not estimate are empty.
+#[derive(Clone, Copy)]
+struct Columns {
+    extent: Extent,
+    /// Largest number of contacts of an estimate.
+    contacts: usize,
+    /// Whether readings without a located contact have their best guess.
+    has_all: bool,
+}
+
+impl Columns {
+    fn heading(self) -> String {
+        let first = match self.extent {
+            Extent::Line { .. } => "position_mm,force_n,low_mm,high_mm,force_low_n,force_high_n",
+            Extent::Plane { .. } => {
+                "x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,force_low_n,force_high_n"
+            }
+        };
+        let further: String = (2..=self.contacts)
+            .map(|n| {
+                format!(
+                    ",position_{n}_mm,force_{n}_n,low_{n}_mm,high_{n}_mm,force_low_{n}_n,force_high_{n}_n"
+                )
+            })
+            .collect();
+        format!("line,{first},trade_off,status{further}\n")
     }
-}
 
-/// An estimate as a line of CSV: the line of its reading, position, force, the ends of the 95 % intervals of place and force, what trades off, status.
-/// What a locator does not estimate stays empty.
-fn csv(estimate: &Estimate, line: u64, extent: Extent) -> String {
-    let contact = &estimate.contact;
-    let mm = |at_m: f64| format!("{:.4}", at_m * 1e3);
-    let mut cells = vec![line.to_string()];
-    cells.extend(extent.coordinates_m(contact.position).map(mm));
-    cells.push(contact.force_n.map_or_else(String::new, |force_n| format!("{force_n:.4}")));
-    cells.extend(match contact.uncertainty {
-        None => vec![String::new(); 2 * extent.dimensions()],
-        Some(Uncertainty { x_95_m: x, y_95_m: y, .. }) => {
-            [x.0, x.1, y.0, y.1].map(mm).into_iter().take(2 * extent.dimensions()).collect()
+    /// Line of an estimate. One of `no_contact` or `outside_model` has its line and status alone, so that its best guess enters no average unasked.
+    fn csv(self, estimate: &Estimate, line: u64) -> String {
+        let has_contact = matches!(estimate.status, Status::Located | Status::Ambiguous);
+        let contacts = std::iter::once(&estimate.contact).chain(estimate.further.as_slice());
+        let shown = contacts.filter(|_| has_contact || self.has_all);
+        let records: Vec<ContactRecord> =
+            shown.map(|contact| ContactRecord::new(contact, self.extent)).collect();
+        self.row(line, &records, estimate.status.name())
+    }
+
+    /// Line of a reading that is taken for an untouched one.
+    fn untouched_csv(self, line: u64) -> String {
+        self.row(line, &[], TARE)
+    }
+
+    fn row(self, line: u64, contacts: &[ContactRecord], status: &str) -> String {
+        let mut cells = vec![line.to_string()];
+        cells.extend(self.cells(contacts.first()));
+        cells.push(contacts.first().and_then(|first| first.trade_off).unwrap_or_default().to_owned());
+        cells.push(status.to_owned());
+        for number in 1..self.contacts {
+            cells.extend(self.cells(contacts.get(number)));
         }
-    });
-    let record = ContactRecord::new(contact, extent);
-    cells.extend(force_cells(&record));
-    cells.push(record.trade_off.unwrap_or_default().to_owned());
-    cells.push(estimate.status.name().to_owned());
-    csv_row(cells)
-}
+        csv_row(cells)
+    }
 
-/// Cells of the ends of the force's 95 % interval; empty where it is not estimated.
-fn force_cells(contact: &ContactRecord) -> [String; 2] {
-    contact
-        .force_interval_95_n()
-        .map_or_else(Default::default, |ends_n| ends_n.map(|end_n| format!("{end_n:.4}")))
+    /// Cells of a contact: position, force, the ends of the 95 % intervals of position and force.
+    fn cells(self, contact: Option<&ContactRecord>) -> Vec<String> {
+        let is_plane = matches!(self.extent, Extent::Plane { .. });
+        let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.4}"));
+        let ends = |ends: Option<[f64; 2]>| [0, 1].map(|end| number(ends.map(|ends| ends[end])));
+        let mut cells = vec![number(contact.map(|contact| contact.x_mm))];
+        cells.extend(is_plane.then(|| number(contact.and_then(|contact| contact.y_mm))));
+        cells.push(number(contact.and_then(|contact| contact.force_n)));
+        cells.extend(ends(contact.and_then(|contact| contact.x_95_mm)));
+        if is_plane {
+            cells.extend(ends(contact.and_then(|contact| contact.y_95_mm)));
+        }
+        cells.extend(ends(contact.and_then(ContactRecord::force_interval_95_n)));
+        cells
+    }
 }
 
 /// A line of JSON: all that the locator says of the reading in line `line` of its source, and the shape where it is asked for.

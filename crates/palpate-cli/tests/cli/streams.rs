@@ -1,7 +1,7 @@
 //! Streams of readings as instruments send them: torn, endless and bad lines, and which answer belongs to which line.
 
 use crate::support::command::{complained, folder, palpate, run, said};
-use crate::support::examples::{LOAD_PROFILE, MOVING_LOAD, NOISY_BEAM};
+use crate::support::examples::{LOAD_PROFILE, MOVING_LOAD, NOISY_BEAM, TWO_MOVING_LOADS};
 use crate::support::toml::Toml;
 use serde_json::Value;
 use std::fs;
@@ -143,4 +143,41 @@ fn tracks_and_profiles_say_their_lines_too() {
     let told = records(&output);
     assert_eq!(told.iter().map(|record| &record["line"]).collect::<Vec<_>>(), [1, 2, 3]);
     assert!(told[1]["skipped"].is_string());
+}
+
+#[test]
+fn estimates_without_a_contact_have_no_place_unless_asked() {
+    let bench = bench();
+    let none = "-1.2,-2.2,-3.0,-3.4,-3.4,-3.0,-2.2,-1.2";
+    let locate = ["locate", "locator.json", "--no-header"];
+    let cells = |more: &[&str]| {
+        let output = fed(bench.path(), &[&locate[..], more].concat(), none.as_bytes());
+        lines(&output)[1].split(',').map(str::to_owned).collect::<Vec<_>>()
+    };
+    let row = cells(&[]);
+    assert_eq!((row[0].as_str(), row[8].as_str()), ("1", "outside_model"));
+    assert!(row[1..8].iter().all(String::is_empty), "{row:?}");
+    let row = cells(&["--all"]);
+    assert!(row[1].parse::<f64>().is_ok() && row[8] == "outside_model", "{row:?}");
+}
+
+#[test]
+fn a_second_contact_has_columns_of_its_own() {
+    let folder = folder(TWO_MOVING_LOADS);
+    let path = folder.path();
+    said(&run(path, &["fit", "rig.toml", "-o", "locator.json"]));
+    said(&run(path, &["simulate", "rig.toml", "--moving", "-o", "moving.csv", "--seed", "1"]));
+    let located = said(&run(path, &["locate", "locator.json", "moving.csv"]));
+    let rows: Vec<Vec<&str>> = located.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows[0][8..10], ["status", "position_2_mm"]);
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()));
+    let json = said(&run(path, &["locate", "locator.json", "moving.csv", "--json"]));
+    let mut two = 0;
+    for (line, row) in json.lines().zip(&rows[1..]) {
+        let record: Value = serde_json::from_str(line).unwrap();
+        let second = record["further"][0]["x_mm"].as_f64().filter(|_| row[8] == "located");
+        assert_eq!(second.map_or(String::new(), |x_mm| format!("{x_mm:.4}")), row[9], "{line}");
+        two += usize::from(second.is_some());
+    }
+    assert!(two > rows.len() / 10, "{two} of {}", rows.len());
 }

@@ -30,7 +30,7 @@ fn touches(board: &mut Board) -> Vec<Touch> {
 
 /// Mean error of the touches, in millimetres, and the share of untouched rows behind the first that are `no_contact`.
 fn judged(folder: &Path, touches: &[Touch], options: &[&str]) -> (f64, f64) {
-    let located = said(&run(folder, &[&["locate", "board.json", "touches.csv"], options].concat()));
+    let located = said(&run(folder, &[&["locate", "board.json", "touches.csv", "--all"], options].concat()));
     let rows: Vec<Vec<&str>> = located.lines().skip(1).map(|line| line.split(',').collect()).collect();
     assert_eq!(rows.len(), touches.len());
     let (mut errors, mut untouched) = (Vec::new(), Vec::new());

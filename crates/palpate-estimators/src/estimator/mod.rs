@@ -335,6 +335,14 @@ pub enum LeaveOutError {
 }
 
 impl Locator {
+    /// Largest number of contacts of an estimate; 1 on a plane.
+    pub fn most_contacts(&self) -> usize {
+        match &self.method {
+            Method::Influence(InfluenceLocator::Beam(beam)) => beam.contacts(),
+            _ => 1,
+        }
+    }
+
     /// The shape that the surface has by an estimate, at `steps` + 1 points; `None` for a method that does not tell it.
     pub fn shape(&self, estimate: &Estimate, steps: usize) -> Option<DigitShape> {
         match &self.method {
