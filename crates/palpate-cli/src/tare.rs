@@ -18,9 +18,9 @@ use std::str::FromStr;
 /// Source of the baseline.
 #[derive(clap::Args)]
 pub struct TareOption {
-    /// Take what the channels read untouched today from the first N readings, from a FILE of untouched readings, or find and follow it
-    /// (`auto`), and bring every reading to what calibration learnt
-    #[arg(long, value_name = "N|FILE|auto")]
+    /// Take the untouched reading of today from the first N readings, from a FILE of untouched readings, find and follow it (`auto`), or take
+    /// the first N and follow from there (`N,auto`); every reading is brought to the untouched reading of the calibration
+    #[arg(long, value_name = "N|FILE|auto|N,auto")]
     pub tare: Option<Source>,
 }
 
@@ -55,17 +55,38 @@ pub enum Source {
     First(u64),
     /// All of a file.
     File(PathBuf),
-    /// Those that the locator's own rule finds.
-    Auto,
+    /// So many of the first ones, and those that the locator's own rule finds behind them.
+    Auto {
+        /// Readings from the beginning that are known to be untouched.
+        first: u64,
+    },
+}
+
+impl Source {
+    /// Readings from the beginning that are known to be untouched.
+    fn first(&self) -> u64 {
+        match self {
+            Self::First(count) | Self::Auto { first: count } => *count,
+            Self::File(_) => 0,
+        }
+    }
 }
 
 impl FromStr for Source {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        if let Some(first) = text.strip_suffix(",auto") {
+            return match first.parse() {
+                Ok(first) if first > 0 => Ok(Self::Auto { first }),
+                _ => {
+                    Err(format!("`{first}` must be a whole number of readings, at least 1, as in `20,auto`"))
+                }
+            };
+        }
         let is_number = text.contains(|c: char| c.is_ascii_digit()) && text.parse::<f64>().is_ok();
         match text {
-            "auto" => Ok(Self::Auto),
+            "auto" => Ok(Self::Auto { first: 0 }),
             "-" => Err("untouched readings cannot come from stdin; name a file".to_owned()),
             _ if is_number => match text.parse() {
                 Ok(count) if count > 0 => Ok(Self::First(count)),
@@ -120,7 +141,7 @@ impl<'a> Taring<'a> {
         match source {
             Source::File(path) => taring.read(&path, no_header)?,
             Source::First(_) => {}
-            Source::Auto if locator.false_alarm_rate().is_none() => {
+            Source::Auto { .. } if locator.false_alarm_rate().is_none() => {
                 let complaint = format!(
                     "--tare auto: a locator of kind `{}` does not tell untouched readings from contacts",
                     locator.kind()
@@ -129,7 +150,7 @@ impl<'a> Taring<'a> {
                     .help("--tare N takes the first N readings for untouched, --tare FILE those of a file")
                     .into());
             }
-            Source::Auto => {}
+            Source::Auto { .. } => {}
         }
         Ok(Some(taring))
     }
@@ -154,16 +175,16 @@ impl<'a> Taring<'a> {
 
     /// Takes a reading, which is the tared one afterwards.
     pub fn take(&mut self, reading: &mut [f64]) -> Result<Taken, TareError> {
-        match self.source {
-            Source::First(needed) if self.count < needed => {
-                self.add(reading)?;
-                if self.count == needed {
-                    self.look_again();
-                }
-                return Ok(Taken::Baseline);
+        if self.count < self.source.first() {
+            self.add(reading)?;
+            if self.count == self.source.first() {
+                self.look_again();
             }
+            return Ok(Taken::Baseline);
+        }
+        match self.source {
             Source::First(_) | Source::File(_) => self.tare.apply(reading, &mut self.tared)?,
-            Source::Auto => {
+            Source::Auto { .. } => {
                 let estimate = self.locator.locate_following(&mut self.tare, reading, &mut self.tared)?;
                 self.count += u64::from(estimate.status == Status::NoContact);
                 self.unexplained += u64::from(estimate.status == Status::OutsideModel);
@@ -210,8 +231,10 @@ impl<'a> Taring<'a> {
         let Some((channel, value)) = most else { return };
         let sensor = &self.locator.setup.layout().sensors()[channel];
         let from = match self.source {
-            Source::Auto => format!("{} untouched readings that were found", format_count(self.count)),
-            Source::First(_) | Source::File(_) => format!("the mean of {} readings", self.count),
+            Source::Auto { first } if self.count > first => {
+                format!("{} untouched readings that were found", format_count(self.count - first))
+            }
+            _ => format!("the mean of {} readings", self.count),
         };
         let moved = Quantity { value, dimension: sensor.kind.dimension() };
         remark!("palpate: tare from {from}; {} has moved most, by {moved}", sensor.name);
@@ -244,16 +267,16 @@ impl<'a> Taring<'a> {
     /// # Errors
     /// A failure where there were fewer readings than make the baseline.
     pub fn finish(&self, source: &str) -> Result<(), Failure> {
-        match self.source {
-            Source::First(needed) if self.count < needed => {
-                let complaint = format!(
-                    "--tare {needed}: {source} holds {} readings; the first {needed} are to be the untouched ones",
-                    self.count
-                );
-                return Err(Complaint::new(complaint).help("give fewer, or record longer").into());
-            }
-            Source::Auto => self.say_followed(source),
-            Source::First(_) | Source::File(_) => {}
+        let needed = self.source.first();
+        if self.count < needed {
+            let complaint = format!(
+                "--tare {needed}: {source} holds {} readings; the first {needed} are to be the untouched ones",
+                self.count
+            );
+            return Err(Complaint::new(complaint).help("give fewer, or record longer").into());
+        }
+        if let Source::Auto { .. } = self.source {
+            self.say_followed(source);
         }
         Ok(())
     }
@@ -268,7 +291,7 @@ pub fn tare_splits(
     splits: &mut [Split],
 ) -> Result<(), Failure> {
     match option.tare {
-        Some(Source::Auto) => {}
+        Some(Source::Auto { first: 0 }) => {}
         Some(_) => {
             let complaint =
                 "--tare N and --tare FILE are for a locator: a rig is judged by folds of one recording";

@@ -58,7 +58,7 @@ fn a_board_that_moved_is_as_good_as_a_fresh_one_with_a_tare() {
     let moved = judged(folder.path(), &touches, &[]);
     println!("fresh {fresh:?}, moved {moved:?}");
     assert!(fresh.1 > 0.95 && moved.1 < 0.1 && moved.0 > 5.0 * fresh.0, "{fresh:?} {moved:?}");
-    for tare in [FIRST.to_string().as_str(), "untouched.csv", "auto"] {
+    for tare in [FIRST.to_string().as_str(), "untouched.csv", "auto", &format!("{FIRST},auto")] {
         let tared = judged(folder.path(), &touches, &["--tare", tare]);
         println!("--tare {tare}: {tared:?}");
         assert!(tared.0 < 1.15 * fresh.0 + 0.1, "--tare {tare}: {tared:?}, fresh {fresh:?}");
@@ -207,8 +207,19 @@ fn bad_tares_are_refused() {
         complained(&run(folder.path(), &["locate", locator, "few.csv", &option]), 2)
     };
     let mut shown = Vec::new();
-    let tares =
-        ["4", "0", "-3", "2.5", "-", "nowhere.csv", "broken.csv", "narrow.csv", "empty.csv", "header.csv"];
+    let tares = [
+        "4",
+        "0",
+        "-3",
+        "2.5",
+        "0,auto",
+        "-",
+        "nowhere.csv",
+        "broken.csv",
+        "narrow.csv",
+        "empty.csv",
+        "header.csv",
+    ];
     for tare in tares {
         shown.push(refused("board.json", tare));
     }
