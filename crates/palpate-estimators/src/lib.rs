@@ -41,6 +41,7 @@ pub mod influence;
 pub mod lightest_touch;
 pub mod likelihood;
 pub mod load_profile;
+mod locator_fault;
 pub mod neighbours;
 pub mod network;
 pub mod offset_course;

@@ -12,7 +12,7 @@
 //! Statistical Society B* 9, 1947). R is the sample's, whose eigenvalues scatter more than those of the
 //! surface: with few rests of unrelated channels the test is conservative.
 
-use crate::fit::LocatorFault;
+use crate::locator_fault::LocatorFault;
 use crate::recording::Recording;
 use crate::status::FalseAlarmRate;
 use palpate_numerics::{chi_squared_critical_value, mean};
