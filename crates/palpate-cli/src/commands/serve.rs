@@ -18,6 +18,7 @@ use palpate_live::server::{Access, AccessError, CalibrationPlan, Live, LiveError
 use palpate_live::simulated_board::BoardConfig;
 use palpate_live::source::SourceUrl;
 use palpate_live::stage::StageUrl;
+use palpate_live::stamp::HostClock;
 use palpate_mechanics::surface::Extent;
 use palpate_rig::Rig;
 use std::net::SocketAddr;
@@ -107,7 +108,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let live = match calibration(arguments)? {
         Some(plan) => {
             let rules = rules_of(arguments, plan.rig.setup.surface().extent())?;
-            with_rules(configured(Live::calibrating(plan, PathBuf::new()), arguments), rules)
+            with_rules(
+                configured(Live::calibrating(plan, PathBuf::new(), HostClock::new()), arguments),
+                rules,
+            )
         }
         None => match (&arguments.locator, &arguments.from) {
             (None, Some(from)) => bringing_up(from, arguments)?,

@@ -3,9 +3,10 @@
 use super::lock::locked;
 use super::machine::{Attendance, UNWATCHED};
 use super::shared::Shared;
-use crate::calibration::{Machine, MachineError, MachineNote, Motion, Waiting};
+use crate::calibration::{Machine, MachineError, MachineNote, Motion, SetUpTask};
 use crate::input::Input;
 use crate::stage::{StageThread, StageUrl};
+use crate::stamp::HostClock;
 use palpate_rig::Stage;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -34,17 +35,20 @@ pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
 pub struct MachineRun {
     pub url: StageUrl,
     pub stage: Stage,
+    /// First tasks of a machine that is set up; `None` of one that presses.
+    pub set_up: Option<Vec<SetUpTask>>,
     /// Set, the machine is stopped whatever it does.
     pub stop: Arc<AtomicBool>,
     pub attendance: Arc<Attendance>,
+    pub clock: HostClock,
 }
 
 impl MachineRun {
-    /// Presses until all is pressed or the machine ends; what ended it early is the problem of `shared`.
-    pub fn press(self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
+    /// Has the machine work until all is done or it ends; what ended it early is the problem of `shared`.
+    pub fn run(self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
         self.attendance.note();
         self.attendance.set_needed(true);
-        let outcome = self.try_to_press(inputs, shared);
+        let outcome = self.try_to_run(inputs, shared);
         self.attendance.set_needed(false);
         let mut shared = locked(shared);
         let left_out = shared.machine.left_out;
@@ -57,14 +61,24 @@ impl MachineRun {
         }
     }
 
-    fn try_to_press(&self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) -> Result<(), MachineError> {
-        let thread = StageThread::open(&self.url, self.stage.clone(), Arc::clone(&self.stop))?;
+    fn try_to_run(&self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) -> Result<(), MachineError> {
+        let thread = StageThread::open(&self.url, self.stage.clone(), Arc::clone(&self.stop), self.clock)?;
         {
             let machine = &mut locked(shared).machine;
             machine.firmware = Some(thread.firmware().name());
             machine.stopping = Some(thread.stopping());
         }
-        let mut machine = Machine::new(thread, self.stage.force_limit_n);
+        let now = self.clock.elapsed();
+        let mut machine = match &self.set_up {
+            None => Machine::new(thread, self.stage.force_limit_n, now),
+            Some(tasks) => {
+                let mut machine = Machine::to_set_up(thread, self.stage.clone(), now);
+                tasks.iter().cloned().for_each(|task| {
+                    machine.ask(task);
+                });
+                machine
+            }
+        };
         loop {
             let arrived = match inputs.recv_timeout(LOOK) {
                 Ok(Input::Arrived(arrived)) => Some(arrived),
@@ -83,11 +97,17 @@ impl MachineRun {
             let mut shared = locked(shared);
             let notes = arrived.map(|arrived| shared.receive(&arrived)).unwrap_or_default();
             machine.heed(&notes)?;
-            if let Some(MachineNote::Unseen | MachineNote::NoRest) = machine.step(&mut shared.calibration)? {
-                shared.machine.left_out += 1;
+            while let Some(task) = shared.tasks.pop_front() {
+                machine.ask(task);
             }
-            shared.machine.take(&machine, &notes);
-            if shared.calibration.guide().waiting() == Waiting::Nothing {
+            let now = self.clock.elapsed();
+            match machine.step(now, &mut shared.calibration)? {
+                Some(MachineNote::Unseen | MachineNote::NoRest) => shared.machine.left_out += 1,
+                Some(MachineNote::SetUp(note)) => shared.take_set_up(note),
+                Some(MachineNote::Homing) | None => {}
+            }
+            shared.machine.take(now, &machine, &notes);
+            if machine.is_done(&shared.calibration) {
                 shared.machine.motion = Some(Motion::Lifting);
                 break;
             }

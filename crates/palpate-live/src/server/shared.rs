@@ -1,8 +1,9 @@
 //! A calibration that runs, between the thread that presses and the requests that look at it.
 
 use super::machine::MachineState;
-use crate::calibration::{Calibration, CalibrationError, Note, last_deviation_percent};
+use crate::calibration::{Calibration, CalibrationError, Note, SetUpNote, SetUpTask, last_deviation_percent};
 use crate::input::Arrived;
+use std::collections::VecDeque;
 
 /// A calibration that runs, as its thread leaves it for others to see.
 pub struct Shared {
@@ -13,6 +14,8 @@ pub struct Shared {
     /// Why a press is asked for again, or what a step that takes long waits for.
     pub hint: Option<String>,
     pub machine: MachineState,
+    /// Tasks of a machine that is set up, which its thread has not taken yet.
+    pub tasks: VecDeque<SetUpTask>,
 }
 
 impl Shared {
@@ -52,6 +55,14 @@ impl Shared {
             }
             Note::Waits(_) | Note::Untouched | Note::Overload(_) => {}
         }
+    }
+
+    /// Takes what a task of the set-up brought.
+    pub fn take_set_up(&mut self, note: SetUpNote) {
+        if let SetUpNote::Touch(z_m) = note {
+            self.machine.touch_z_m = Some(z_m);
+        }
+        self.hint = Some(note.to_string());
     }
 
     /// A press that is not on disk: the guide must not go on from it.
