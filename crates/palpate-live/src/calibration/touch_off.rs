@@ -230,3 +230,105 @@ impl TouchOff {
         TouchOffAction::Wait
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    const TOUCH_M: f64 = 0.0217;
+    /// Distance of two readings.
+    const EVERY: Duration = Duration::from_millis(10);
+
+    /// A stage whose `touch` is 0.3 mm too high, as it stands above the surface.
+    fn stage() -> Stage {
+        Stage {
+            origin_m: (0.0, 0.0),
+            touch_z_m: 0.022,
+            clearance_m: 5e-3,
+            depths_m: vec![1e-3, 2e-3],
+            travel_m_per_s: 0.05,
+            press_m_per_s: 2e-3,
+            load_cell: None,
+            force_limit_n: None,
+            dtr_reset: false,
+        }
+    }
+
+    /// Outcome of a search over a surface whose reading follows from the finger's height and the time; with the lowest height and the time.
+    fn search(
+        setup: &Stage,
+        read: impl Fn(f64, f64) -> Vec<f64>,
+    ) -> (Result<f64, TouchOffFailure>, f64, Duration) {
+        let (mut detector, mut search) = (TouchDetector::default(), TouchOff::new(setup));
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+        let travel_m = setup.travel_z_m();
+        let (mut z_m, mut lowest_m) = (travel_m, travel_m);
+        let (mut now, mut since) = (Duration::ZERO, Duration::ZERO);
+        loop {
+            now += EVERY;
+            let mut reading = read(z_m, now.as_secs_f64());
+            reading.iter_mut().for_each(|value| {
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                *value += noise;
+            });
+            detector.add(now, &reading);
+            z_m = match search.next(now - since, &mut detector) {
+                TouchOffAction::Wait => continue,
+                TouchOffAction::Lower(z_m) => z_m,
+                TouchOffAction::Lift => travel_m,
+                TouchOffAction::Found(z_m) => return (Ok(z_m), lowest_m, now),
+                TouchOffAction::Failed(failure) => return (Err(failure), lowest_m, now),
+            };
+            detector.forget_readings();
+            (since, lowest_m) = (now, lowest_m.min(z_m));
+        }
+    }
+
+    /// 3,000 counts a millimetre, of two channels with an offset and a noise of 1 count.
+    fn counts(z_m: f64) -> Vec<f64> {
+        let depth_mm = (TOUCH_M - z_m).max(0.0) * 1e3;
+        vec![500.0 + 3000.0 * depth_mm, -80.0 - 900.0 * depth_mm]
+    }
+
+    #[test]
+    fn finds_the_touch_by_the_channels_within_a_fine_step() {
+        let (found, lowest_m, time) = search(&stage(), |z_m, _| counts(z_m));
+        let found_m = found.unwrap();
+        // A fine step is 0.01 mm.
+        assert!((-1.5e-5..=1e-9).contains(&(found_m - TOUCH_M)), "{found_m}");
+        assert!(TOUCH_M - lowest_m <= 1.001e-4, "it presses no deeper than a coarse step: {lowest_m}");
+        assert!(time < Duration::from_secs(20), "{time:?}");
+    }
+
+    #[test]
+    fn a_weak_reading_is_found_where_it_exceeds_the_noise() {
+        // 20 counts a millimetre: the touch shows 0.4 mm below the surface.
+        let weak = |z_m: f64, _| vec![20.0 * (TOUCH_M - z_m).max(0.0) * 1e3];
+        let found_m = search(&stage(), weak).0.unwrap();
+        assert!((3e-4..6e-4).contains(&(TOUCH_M - found_m)), "{found_m}");
+    }
+
+    #[test]
+    fn ends_at_the_deepest_press_without_a_touch() {
+        let (found, lowest_m, _) = search(&stage(), |_, _| vec![500.0]);
+        assert!((lowest_m - stage().lowest_z_m()).abs() < 1e-12);
+        assert!(matches!(found, Err(TouchOffFailure::NoTouch { .. })), "{found:?}");
+    }
+
+    #[test]
+    fn drift_is_no_touch() {
+        // 5 counts a second: 8 standard deviations of the noise in less than 2 s.
+        let (found, ..) = search(&stage(), |_, time_s| vec![500.0 + 5.0 * time_s]);
+        assert_eq!(found, Err(TouchOffFailure::NoReturn));
+    }
+
+    #[test]
+    fn a_surface_that_swings_has_no_untouched_reading() {
+        let swings = |_, time_s: f64| vec![500.0 + 400.0 * (3.0 * time_s).sin()];
+        let (found, lowest_m, _) = search(&stage(), swings);
+        assert_eq!((found, lowest_m), (Err(TouchOffFailure::NoRest), stage().travel_z_m()));
+    }
+}

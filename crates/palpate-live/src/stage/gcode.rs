@@ -195,7 +195,8 @@ impl<L: StageLink> GcodeStage<L> {
         if self.is_below_travel() {
             self.lift()?;
         }
-        let Some(at_mm) = self.at_mm else { return self.end_of(Err(Fault::NotHomed)) };
+        self.heed_stop()?;
+        let at_mm = self.at_mm.ok_or(StageError::NotHomed)?;
         let lowest_mm = [f64::NEG_INFINITY, f64::NEG_INFINITY, self.travel_z_mm()];
         let to_mm: [f64; 3] =
             std::array::from_fn(|axis| (at_mm[axis] + by_m[axis] * 1e3).max(lowest_mm[axis]));
