@@ -40,6 +40,20 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     expect(await says(page, "machine-moves", /presses 18 times, down to z 21 and 20 mm/)).toContain("It looks for its end stops first");
     expect(await page.locator("#machine-stop").isVisible()).toBe(false);
     await picture(page, "machine-ready");
+    await page.locator("#calibration-dry-run").click();
+    await says(page, "calibration-why", /^dry run: 9 positions reached at the height of travel, none pressed$/);
+    await page.locator("#calibration-set-up").click();
+    await says(page, "calibration-step", /^Jog the machine, or find the touch$/);
+    await page.locator("#machine-step").selectOption("10");
+    for (const x of [10, 20, 30, 40, 50, 60, 70]) {
+      await page.locator("#machine-jogs button", { hasText: "x +" }).click();
+      await says(page, "machine-at", new RegExp(`^x ${x}, y 0, z 27 mm$`));
+    }
+    await page.locator("#machine-touch-off").click();
+    await says(page, "calibration-why", /^the finger touches at z 2[12]\.\d+ mm/);
+    await picture(page, "machine-set-up");
+    await page.locator("#calibration-stop").click();
+    await says(page, "machine-moves", /The untouched surface is at z 2[12]\.\d+ mm/);
     await page.locator("#calibration-begin").click();
     await taken(page, 3);
     await says(page, "calibration-step", /^Pressing at [\d.]+ mm, [12] mm deep$/);
@@ -59,6 +73,9 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await page.locator("#calibration-finish").click();
     await says(page, "calibration-step", /^Fitted to 18 presses: error at positions held out [\d.]+ mm/);
     expect(existsSync(bench.path("locator.json"))).toBe(true);
+    await page.locator("#calibration-check").click();
+    await says(page, "calibration-checked-words", /\(median\).* of 5 within their 95 % intervals/);
+    await picture(page, "machine-checked");
     await bench.press(55);
     await dotAt(page, 55);
     await picture(page, "machine-done");
