@@ -41,7 +41,7 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     expect(await page.locator("#machine-stop").isVisible()).toBe(false);
     await picture(page, "machine-ready");
     await page.locator("#calibration-dry-run").click();
-    await says(page, "calibration-why", /^dry run: 9 positions reached at the height of travel, none pressed$/);
+    await says(page, "calibration-why", /^Dry run: 9 positions reached at the height of travel, none pressed\.$/);
     await page.locator("#calibration-set-up").click();
     await says(page, "calibration-step", /^Jog the machine, or find the touch$/);
     await page.locator("#machine-step").selectOption("10");
@@ -50,7 +50,7 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
       await says(page, "machine-at", new RegExp(`^x ${x}, y 0, z 27 mm$`));
     }
     await page.locator("#machine-touch-off").click();
-    await says(page, "calibration-why", /^the finger touches at z 2[12]\.\d+ mm/);
+    await says(page, "calibration-why", /^The finger touches at z 2[12]\.\d+ mm/);
     await picture(page, "machine-set-up");
     await page.locator("#calibration-stop").click();
     await says(page, "machine-moves", /The untouched surface is at z 2[12]\.\d+ mm/);

@@ -149,6 +149,7 @@ export class CalibrationPanel {
     };
     for (const { id, step } of BUTTONS) need(id).hidden = !shown[step];
     need("calibration-begin").firstChild!.textContent = beginWords(state);
+    need("calibration-stop").firstChild!.textContent = state.phase === "setting_up" ? "End the set-up " : "Stop early ";
     need("calibration-close").hidden = state.phase !== "done";
     writeStatements(state);
     this.preview.write(state, performance.now() / 1000);

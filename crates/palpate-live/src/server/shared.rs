@@ -62,7 +62,7 @@ impl Shared {
         if let SetUpNote::Touch(z_m) = note {
             self.machine.touch_z_m = Some(z_m);
         }
-        self.hint = Some(note.to_string());
+        self.hint = Some(sentence(&note.to_string()));
     }
 
     /// A press that is not on disk: the guide must not go on from it.
@@ -70,4 +70,11 @@ impl Shared {
         self.calibration.stop();
         self.problem = Some(error.to_string());
     }
+}
+
+/// Words as a sentence: with a capital letter and a full stop.
+fn sentence(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str())
 }

@@ -349,7 +349,7 @@ fn ends_with_its_words(firmware: Firmware, case: &FaultCase, words: &str) {
 /// A board that is reset while its finger rests on the surface is not driven on.
 #[test]
 fn reset_at_rest_ends_the_run() {
-    for firmware in [Firmware::Marlin, Firmware::Grbl] {
+    of_both_firmwares(|firmware| {
         let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::with(firmware, MachineConfig::default()));
         let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
         assert_eq!(step(&server, "begin").0, 200);
@@ -360,40 +360,40 @@ fn reset_at_rest_ends_the_run() {
         assert!(problem.contains("the machine was reset: it sent `"), "{firmware:?}: {problem}");
         assert_eq!(bench.machine.doubtful_moves(), 0, "{firmware:?}: {problem}");
         live.end();
-    }
+    });
 }
 
-/// Homing that takes long, with the `busy` of Marlin and the silence of GRBL, is waited for.
+/// Homing that takes longer than any other answer, with the `busy` of Marlin and the silence of GRBL, is waited for.
 #[test]
 fn slow_homing_is_waited_for() {
-    for firmware in [Firmware::Marlin, Firmware::Grbl] {
-        let config = "homing=12s,delay=50ms".parse().unwrap();
+    of_both_firmwares(|firmware| {
+        let config = "homing=6s,delay=50ms".parse().unwrap();
         let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::with(firmware, config));
         let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
         assert_eq!(step(&server, "begin").0, 200);
         let pressed = waited(&server, |state| state["taken"] == 1 || state["problem"].is_string());
         assert_eq!(pressed["problem"], Value::Null, "{firmware:?}");
         live.end();
-    }
+    });
+}
+
+/// Does the same with either firmware, both at once: their time is waiting.
+fn of_both_firmwares(test: fn(Firmware)) {
+    let runs = [Firmware::Marlin, Firmware::Grbl].map(|firmware| std::thread::spawn(move || test(firmware)));
+    runs.into_iter().for_each(|run| run.join().unwrap());
 }
 
 /// A dry run, jogs and a touch-off from the browser, whose height the presses use.
 #[test]
 fn a_machine_is_set_up_before_its_presses() {
-    for firmware in [Firmware::Marlin, Firmware::Grbl] {
+    of_both_firmwares(|firmware| {
         let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::with(firmware, MachineConfig::default()));
         let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
         let ask = |body: Value| post(&server, "/api/calibration", &body.to_string()).0;
-        assert_eq!(ask(json!({ "step": "touch_off" })), 409, "it is not connected");
+        assert_eq!(step(&server, "touch_off").0, 409, "it is not connected");
         assert_eq!(step(&server, "dry_run").0, 200);
         let flown = waited(&server, |state| state["phase"] == "ready");
-        assert!(
-            flown["hint"]
-                .as_str()
-                .unwrap()
-                .contains("4 positions reached at the height of travel, none pressed"),
-            "{flown}"
-        );
+        assert_eq!(flown["hint"], "Dry run: 4 positions reached at the height of travel, none pressed.");
         assert_eq!((&flown["taken"], &flown["problem"]), (&json!(0), &Value::Null));
 
         assert_eq!(step(&server, "set_up").0, 200);
@@ -403,20 +403,13 @@ fn a_machine_is_set_up_before_its_presses() {
             assert_eq!(ask(json!({ "step": "jog", "axis": "x", "by_mm": wrong })), 400, "{wrong}");
         }
         assert_eq!(ask(json!({ "step": "jog", "by_mm": 1 })), 400);
-        let home_mm = get(&server, "/api/calibration").1["machine"]["at_mm"].clone();
-        // Off the surface: the finger goes below it, and nothing touches.
-        assert_eq!(ask(json!({ "step": "touch_off" })), 200);
-        let missed = waited(&server, |state| state["hint"].is_string());
-        assert!(missed["hint"].as_str().unwrap().contains("shows a touch down to z 20.000 mm"), "{missed}");
         for _ in 0..7 {
             assert_eq!(ask(json!({ "step": "jog", "axis": "x", "by_mm": 10 })), 200);
         }
         // No jog leads below the height of travel.
         assert_eq!(ask(json!({ "step": "jog", "axis": "z", "by_mm": -10 })), 200);
-        let x_mm = home_mm[0].as_f64().unwrap() + 70.0;
-        let words = format!("the finger is at x {x_mm}, y 0, z 27 mm of the machine");
-        waited(&server, |state| state["hint"] == words.as_str());
-        assert_eq!(ask(json!({ "step": "touch_off" })), 200);
+        waited(&server, |state| state["hint"] == "The finger is at x 70, y 0, z 27 mm of the machine.");
+        assert_eq!(step(&server, "touch_off").0, 200);
         let touched = waited(&server, |state| state["machine"]["found_touch_mm"].is_number());
         let touch_mm = touched["machine"]["found_touch_mm"].as_f64().unwrap();
         assert!((touch_mm - 22.0).abs() < 0.06, "{firmware:?}: {touch_mm}");
@@ -427,7 +420,44 @@ fn a_machine_is_set_up_before_its_presses() {
         assert_eq!(ready["machine"]["moves"]["touch_z_mm"], touched["machine"]["found_touch_mm"]);
         assert!(!bench.machine.is_stopped() && !folder.path().join("presses.csv").exists());
         live.end();
-    }
+    });
+}
+
+/// A touch-off is stopped as presses are: by the button at once, by a fault with its words, and where nobody watches with its finger up.
+#[test]
+fn a_machine_that_is_set_up_stops_as_one_that_presses() {
+    of_both_firmwares(|firmware| {
+        let down = |config: &str| {
+            let (folder, bench) =
+                (tempfile::tempdir().unwrap(), Bench::with(firmware, config.parse().unwrap()));
+            let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
+            assert_eq!(step(&server, "set_up").0, 200);
+            assert_eq!(step(&server, "touch_off").0, 200);
+            (folder, bench, live, server)
+        };
+        let (_folder, bench, live, server) = down("");
+        waited(&server, |state| state["machine"]["motion"] == "down");
+        assert_eq!(post(&server, "/api/emergency-stop", "{}").0, 200);
+        let stopped = waited(&server, |state| state["phase"] == "ready");
+        assert!(stopped["problem"].as_str().unwrap().contains("stopped by hand"), "{stopped}");
+        bench.is_told_to_stop();
+        live.end();
+
+        // The third step down.
+        let (_folder, bench, live, server) = down("unknown@G1 Z:4");
+        let ended = waited(&server, |state| state["phase"] == "ready");
+        let problem = ended["problem"].as_str().unwrap();
+        assert!(problem.contains("to `G1 Z26.700 ") && problem.contains(LIFTED), "{firmware:?}: {problem}");
+        assert!(bench.machine.is_stopped() && bench.machine.doubtful_moves() == 0);
+        live.end();
+
+        let (_folder, bench, live, server) = down("");
+        std::thread::sleep(Duration::from_secs(8) / SPEED);
+        let ended = get(&server, "/api/calibration").1;
+        assert!(ended["problem"].as_str().unwrap().contains("nobody has watched the machine"), "{ended}");
+        assert!(!bench.machine.is_stopped() && bench.machine.contact().is_none());
+        live.end();
+    });
 }
 
 #[test]
