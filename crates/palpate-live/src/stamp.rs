@@ -36,6 +36,11 @@ impl HostClock {
         self.start.elapsed().saturating_mul(self.speed)
     }
 
+    /// Real time in which `span` passes by the monotonic clock.
+    pub fn real_time(&self, span: Duration) -> Duration {
+        span / self.speed.max(1)
+    }
+
     /// The present instant.
     pub fn now(&self) -> Stamp {
         let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();

@@ -235,7 +235,7 @@ fn signals_stop_the_machine_before_the_process_ends() {
     let runs: Vec<_> = SIGNALS.into_iter().cycle().take(stops).collect();
     let mut took: Vec<Duration> = Vec::new();
     for runs in runs.chunks(SIGNALS.len()) {
-        let threads = runs.iter().map(|(signal, code)| std::thread::spawn(|| stopped_by(signal, *code)));
+        let threads = runs.iter().map(|&(signal, code)| std::thread::spawn(move || stopped_by(signal, code)));
         let threads: Vec<_> = threads.collect();
         took.extend(threads.into_iter().map(|thread| thread.join().unwrap()));
     }

@@ -48,7 +48,7 @@ impl StageUrl {
     pub(super) fn open(&self, clock: HostClock) -> io::Result<Box<dyn StageLink>> {
         match self {
             Self::Serial { port, baud } => {
-                let port = serialport::new(port.to_string_lossy(), *baud).timeout(READ).open()?;
+                let port = serialport::new(port.to_string_lossy(), *baud).timeout(clock.real_time(READ)).open()?;
                 Ok(Box::new(SerialLink { port, clock }))
             }
             Self::Tcp(server) => {
@@ -57,7 +57,7 @@ impl StageUrl {
                     match TcpStream::connect_timeout(&address, CONNECT) {
                         Ok(stream) => {
                             stream.set_nodelay(true)?;
-                            stream.set_read_timeout(Some(READ))?;
+                            stream.set_read_timeout(Some(clock.real_time(READ)))?;
                             stream.set_write_timeout(Some(WRITE))?;
                             return Ok(Box::new(TcpLink { stream, clock }));
                         }
