@@ -230,12 +230,15 @@ fn ends_with_its_words(firmware: &str, (config, _, finger, taken): &FaultCase, w
 #[cfg(unix)]
 #[test]
 fn signals_stop_the_machine_before_the_process_ends() {
-    const SIGNALS: [(&str, i32); 4] = [("INT", 130), ("TERM", 143), ("HUP", 129), ("QUIT", 131)];
+    const SIGNALS: [(&str, i32, &str); 4] =
+        [("INT", 130, "marlin"), ("TERM", 143, "grbl"), ("HUP", 129, "marlin"), ("QUIT", 131, "grbl")];
     let stops = std::env::var("PALPATE_STOPS").map_or(SIGNALS.len(), |stops| stops.parse().unwrap());
     let runs: Vec<_> = SIGNALS.into_iter().cycle().take(stops).collect();
     let mut took: Vec<Duration> = Vec::new();
     for runs in runs.chunks(SIGNALS.len()) {
-        let threads = runs.iter().map(|&(signal, code)| std::thread::spawn(move || stopped_by(signal, code)));
+        let threads = runs
+            .iter()
+            .map(|&(signal, code, firmware)| std::thread::spawn(move || stopped_by(signal, code, firmware)));
         let threads: Vec<_> = threads.collect();
         took.extend(threads.into_iter().map(|thread| thread.join().unwrap()));
     }
@@ -250,10 +253,10 @@ fn signals_stop_the_machine_before_the_process_ends() {
 
 /// The time from a signal to the stop at the machine.
 #[cfg(unix)]
-fn stopped_by(signal: &str, code: i32) -> Duration {
+fn stopped_by(signal: &str, code: i32, firmware: &str) -> Duration {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
-    let bench = Bench::at_speed(folder.path(), "pty", &["--machine", "paced"], 1);
+    let bench = Bench::at_speed(folder.path(), "pty", &["--firmware", firmware, "--machine", "paced"], 1);
     let mut child =
         bench.calibrate(folder.path(), &[]).stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);

@@ -48,7 +48,8 @@ impl StageUrl {
     pub(super) fn open(&self, clock: HostClock) -> io::Result<Box<dyn StageLink>> {
         match self {
             Self::Serial { port, baud } => {
-                let port = serialport::new(port.to_string_lossy(), *baud).timeout(clock.real_time(READ)).open()?;
+                let port =
+                    serialport::new(port.to_string_lossy(), *baud).timeout(clock.real_time(READ)).open()?;
                 Ok(Box::new(SerialLink { port, clock }))
             }
             Self::Tcp(server) => {
