@@ -377,7 +377,7 @@ impl Bench<'_> {
                 (None, None) => {}
                 (Some(machine), key) => {
                     step(machine, key.as_deref(), &notes, clock.elapsed(), &mut calibration)
-                        .map_err(|error| machine_ended(arguments, &calibration, &error))?
+                        .map_err(|error| machine_ended(arguments, &calibration, &error))?;
                 }
             }
         }

@@ -125,22 +125,14 @@ pub enum Motion {
     Down,
 }
 
-/// Purpose of a machine's moves.
-#[derive(Debug)]
-enum Duty {
-    /// The presses of a guide.
-    Presses,
-    /// Tasks before a calibration.
-    SetUp(SetUp),
-}
-
 /// A machine that presses where the guide of a calibration asks for it, or is set up before.
 ///
 /// The instants of its steps are those of the clock of its [`StageThread`].
 #[derive(Debug)]
 pub struct Machine {
     thread: StageThread,
-    duty: Duty,
+    /// Tasks of a machine that is set up; `None` of one that presses.
+    set_up: Option<SetUp>,
     force_limit_n: f64,
     motion: Motion,
     /// The press that it was sent to last.
@@ -160,19 +152,24 @@ pub struct Machine {
 impl Machine {
     /// A machine whose stage is connected, and not homed yet.
     pub fn new(thread: StageThread, force_limit_n: Option<f64>, now: Duration) -> Self {
-        Self::with_duty(thread, force_limit_n, now, Duty::Presses)
+        Self::with_tasks(thread, force_limit_n, now, None)
     }
 
     /// A machine that is set up: it homes, and does what [`Self::ask`] asks for. No press is taken.
     pub fn to_set_up(thread: StageThread, stage: Stage, now: Duration) -> Self {
         let limit_n = stage.force_limit_n;
-        Self::with_duty(thread, limit_n, now, Duty::SetUp(SetUp::new(stage)))
+        Self::with_tasks(thread, limit_n, now, Some(SetUp::new(stage)))
     }
 
-    fn with_duty(thread: StageThread, force_limit_n: Option<f64>, now: Duration, duty: Duty) -> Self {
+    fn with_tasks(
+        thread: StageThread,
+        force_limit_n: Option<f64>,
+        now: Duration,
+        set_up: Option<SetUp>,
+    ) -> Self {
         Self {
             thread,
-            duty,
+            set_up,
             force_limit_n: force_limit_n.unwrap_or(f64::INFINITY),
             motion: Motion::Blind,
             press: None,
@@ -208,28 +205,21 @@ impl Machine {
 
     /// Asks for a task of a machine that is set up, which follows those before it; false of one that presses.
     pub fn ask(&mut self, task: SetUpTask) -> bool {
-        match &mut self.duty {
-            Duty::Presses => false,
-            Duty::SetUp(set_up) => {
-                set_up.ask(task);
-                true
-            }
-        }
+        let Some(set_up) = &mut self.set_up else { return false };
+        set_up.ask(task);
+        true
     }
 
     /// True where it rests, has no task of a set-up any more, and waits for one.
     pub fn is_idle(&self) -> bool {
-        match &self.duty {
-            Duty::Presses => false,
-            Duty::SetUp(set_up) => self.motion == Motion::Up && set_up.is_idle(),
-        }
+        self.motion == Motion::Up && self.set_up.as_ref().is_some_and(SetUp::is_idle)
     }
 
     /// True once nothing is left to do, so that it is to be finished.
     pub fn is_done(&self, calibration: &Calibration) -> bool {
-        match &self.duty {
-            Duty::Presses => calibration.guide().waiting() == Waiting::Nothing,
-            Duty::SetUp(set_up) => set_up.has_ended(),
+        match &self.set_up {
+            None => calibration.guide().waiting() == Waiting::Nothing,
+            Some(set_up) => set_up.has_ended(),
         }
     }
 
@@ -288,28 +278,28 @@ impl Machine {
             Some(Err(error)) => return Err(error.into()),
             None => {}
         }
-        match self.duty {
-            Duty::Presses => self.press_next(calibration),
-            Duty::SetUp(_) => Ok(self.set_up_next(calibration)),
+        match self.set_up {
+            None => self.press_next(calibration),
+            Some(_) => Ok(self.set_up_next(calibration)),
         }
     }
 
     /// True where nobody would see what it does without readings.
     fn needs_readings(&self) -> bool {
-        match &self.duty {
-            Duty::Presses => self.motion != Motion::Blind,
-            Duty::SetUp(set_up) => set_up.needs_readings(),
+        match &self.set_up {
+            None => self.motion != Motion::Blind,
+            Some(set_up) => set_up.needs_readings(),
         }
     }
 
     /// Does what the next task of the set-up asks for, where it rests.
     fn set_up_next(&mut self, calibration: &mut Calibration) -> Option<MachineNote> {
-        let Duty::SetUp(set_up) = &mut self.duty else { return None };
         if self.motion == Motion::Blind {
             self.order(Order::Home, calibration);
             return Some(MachineNote::Homing);
         }
         let at_m = self.at_m.filter(|_| matches!(self.motion, Motion::Up | Motion::Down))?;
+        let set_up = self.set_up.as_mut()?;
         if set_up.is_between_tasks() {
             // The next task waits, and needs readings, from now on.
             (self.since, self.read_at) = (self.now, self.now);
