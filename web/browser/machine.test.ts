@@ -3,7 +3,7 @@
 import { existsSync, readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
-import { MachineBench } from "./bench";
+import { CLOCK_SPEED, MachineBench } from "./bench";
 import { endAll } from "./children";
 import { dotAt, hasChromium, launch, open, picture, says } from "./chromium";
 import { Server } from "./server";
@@ -21,7 +21,7 @@ function presses(bench: MachineBench): number {
 
 function started(bench: MachineBench): Promise<Server> {
   const [rig, csv, out] = ["rig.toml", "presses.csv", "locator.json"].map((name) => bench.path(name));
-  return Server.start([rig!, "--from", bench.from, "--calibrate", "--stage", bench.stage, "--presses", csv!, "--out", out!]);
+  return Server.start([rig!, "--from", bench.from, "--calibrate", "--stage", bench.stage, "--presses", csv!, "--out", out!, ...CLOCK_SPEED]);
 }
 
 describe.skipIf(!hasChromium())("calibration by a machine", () => {
@@ -102,10 +102,10 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await first.page.keyboard.press("b");
     await taken(first.page, 5);
     await first.page.context().close();
-    // Without a page the finger is lifted after 5 s, and nothing more is pressed.
-    await new Promise((resolve) => setTimeout(resolve, 7_000));
+    // Without a page the finger is lifted after 5 s of the bench's clock, and nothing more is pressed.
+    await new Promise((resolve) => setTimeout(resolve, 2_500));
     const pressed = presses(bench);
-    await new Promise((resolve) => setTimeout(resolve, 2_000));
+    await new Promise((resolve) => setTimeout(resolve, 1_000));
     expect(presses(bench)).toBe(pressed);
     expect(pressed).toBeLessThan(18);
     const { page, faults } = await open(browser, server.url, phone);

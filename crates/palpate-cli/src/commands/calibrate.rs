@@ -28,11 +28,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel, sync_channel};
 use std::time::Duration;
 
-/// Calibrate by pressing: says where to press, takes each press once its reading is at rest, and ends with a locator.
+/// Calibrate by guided presses: each is taken once its reading is at rest, and the fit ends with a locator.
 ///
 /// Positions and repeats are those of the rig's [training]. Every press is in the file of presses before the next one is asked for, and --resume
 /// goes on from there. A person is asked first how well he meets the places, and for a second weight where one is too few. Between presses the surface is let go, and what it reads then is recorded too: offsets and drift follow from it.
-/// With --stage a machine presses by itself, as the rig's [stage] says: Enter or Ctrl-C stops it at once.
+/// With --stage a machine presses by itself, with the positions and depths of the rig's [stage]: Enter or Ctrl-C stops it at once.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The rig file
@@ -52,7 +52,7 @@ pub struct Arguments {
     /// Force of every press, as in `--force "2 N"` [default: the rig's, or unknown]
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     force: Option<f64>,
-    /// Travel to every position at the height of travel, and press nowhere; nothing is read or written
+    /// Travel to every position at the height of travel without a press; no file is read or written but the rig
     #[arg(long, requires = "stage")]
     dry_run: bool,
     #[command(flatten)]

@@ -88,6 +88,9 @@ pub struct Arguments {
     /// Seed of fit and simulation
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    /// Run the clock of a calibration so many times as fast, for a simulated board and machine of the same --clock-speed
+    #[arg(long, value_name = "N", default_value_t = 1, hide = true, requires = "calibrate", value_parser = input::clock_speed())]
+    clock_speed: u32,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -109,7 +112,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(plan) => {
             let rules = rules_of(arguments, plan.rig.setup.surface().extent())?;
             with_rules(
-                configured(Live::calibrating(plan, PathBuf::new(), HostClock::new()), arguments),
+                configured(
+                    Live::calibrating(plan, PathBuf::new(), HostClock::with_speed(arguments.clock_speed)),
+                    arguments,
+                ),
                 rules,
             )
         }

@@ -413,6 +413,11 @@ fn a_machine_that_is_not_there_and_a_rig_without_a_stage_are_told_with_a_remedy(
     assert!(words.contains("--force does not go with the rig's [stage]: the load cell"), "{words}");
     let words = calibrate("tcp://127.0.0.1:1");
     assert!(words.contains("gcode:serial:///dev/ttyUSB0"), "{words}");
+    let mut command = palpate(folder.path());
+    let jogged = ["calibrate", "rig.toml", "--from", "-", "--stage", "gcode:tcp://127.0.0.1:1", "--jog"];
+    command.args(jogged).args(["--presses", "presses.csv", "--out", "locator.json"]);
+    let words = complained(&command.output().unwrap(), 2);
+    assert!(words.contains("--jog needs the keyboard") && words.contains("another source"), "{words}");
 }
 
 #[test]

@@ -9,20 +9,20 @@ use palpate_rig::Stage;
 use serde::Serialize;
 use std::time::Duration;
 
-/// Readings that stay away for so long stop the machine: nobody sees what it does.
+/// Time without readings after which the machine is stopped.
 const SILENT: Duration = Duration::from_secs(2);
 /// Time in which a press must be seen in the readings, and in which its reading must come to rest.
 const SEEN_WITHIN: Duration = Duration::from_secs(3);
 const AT_REST_WITHIN: Duration = Duration::from_secs(60);
 /// Time in which the surface must be at rest when it has been let go.
 const RELEASED_WITHIN: Duration = Duration::from_secs(300);
-/// Presses in a row that no reading shows, after which no more are tried.
+/// Unseen presses in a row after which the run ends.
 const MOST_UNSEEN: u32 = 3;
 
 /// A machine that ended its work.
 #[derive(Debug, thiserror::Error)]
 pub enum MachineError {
-    /// It does not do what it is asked for.
+    /// The stage failed.
     #[error(transparent)]
     Stage(#[from] StageError),
     /// A channel reads the end of its range.
@@ -41,19 +41,19 @@ pub enum MachineError {
         /// The limit.
         limit_n: f64,
     },
-    /// Readings that stay away.
+    /// No readings.
     #[error("no reading came for {} s: the machine was stopped", SILENT.as_secs())]
     Silent,
-    /// Somebody stopped it.
+    /// A stop by hand.
     #[error("the machine was stopped by hand")]
     ByHand,
-    /// Nobody who could stop it.
+    /// No page is open.
     #[error("nobody has watched the machine for {seconds} s: its finger was lifted")]
     Unwatched {
-        /// Seconds that somebody was waited for.
+        /// Seconds without an open page.
         seconds: u64,
     },
-    /// Presses that nobody sees.
+    /// Unseen presses.
     #[error(
         "the readings have not shown the last {MOST_UNSEEN} presses: `touch` or `depths` of [stage] are wrong"
     )]
@@ -92,7 +92,7 @@ impl MachineError {
     }
 }
 
-/// Step of a machine that people are told of.
+/// Step of a machine, for messages.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MachineNote {
     /// It looks for its end stops.
@@ -109,7 +109,7 @@ pub enum MachineNote {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Motion {
-    /// It waits for the first reading: nothing moves unseen.
+    /// It waits for the first reading.
     Blind,
     /// It looks for its end stops.
     Homing,
@@ -284,7 +284,7 @@ impl Machine {
         }
     }
 
-    /// True where nobody would see what it does without readings.
+    /// True where its work depends on readings.
     fn needs_readings(&self) -> bool {
         match &self.set_up {
             None => self.motion != Motion::Blind,

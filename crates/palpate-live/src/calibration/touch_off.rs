@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// Readings in a row that deviate where something touches, as in a calibration by hand.
 const ONSET_READINGS: usize = 3;
-/// Readings without such a row after which nothing touches.
+/// Readings without such a row that show no touch.
 const CLEAR_READINGS: usize = 2 * ONSET_READINGS;
 /// Share of the shallowest press that a coarse step is: a touch-off presses no harder than that.
 const COARSE_SHARE: f64 = 0.1;
@@ -37,7 +37,7 @@ pub enum TouchOffFailure {
     },
     /// The untouched reading does not rest.
     #[error(
-        "the untouched readings have not come to rest within {} s: see that nothing else touches the surface",
+        "the untouched readings have not come to rest within {} s: keep the surface free of other contacts",
         SETTLES_WITHIN.as_secs()
     )]
     NoRest,
@@ -133,7 +133,7 @@ enum Step {
     Learn,
     /// The finger rests at a height.
     Down { z_m: f64 },
-    /// The finger was lifted after a touch, whose deviation had this size.
+    /// The finger was lifted after a touch of this deviation.
     Return { size: f64 },
     /// The finger is lifted, and nothing was found.
     Failed(TouchOffFailure),

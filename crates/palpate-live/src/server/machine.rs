@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// A machine that nobody has watched for so long lifts its finger, and ends.
+/// Time without an open page after which a machine lifts its finger and ends.
 pub const UNWATCHED: Duration = Duration::from_secs(5);
 
 /// Attendance of the people who can stop a machine: the last sign of a page.
@@ -23,7 +23,7 @@ pub struct Attendance {
 }
 
 impl Attendance {
-    /// Attendance by a clock; nobody has given a sign yet.
+    /// Attendance by a clock, without a sign so far.
     pub fn new(clock: HostClock) -> Self {
         Self { clock, seen_ms: AtomicU64::new(0), is_needed: AtomicBool::new(false) }
     }
@@ -163,7 +163,7 @@ impl MachineRecord {
         }
     }
 
-    /// The same, while it runs with `left` presses to come.
+    /// The record of a machine that runs with `left` presses to come.
     pub fn running(
         self,
         state: &MachineState,

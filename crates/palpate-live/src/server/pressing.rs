@@ -13,10 +13,10 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// Longest wait until the machine and its stop are looked at again.
+/// Longest wait between two looks at the machine and its stop.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Takes what the source brings, until it is told to stop.
+/// Takes the arrivals of the source until a stop arrives.
 pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
     /// Longest wait for what is next.
     const LOOK: Duration = Duration::from_millis(100);
@@ -37,7 +37,7 @@ pub struct MachineRun {
     pub stage: Stage,
     /// First tasks of a machine that is set up; `None` of one that presses.
     pub set_up: Option<Vec<SetUpTask>>,
-    /// Set, the machine is stopped whatever it does.
+    /// Setting it stops the machine at any time.
     pub stop: Arc<AtomicBool>,
     pub attendance: Arc<Attendance>,
     pub clock: HostClock,

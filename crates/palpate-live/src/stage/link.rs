@@ -6,7 +6,7 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-/// Link to a machine, whose reads end after some 10 ms at most.
+/// Link to a machine; a read ends after some 10 ms at most.
 pub trait StageLink: Read + Write + Send {
     /// Time since some instant.
     fn now(&self) -> Duration;
@@ -14,7 +14,7 @@ pub trait StageLink: Read + Write + Send {
     /// Resets the board by its DTR line; false for links without one.
     ///
     /// # Errors
-    /// Those of the port.
+    /// [`io::Error`] of the port.
     fn reset_by_dtr(&mut self) -> io::Result<bool>;
 
     /// True for links with a DTR line.
@@ -44,7 +44,7 @@ const CONNECT: Duration = Duration::from_secs(2);
 const DTR: Duration = Duration::from_millis(20);
 
 impl StageUrl {
-    /// Opens the link, whose time is that of the clock.
+    /// Opens the link; the clock gives its time.
     pub(super) fn open(&self, clock: HostClock) -> io::Result<Box<dyn StageLink>> {
         match self {
             Self::Serial { port, baud } => {

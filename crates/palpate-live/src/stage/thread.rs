@@ -1,4 +1,4 @@
-//! The thread of a machine: orders to it, and the stop that it heeds whatever it does.
+//! The thread of a machine: it takes orders, and heeds a stop at any time.
 
 use super::error::StageError;
 use super::firmware::Firmware;
@@ -56,7 +56,7 @@ pub struct StageThread {
 }
 
 impl StageThread {
-    /// Opens the link, whose time is that of the clock, and greets the machine. Setting `stop` stops it whatever it does, as [`Self::stop`] does.
+    /// Opens the link and greets the machine; the clock gives the link's time. Setting `stop` stops the machine at any time, as [`Self::stop`] does.
     ///
     /// # Errors
     /// [`StageError`] where it is not there, or does not answer.

@@ -185,6 +185,14 @@ fn a_machine_is_stopped_gone_on_with_and_ends_in_a_locator() {
     );
     assert!(check["median_mm"].as_f64().unwrap() < 1.0 && check["covered"].is_u64(), "{check}");
     assert!(!bench.machine.is_stopped() && bench.machine.contact().is_none());
+    // A check that is stopped leaves the locator in use, and measures it by the presses that were taken.
+    assert_eq!(step(&server, "check").0, 200);
+    waited(&server, |state| state["phase"] == "checking" && state["taken"] == 2);
+    assert_eq!(post(&server, "/api/emergency-stop", "{}").0, 200);
+    let stopped = waited(&server, |state| state["phase"] == "done");
+    assert!(stopped["problem"].as_str().unwrap().contains("stopped by hand"), "{stopped}");
+    let places = stopped["check"]["places"].as_array().unwrap().len();
+    assert!((2..5).contains(&places) && bench.machine.is_stopped(), "{stopped}");
     assert_eq!(get(&server, "/api/session").1["source"], bench.from.as_str());
     live.end();
 }
