@@ -5,7 +5,7 @@ use super::machine::{Attendance, UNWATCHED};
 use super::shared::Shared;
 use crate::calibration::{Machine, MachineError, MachineNote, Motion, SetUpTask};
 use crate::input::Input;
-use crate::stage::{StageThread, StageUrl};
+use crate::stage::{StageError, StageThread, StageUrl};
 use crate::stamp::HostClock;
 use palpate_rig::Stage;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -48,7 +48,13 @@ impl MachineRun {
     pub fn run(self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
         self.attendance.note();
         self.attendance.set_needed(true);
-        let outcome = self.try_to_run(inputs, shared);
+        let outcome = self.try_to_run(inputs, shared).map_err(|error| match error {
+            // Its thread may heed the stop first.
+            MachineError::Stage(StageError::Stopped) if self.stop.load(Ordering::Relaxed) => {
+                MachineError::ByHand
+            }
+            error => error,
+        });
         self.attendance.set_needed(false);
         let mut shared = locked(shared);
         let left_out = shared.machine.left_out;
