@@ -1,4 +1,4 @@
-//! Any bytes as the replies of a machine: no panic, and no move without an `ok` for every command before it.
+//! Any bytes as the replies of a machine: no panic, no move without an `ok` for every command before it, and none below the deepest press.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -72,10 +72,17 @@ fuzz_target!(|replies: &[u8]| {
             .home()
             .and_then(|()| stage.travel(Position::along(0.05)))
             .and_then(|()| stage.press(1e-3))
+            .and_then(|()| stage.jog([1e-3, 0.0, -1.0]))
+            .and_then(|()| stage.lower(-1.0))
             .and_then(|()| stage.lift());
     }
     let confirmed = replies.windows(2).filter(|pair| *pair == b"ok").count();
-    let moves = String::from_utf8_lossy(&locked(&line.sent)).matches("G1 ").count();
+    let sent = String::from_utf8_lossy(&locked(&line.sent)).into_owned();
+    let moves = sent.matches("G1 ").count();
     // The lift of a retreat follows a refused command.
     assert!(moves <= confirmed + 1, "{moves} moves after {confirmed} answers");
+    let heights_mm =
+        sent.split(|c: char| c.is_ascii_whitespace()).filter_map(|word| word.strip_prefix('Z')?.parse().ok());
+    let lowest_mm = heights_mm.fold(f64::INFINITY, f64::min);
+    assert!(lowest_mm >= STAGE.lowest_z_m() * 1e3 - 1e-3, "sent to {lowest_mm} mm");
 });

@@ -53,7 +53,10 @@ export class Bench {
   }
 }
 
-/** A board, a load cell and a machine that nobody but the server moves. */
+/** Factor by which the clocks of a machine's bench and its server run fast. */
+export const CLOCK_SPEED = ["--clock-speed", "4"];
+
+/** A board, a load cell and a machine that the server alone moves. */
 export class MachineBench {
   private constructor(
     private machine_port: number,
@@ -66,7 +69,7 @@ export class MachineBench {
   static async start(example: string, replaced: [string, string][]): Promise<MachineBench> {
     const folder = written(example, replaced, "");
     const [board, stage] = [await freePort(), await freePort()];
-    const args = ["simulated-board", "rig.toml", "--rate", "200 Hz", "--load-cell", "2 mN", "--to", `tcp://:${board}`, "--stage", `tcp://:${stage}`];
+    const args = ["simulated-board", "rig.toml", "--rate", "200 Hz", "--load-cell", "2 mN", "--to", `tcp://:${board}`, "--stage", `tcp://:${stage}`, ...CLOCK_SPEED];
     start(BINARY, args, { cwd: folder, stdio: "ignore" });
     (await connected(stage)).destroy();
     return new MachineBench(stage, folder, `tcp://127.0.0.1:${board}`, `gcode:tcp://127.0.0.1:${stage}`);

@@ -3,7 +3,7 @@
 import { existsSync, readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
-import { MachineBench } from "./bench";
+import { CLOCK_SPEED, MachineBench } from "./bench";
 import { endAll } from "./children";
 import { dotAt, hasChromium, launch, open, picture, says } from "./chromium";
 import { Server } from "./server";
@@ -21,7 +21,7 @@ function presses(bench: MachineBench): number {
 
 function started(bench: MachineBench): Promise<Server> {
   const [rig, csv, out] = ["rig.toml", "presses.csv", "locator.json"].map((name) => bench.path(name));
-  return Server.start([rig!, "--from", bench.from, "--calibrate", "--stage", bench.stage, "--presses", csv!, "--out", out!]);
+  return Server.start([rig!, "--from", bench.from, "--calibrate", "--stage", bench.stage, "--presses", csv!, "--out", out!, ...CLOCK_SPEED]);
 }
 
 describe.skipIf(!hasChromium())("calibration by a machine", () => {
@@ -40,6 +40,20 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     expect(await says(page, "machine-moves", /presses 18 times, down to z 21 and 20 mm/)).toContain("It looks for its end stops first");
     expect(await page.locator("#machine-stop").isVisible()).toBe(false);
     await picture(page, "machine-ready");
+    await page.locator("#calibration-dry-run").click();
+    await says(page, "calibration-why", /^Dry run: 9 positions reached at the height of travel, none pressed\.$/);
+    await page.locator("#calibration-set-up").click();
+    await says(page, "calibration-step", /^Jog the machine, or find the touch$/);
+    await page.locator("#machine-step").selectOption("10");
+    for (const x of [10, 20, 30, 40, 50, 60, 70]) {
+      await page.locator("#machine-jogs button", { hasText: "x +" }).click();
+      await says(page, "machine-at", new RegExp(`^x ${x}, y 0, z 27 mm$`));
+    }
+    await page.locator("#machine-touch-off").click();
+    await says(page, "calibration-why", /^The finger touches at z 2[12]\.\d+ mm/);
+    await picture(page, "machine-set-up");
+    await page.locator("#calibration-stop").click();
+    await says(page, "machine-moves", /The untouched surface is at z 2[12]\.\d+ mm/);
     await page.locator("#calibration-begin").click();
     await taken(page, 3);
     await says(page, "calibration-step", /^Pressing at [\d.]+ mm, [12] mm deep$/);
@@ -59,6 +73,9 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await page.locator("#calibration-finish").click();
     await says(page, "calibration-step", /^Fitted to 18 presses: error at positions held out [\d.]+ mm/);
     expect(existsSync(bench.path("locator.json"))).toBe(true);
+    await page.locator("#calibration-check").click();
+    await says(page, "calibration-checked-words", /\(median\).* of 5 within their 95 % intervals/);
+    await picture(page, "machine-checked");
     await bench.press(55);
     await dotAt(page, 55);
     await picture(page, "machine-done");
@@ -85,10 +102,10 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await first.page.keyboard.press("b");
     await taken(first.page, 5);
     await first.page.context().close();
-    // Without a page the finger is lifted after 5 s, and nothing more is pressed.
-    await new Promise((resolve) => setTimeout(resolve, 7_000));
+    // Without a page the finger is lifted after 5 s of the bench's clock, and nothing more is pressed.
+    await new Promise((resolve) => setTimeout(resolve, 2_500));
     const pressed = presses(bench);
-    await new Promise((resolve) => setTimeout(resolve, 2_000));
+    await new Promise((resolve) => setTimeout(resolve, 1_000));
     expect(presses(bench)).toBe(pressed);
     expect(pressed).toBeLessThan(18);
     const { page, faults } = await open(browser, server.url, phone);

@@ -137,16 +137,20 @@ export interface RecordingContent {
   events: EventRecord[];
 }
 
-export type CalibrationPhase = "ready" | "pressing" | "pressed" | "fitting" | "assessing" | "done" | "checking";
+export type CalibrationPhase = "ready" | "pressing" | "pressed" | "fitting" | "assessing" | "done" | "checking" | "setting_up";
 export type Waiting = "untouched" | "press" | "rest" | "release" | "nothing";
-export type CalibrationStep = "begin" | "redo" | "skip" | "untouched" | "stop" | "finish" | "strike" | "check";
+export type CalibrationStep =
+  | "begin" | "redo" | "skip" | "untouched" | "stop" | "finish" | "strike" | "check" | "dry_run" | "set_up" | "jog" | "touch_off";
+export type Axis = "x" | "y" | "z";
 
-/** What goes with a step: statements of the operator with `begin`, the number of the press with `strike`. */
+/** What goes with a step: statements of the operator with `begin`, the number of the press with `strike`, axis and distance with `jog`. */
 export interface StepDetails {
   placement_mm?: number;
   second_force_n?: number;
   force_is_known?: boolean;
   press?: number;
+  axis?: Axis;
+  by_mm?: number;
 }
 
 /** A place to press. */
@@ -183,6 +187,8 @@ export interface CalibrationRecord {
   outcome: CalibrationOutcome | null;
   check: CheckRecord | null;
   can_check: boolean;
+  /** True where a machine can be set up: dry run, jogs, touch-off. */
+  can_set_up: boolean;
 }
 
 /** A press that was taken. */
@@ -207,7 +213,7 @@ export interface CheckRecord {
   placement_mm: number | null;
 }
 
-export type Motion = "blind" | "homing" | "pressing" | "lifting" | "up" | "down";
+export type Motion = "blind" | "homing" | "travelling" | "pressing" | "lifting" | "up" | "down";
 
 /** A machine that presses. */
 export interface MachineRecord {
@@ -225,6 +231,10 @@ export interface MachineRecord {
   /** Force at the load cell. */
   force_n: number | null;
   left_s: number | null;
+  /** Position by its own axes, after its last move. */
+  at_mm: [number, number, number] | null;
+  /** Height of the touch that a touch-off found. */
+  found_touch_mm: number | null;
   moves: MovesRecord;
 }
 

@@ -7,7 +7,7 @@ const { stepWords, weightWords } = await import("../src/panel/calibration");
 const { checkWords, mmWords, tracePoints } = await import("../src/panel/presses");
 const { rateOf } = await import("../src/panel/preview");
 
-const { movesWords } = await import("../src/panel/machine");
+const { atWords, foundWords, movesWords } = await import("../src/panel/machine");
 
 const PRESSING: CalibrationRecord = {
   phase: "pressing",
@@ -30,6 +30,7 @@ const PRESSING: CalibrationRecord = {
   outcome: null,
   check: null,
   can_check: false,
+  can_set_up: false,
 };
 
 describe("words of a calibration", () => {
@@ -76,12 +77,19 @@ describe("words of a calibration", () => {
       depth_mm: null,
       force_n: null,
       left_s: null,
+      at_mm: null,
+      found_touch_mm: null,
       moves,
     };
     expect(stepWords({ ...PRESSING, machine })).toBe("The machine looks for its end stops");
     const down: MachineRecord = { ...machine, motion: "down", x_mm: 40, depth_mm: 2 };
     expect(stepWords({ ...PRESSING, machine: down })).toBe("Pressing at 40.0 mm, 2 mm deep");
     expect(stepWords({ ...PRESSING, machine: { ...machine, motion: null } })).toBe("Greeting the machine…");
+    expect(stepWords({ ...PRESSING, phase: "checking", machine: down })).toBe("Pressing at 40.0 mm, 2 mm deep");
+    expect(stepWords({ ...PRESSING, phase: "setting_up", machine })).toBe("The machine looks for its end stops");
+    expect(stepWords({ ...PRESSING, phase: "setting_up", machine: { ...machine, motion: "up" } })).toBe("Jog the machine, or find the touch");
+    expect(atWords([60.1, -2, 27])).toBe("x 60.1, y −2, z 27 mm");
+    expect(foundWords(21.97)).toContain('touch = "21.97 mm"');
   });
 
   test("end with the error at positions held out", () => {

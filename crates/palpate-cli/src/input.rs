@@ -217,6 +217,11 @@ pub fn share(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A factor by which a clock runs fast.
+pub fn clock_speed() -> clap::builder::RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(1..=100)
+}
+
 /// A time in seconds, greater than 0.
 pub fn time(text: &str) -> Result<f64, String> {
     match Quantity::parse_as(text, Dimension::Time) {

@@ -15,18 +15,35 @@ pub struct Stamp {
 #[derive(Clone, Copy, Debug)]
 pub struct HostClock {
     start: Instant,
+    /// Factor by which the monotonic clock runs fast.
+    speed: u32,
 }
 
 impl HostClock {
     /// Clocks that start now.
     #[expect(clippy::new_without_default, reason = "a clock's start is no default value")]
     pub fn new() -> Self {
-        Self { start: Instant::now() }
+        Self::with_speed(1)
+    }
+
+    /// Clocks that start now, the monotonic one `speed` times as fast: for a simulated board and a simulated machine that run as fast.
+    pub fn with_speed(speed: u32) -> Self {
+        Self { start: Instant::now(), speed }
+    }
+
+    /// Time since the start, by the monotonic clock.
+    pub fn elapsed(&self) -> Duration {
+        self.start.elapsed().saturating_mul(self.speed)
+    }
+
+    /// Real time in which `span` passes by the monotonic clock.
+    pub fn real_time(&self, span: Duration) -> Duration {
+        span / self.speed.max(1)
     }
 
     /// The present instant.
     pub fn now(&self) -> Stamp {
         let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        Stamp { elapsed: self.start.elapsed(), unix_ns: unix.as_nanos() as u64 }
+        Stamp { elapsed: self.elapsed(), unix_ns: unix.as_nanos() as u64 }
     }
 }

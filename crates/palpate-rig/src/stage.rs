@@ -54,6 +54,16 @@ impl Stage {
     pub fn deepest_m(&self) -> f64 {
         self.depths_m.iter().copied().fold(0.0, f64::max)
     }
+
+    /// Height of travel, in metres of the machine.
+    pub fn travel_z_m(&self) -> f64 {
+        self.touch_z_m + self.clearance_m
+    }
+
+    /// Lowest height of the finger, that of the deepest press, in metres of the machine.
+    pub fn lowest_z_m(&self) -> f64 {
+        self.touch_z_m - self.deepest_m()
+    }
 }
 
 /// The machine that presses by itself; see docs/live.md.

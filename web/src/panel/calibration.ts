@@ -4,7 +4,7 @@ import { api } from "../api";
 import { element, need, setText } from "../dom";
 import type { CalibrationOutcome, CalibrationRecord, CalibrationStep, PlaceRecord, StepDetails } from "../protocol";
 import { size } from "../words";
-import { machineStep, MachinePanel, motionWords } from "./machine";
+import { machineStep, MachinePanel, motionWords, setUpStep } from "./machine";
 import { mmWords, writeCheck, writePresses } from "./presses";
 import { Preview } from "./preview";
 
@@ -15,7 +15,10 @@ const IDLE_MS = 1_000;
 const PREVIEW_MS = 200;
 
 /** Steps that have a button. */
-type ButtonStep = Exclude<CalibrationStep, "strike">;
+type ButtonStep = Exclude<CalibrationStep, "strike" | "jog" | "touch_off">;
+
+/** Steps after which a machine moves. */
+const MOVING: CalibrationStep[] = ["begin", "check", "dry_run", "set_up"];
 
 const BUTTONS: { id: string; step: ButtonStep }[] = [
   { id: "calibration-begin", step: "begin" },
@@ -25,13 +28,18 @@ const BUTTONS: { id: string; step: ButtonStep }[] = [
   { id: "calibration-stop", step: "stop" },
   { id: "calibration-finish", step: "finish" },
   { id: "calibration-check", step: "check" },
+  { id: "calibration-dry-run", step: "dry_run" },
+  { id: "calibration-set-up", step: "set_up" },
 ];
 
 /** The panel of a calibration; hidden where the server has none. */
 export class CalibrationPanel {
   /** Its state, while it is shown. */
   state: CalibrationRecord | null = null;
-  private machine = new MachinePanel();
+  private machine = new MachinePanel(
+    (axis, by_mm) => this.act("jog", { axis, by_mm }),
+    () => this.act("touch_off"),
+  );
   private preview = new Preview();
   /** Presses that the list shows: their number, and whether they can be struck out. */
   private listed = "";
@@ -70,11 +78,12 @@ export class CalibrationPanel {
   }
 
   private act(step: CalibrationStep, details: StepDetails = {}): void {
-    if (step === "begin" && this.state?.machine != null) this.machine.begins();
+    const moves = MOVING.includes(step) && this.state?.machine != null;
+    if (moves) this.machine.begins();
     const stated = step === "begin" ? statements() : details;
     void api.calibrate(step, stated).then(
       (state) => {
-        if (step === "begin") this.machine.begun();
+        if (moves) this.machine.begun();
         this.take(state);
         this.follow();
         void this.list(true);
@@ -133,11 +142,14 @@ export class CalibrationPanel {
       redo: (pressing || state.phase === "pressed") && state.taken > 0 && state.machine === null,
       skip: pressing && state.machine === null,
       untouched: pressing && state.machine === null,
-      stop: pressing,
+      stop: pressing || state.phase === "setting_up",
+      dry_run: state.can_set_up,
+      set_up: state.can_set_up,
       finish: waits && state.taken > 0,
     };
     for (const { id, step } of BUTTONS) need(id).hidden = !shown[step];
     need("calibration-begin").firstChild!.textContent = beginWords(state);
+    need("calibration-stop").firstChild!.textContent = state.phase === "setting_up" ? "End the set-up " : "Stop early ";
     need("calibration-close").hidden = state.phase !== "done";
     writeStatements(state);
     this.preview.write(state, performance.now() / 1000);
@@ -228,7 +240,10 @@ export function stepWords(state: CalibrationRecord): string {
       if (state.source === null) return "Waiting for readings";
       return waitingWords(state);
     case "checking":
+      if (state.machine?.runs === true) return machineStep(state.machine, state);
       return state.source === null ? "Waiting for readings" : waitingWords(state);
+    case "setting_up":
+      return state.machine === null ? "" : setUpStep(state.machine, state);
     case "pressed":
       return "No more presses are asked for";
     case "fitting":
@@ -258,6 +273,7 @@ function waitingWords(state: CalibrationRecord): string {
 function whyWords(state: CalibrationRecord): string {
   switch (state.phase) {
     case "ready":
+      if (state.hint !== null) return state.hint;
       if (state.machine !== null && state.taken === 0) return `${state.left} presses, one after the other as the surface shows them. Each is taken once its reading is at rest.`;
       return state.taken === 0
         ? `The places to press are shown on the surface, one after the other: ${state.left} presses. Each is taken by itself once its reading is at rest.`
@@ -271,6 +287,8 @@ function whyWords(state: CalibrationRecord): string {
       return `The last press is ${size(state.last_percent)} % off the others of its place.`;
     case "checking":
       return `Check: ${state.taken} of ${state.taken + state.left} fresh places, which the calibration has not pressed.`;
+    case "setting_up":
+      return state.hint ?? (state.machine === null ? "" : motionWords(state.machine, state));
     case "pressed":
       return "Take the last press back, go on with those that were left out, or fit the locator.";
     case "done":

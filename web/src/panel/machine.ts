@@ -2,7 +2,7 @@
 
 import { api } from "../api";
 import { element, need, setText } from "../dom";
-import type { CalibrationRecord, MachineRecord, MovesRecord } from "../protocol";
+import type { Axis, CalibrationRecord, MachineRecord, MovesRecord } from "../protocol";
 import { fixed, seconds, size } from "../words";
 
 /** Milliseconds between two tries to stop it, and tries until the page says that it cannot. */
@@ -14,7 +14,11 @@ export class MachinePanel {
   private stopping = false;
   private asked = false;
 
-  constructor() {
+  constructor(jog: (axis: Axis, by_mm: number) => void, touchOff: () => void) {
+    for (const button of need("machine-jogs").querySelectorAll<HTMLButtonElement>("button[data-axis]")) {
+      button.addEventListener("click", () => jog(button.dataset.axis as Axis, Number(button.dataset.sign) * stepOf()));
+    }
+    need("machine-touch-off").addEventListener("click", touchOff);
     need("machine-stop").addEventListener("click", () => void this.stop());
     // Whatever has the focus, and whether single keys are on or off.
     document.addEventListener("keydown", (event) => {
@@ -41,13 +45,19 @@ export class MachinePanel {
     const moves = need("machine-moves");
     moves.hidden = machine === null || machine.runs || state.left === 0 || state.phase !== "ready";
     if (machine !== null) {
-      const items = movesWords(machine.moves, state.left).map((words) => element("li", "", words));
+      const found = machine.found_touch_mm === null ? [] : [foundWords(machine.found_touch_mm)];
+      const items = [...movesWords(machine.moves, state.left), ...found].map((words) => element("li", "", words));
       const list = need("machine-moves-list");
       if (list.textContent !== items.map((item) => item.textContent).join("")) list.replaceChildren(...items);
     }
     this.runs = machine?.runs ?? false;
     need("machine").hidden = !this.runs;
+    const setsUp = this.runs && state.phase === "setting_up";
+    need("machine-set-up").hidden = !setsUp;
+    need("machine-run").hidden = setsUp;
     if (machine === null || !this.runs) return;
+    for (const button of need("machine-jogs").querySelectorAll("button")) button.disabled = machine.motion !== "up";
+    setText(need("machine-at"), machine.at_mm === null ? "—" : atWords(machine.at_mm));
     const force = machine.force_n === null ? (state.next?.force_n ?? null) : machine.force_n;
     setText(need("machine-position"), positionWords(machine) ?? "—");
     setText(need("machine-depth"), depthWords(machine));
@@ -73,6 +83,22 @@ export class MachinePanel {
     words.hidden = stopped;
     this.stopping = false;
   }
+}
+
+/** The chosen step of a jog, in mm. */
+function stepOf(): number {
+  return Number(need<HTMLSelectElement>("machine-step").value);
+}
+
+/** A position by the machine's own axes. */
+export function atWords([x, y, z]: [number, number, number]): string {
+  const place = (at: number) => String(Number(at.toFixed(3))).replace("-", "−");
+  return `x ${place(x)}, y ${place(y)}, z ${place(z)} mm`;
+}
+
+/** The height that a touch-off found. */
+export function foundWords(z_mm: number): string {
+  return `The untouched surface is at z ${Number(z_mm.toFixed(3))} mm, as the touch-off found it; the rig keeps that as touch = "${Number(z_mm.toFixed(3))} mm".`;
 }
 
 /** What is about to move, how far and how fast, and what stops it. */
@@ -107,6 +133,21 @@ export function machineStep(machine: MachineRecord, state: CalibrationRecord): s
   }
 }
 
+/** The step of a machine that is set up. */
+export function setUpStep(machine: MachineRecord, state: CalibrationRecord): string {
+  switch (machine.motion) {
+    case "up":
+      return "Jog the machine, or find the touch";
+    case "down":
+    case "pressing":
+      return "The finger goes down in search of the touch";
+    case "travelling":
+      return "The finger travels, lifted";
+    default:
+      return machineStep(machine, state);
+  }
+}
+
 /** What it is doing just now. */
 export function motionWords(machine: MachineRecord, state: CalibrationRecord): string {
   switch (machine.motion) {
@@ -116,6 +157,8 @@ export function motionWords(machine: MachineRecord, state: CalibrationRecord): s
       return `Nothing moves before a reading has come${machine.stopping === null ? "" : `; ${machine.stopping}`}.`;
     case "homing":
       return machine.stopping === null ? "Keep your hands away." : `Keep your hands away: ${machine.stopping}.`;
+    case "travelling":
+      return "The finger travels, lifted.";
     case "pressing":
       return "The finger is on its way.";
     case "lifting":
@@ -135,7 +178,7 @@ function positionWords(machine: MachineRecord): string | null {
 
 function depthWords(machine: MachineRecord): string {
   if (machine.motion === "down" && machine.depth_mm !== null) return `${mm(machine.depth_mm)} mm`;
-  return { pressing: "going down", lifting: "lifting", up: "lifted" }[machine.motion as string] ?? "—";
+  return { travelling: "lifted", pressing: "going down", lifting: "lifting", up: "lifted" }[machine.motion as string] ?? "—";
 }
 
 function spanWords(axis: string, [from, to]: [number, number]): string {

@@ -1,5 +1,6 @@
 //! `palpate calibrate`: a calibration by hand, guided press by press, or by a machine.
 
+use super::jog::{Jog, JogEnd};
 use super::operator::{self, place};
 use crate::failure::{Complaint, Failure};
 use crate::progress::{self, Observer};
@@ -27,11 +28,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel, sync_channel};
 use std::time::Duration;
 
-/// Calibrate by pressing: says where to press, takes each press once its reading is at rest, and ends with a locator.
+/// Calibrate by guided presses: each is taken once its reading is at rest, and the fit ends with a locator.
 ///
 /// Positions and repeats are those of the rig's [training]. Every press is in the file of presses before the next one is asked for, and --resume
 /// goes on from there. A person is asked first how well he meets the places, and for a second weight where one is too few. Between presses the surface is let go, and what it reads then is recorded too: offsets and drift follow from it.
-/// With --stage a machine presses by itself, as the rig's [stage] says: Enter or Ctrl-C stops it at once.
+/// With --stage a machine presses by itself, with the positions and depths of the rig's [stage]: Enter or Ctrl-C stops it at once.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// The rig file
@@ -51,13 +52,16 @@ pub struct Arguments {
     /// Force of every press, as in `--force "2 N"` [default: the rig's, or unknown]
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     force: Option<f64>,
-    /// Travel to every position at the height of travel, and press nowhere; nothing is read or written
+    /// Travel to every position at the height of travel without a press; no file is read or written but the rig
     #[arg(long, requires = "stage")]
     dry_run: bool,
     #[command(flatten)]
     operator: OperatorOptions,
+    /// Jog the machine by hand before the presses, and find the height at which its finger touches
+    #[arg(long, requires = "stage", conflicts_with = "dry_run")]
+    jog: bool,
     /// Check the locator by presses at five fresh places after the fit
-    #[arg(long, conflicts_with = "stage")]
+    #[arg(long)]
     check: bool,
     /// Go on with the presses that the file of presses has
     #[arg(long)]
@@ -65,6 +69,9 @@ pub struct Arguments {
     /// Seed of the fit
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    /// Run the clock so many times as fast, for a simulated board and machine of the same --clock-speed
+    #[arg(long, value_name = "N", default_value_t = 1, hide = true, value_parser = input::clock_speed())]
+    clock_speed: u32,
 }
 
 /// Statements of the person who presses.
@@ -111,9 +118,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Target::new(&arguments.presses, &inputs)?;
     let rig = input::read_rig(&arguments.rig)?;
     let machine = arguments.stage.as_ref();
-    let stage = stage(&arguments.rig, &rig, machine, arguments.force)?;
+    let mut stage = stage(&arguments.rig, &rig, machine, arguments.force)?;
+    let clock = HostClock::with_speed(arguments.clock_speed);
     if let (true, Some(stage)) = (arguments.dry_run, &stage) {
-        return dry_run(arguments, &rig, stage.clone());
+        return dry_run(arguments, &rig, stage.clone(), clock);
     }
     let depths = DepthKnowledge::for_stage(stage.as_ref());
     let (before, in_file_m) = rows_before(arguments, &rig, depths)?;
@@ -123,13 +131,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         // The placement of the rig is that of a person.
         Some(_) => stated,
     };
-    let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
+    let depths_m = stage.as_ref().map_or_else(Vec::new, |stage| stage.depths_m.clone());
     let to_come = |statements: &Statements, rows: &[Row]| {
-        calibration::plan(&rig, statements.weights(arguments.force), depths_m, rows)
+        calibration::plan(&rig, statements.weights(arguments.force), &depths_m, rows)
             .map_err(|error| Complaint::about(&arguments.rig, error))
     };
     let is_by_hand = stage.is_none() && !to_come(&known, &before)?.is_empty();
     let keys = (arguments.from != SourceUrl::Stdin).then(keys);
+    if let (true, Some(set_up)) = (arguments.jog, &mut stage) {
+        let bench = Bench { arguments, rig: &rig, keys: keys.as_ref(), clock };
+        if !bench.set_up(set_up)? {
+            return Ok(());
+        }
+    }
     let statements = match (&keys, is_by_hand) {
         (Some(keys), true) => operator::ask(known, &rig, arguments.force, keys)?,
         _ => known,
@@ -137,7 +151,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = statements.applied_to(&rig, arguments.force);
     let plan = to_come(&statements, &before)?;
     let comment = comment_with_placement(&pressed_for(&arguments.rig), statements.placement_sd_m);
-    let bench = Bench { arguments, rig: &rig, keys: keys.as_ref() };
+    let bench = Bench { arguments, rig: &rig, keys: keys.as_ref(), clock };
     if let Some(press) = plan.first() {
         if let Some(force_n) = statements.single_weight_n(&rig, arguments.force).filter(|_| is_by_hand) {
             remark!("{}", operator::single_weight(force_n));
@@ -154,7 +168,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let weights = statements.weights(arguments.force);
     let asks = is_by_hand && !arguments.check && bench.keys.is_some_and(operator::wants_check);
     if arguments.check || asks {
-        bench.check(&locator, &recording.rows, weights, comment, statements.placement_sd_m)?;
+        bench.check(&locator, &recording.rows, weights, comment, statements.placement_sd_m, stage)?;
     }
     Ok(())
 }
@@ -239,9 +253,47 @@ struct Bench<'a> {
     arguments: &'a Arguments,
     rig: &'a Rig,
     keys: Option<&'a Receiver<String>>,
+    clock: HostClock,
 }
 
 impl Bench<'_> {
+    fn open_source(&self) -> Result<(Source, Receiver<Input>), Failure> {
+        let from = &self.arguments.from;
+        let (to, inputs) = sync_channel(WAITING);
+        let source = Source::open(from, Path::new("."), self.clock, to)
+            .map_err(|error| Complaint::new(format!("--from {from}: {error}")))?;
+        Ok((source, inputs))
+    }
+
+    /// Jogs and touch-offs by the keys; the stage gets the height that is found. False where the operator ends it.
+    fn set_up(&self, stage: &mut Stage) -> Result<bool, Failure> {
+        let Self { arguments, rig, clock, .. } = self;
+        let (Some(url), Some(keys)) = (&arguments.stage, self.keys) else {
+            let complaint =
+                Complaint::new("--jog needs the keyboard, and --from - takes the readings from it");
+            return Err(complaint.help("give the readings by another source").into());
+        };
+        // Nothing is pressed, and no file is written.
+        let journal =
+            Journal::new(&rig.setup, &arguments.presses, String::new(), Vec::new(), DepthKnowledge::Unknown)
+                .map_err(|error| about_journal(&arguments.rig, &error))?;
+        let calibration = self.calibration(Some(stage), Vec::new(), journal)?;
+        let (_source, inputs) = self.open_source()?;
+        let thread = open_stage(url, stage.clone(), *clock)?;
+        let machine = Machine::to_set_up(thread, stage.clone(), clock.elapsed());
+        let outcome = Jog::new(machine, calibration, *clock)
+            .run(&inputs, keys)
+            .map_err(|error| machine_failure(&error, ""))?;
+        if let Some(touch_z_m) = outcome.touch_z_m {
+            stage.touch_z_m = touch_z_m;
+        }
+        match outcome.end {
+            JogEnd::Begin => Ok(true),
+            JogEnd::Quit => Ok(false),
+            JogEnd::Interrupted => Err(Failure::Interrupted("stopped; nothing was pressed".to_owned())),
+        }
+    }
+
     fn calibration(
         &self,
         stage: Option<&Stage>,
@@ -261,19 +313,23 @@ impl Bench<'_> {
         weights: Weights,
         comment: String,
         placement_sd_m: Option<f64>,
+        stage: Option<Stage>,
     ) -> Result<(), Failure> {
         let Self { arguments, rig, .. } = self;
-        let plan = calibration::check_presses(rig, rows, weights);
+        let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
+        let plan = calibration::check_presses(rig, rows, weights, depths_m);
         if plan.is_empty() {
             return Err(
                 Complaint::new("there is no place between those of the calibration to check at").into()
             );
         }
         let path = calibration::check_path(&arguments.presses);
-        let journal = Journal::new(&rig.setup, &path, comment, Vec::new(), DepthKnowledge::Unknown)
+        let depths = DepthKnowledge::for_stage(stage.as_ref());
+        let journal = Journal::new(&rig.setup, &path, comment, Vec::new(), depths)
             .map_err(|error| about_journal(&arguments.rig, &error))?;
         remark!("check at {} fresh places; the presses are in {}", plan.len(), path.display());
-        self.press_all(None, self.calibration(None, plan, journal)?, None)?;
+        let calibration = self.calibration(stage.as_ref(), plan, journal)?;
+        self.press_all(stage, calibration, None)?;
         if !path.exists() {
             remark!("no place was checked");
             return Ok(());
@@ -290,15 +346,13 @@ impl Bench<'_> {
         mut calibration: Calibration,
         replan: Option<Replan>,
     ) -> Result<(), Failure> {
-        let Self { arguments, rig, keys } = self;
-        let (to, inputs) = sync_channel(WAITING);
-        let _source = Source::open(&arguments.from, Path::new("."), HostClock::new(), to)
-            .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
-        let mut machine = machine(arguments, stage)?;
+        let Self { arguments, rig, keys, clock } = self;
+        let (_source, inputs) = self.open_source()?;
+        let mut machine = machine(arguments, stage, *clock)?;
         let extent = rig.setup.surface().extent();
         if machine.is_none() {
             remark!("{}", help(replan.is_some()));
-            ask(&calibration, extent);
+            operator::ask_for(&calibration, extent);
         }
         let mut ended = false;
         while calibration.guide().waiting() != Waiting::Nothing && !ended {
@@ -316,13 +370,15 @@ impl Bench<'_> {
                 Err(RecvTimeoutError::Disconnected) => ended = true,
             }
             ended |= notes.contains(&Note::Ended);
-            say(&notes, &calibration, machine.is_none().then_some(extent));
+            operator::say(&notes, &calibration, machine.is_none().then_some(extent));
             let key = keys.as_ref().and_then(|keys| keys.try_recv().ok());
             match (&mut machine, key) {
                 (None, Some(key)) => press_key(&key, arguments, &mut calibration, extent, replan)?,
                 (None, None) => {}
-                (Some(machine), key) => step(machine, key.as_deref(), &notes, &mut calibration)
-                    .map_err(|error| machine_ended(arguments, &calibration, &error))?,
+                (Some(machine), key) => {
+                    step(machine, key.as_deref(), &notes, clock.elapsed(), &mut calibration)
+                        .map_err(|error| machine_ended(arguments, &calibration, &error))?;
+                }
             }
         }
         for (cause, count) in calibration.bad_frames() {
@@ -346,17 +402,22 @@ impl Bench<'_> {
 }
 
 /// The machine, connected, where one presses.
-fn machine(arguments: &Arguments, stage: Option<Stage>) -> Result<Option<Machine>, Failure> {
+fn machine(
+    arguments: &Arguments,
+    stage: Option<Stage>,
+    clock: HostClock,
+) -> Result<Option<Machine>, Failure> {
     let (Some(url), Some(stage)) = (&arguments.stage, stage) else { return Ok(None) };
     let limit_n = stage.force_limit_n;
-    Ok(Some(Machine::new(open_stage(url, stage)?, limit_n)))
+    let thread = open_stage(url, stage, clock)?;
+    Ok(Some(Machine::new(thread, limit_n, clock.elapsed())))
 }
 
 /// Connects to a machine, which a signal stops at once; nothing moves yet.
-fn open_stage(url: &StageUrl, stage: Stage) -> Result<StageThread, Failure> {
+fn open_stage(url: &StageUrl, stage: Stage, clock: HostClock) -> Result<StageThread, Failure> {
     let stop = Arc::default();
     progress::set_at_signal(&stop).map_err(Complaint::new)?;
-    let thread = StageThread::open(url, stage, stop).map_err(|error| {
+    let thread = StageThread::open(url, stage, stop, clock).map_err(|error| {
         if progress::interrupted() {
             return Failure::Interrupted("stopped before anything moved".to_owned());
         }
@@ -372,15 +433,14 @@ fn open_stage(url: &StageUrl, stage: Stage) -> Result<StageThread, Failure> {
 }
 
 /// Homes, and travels to every position at the height of travel.
-fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage) -> Result<(), Failure> {
+fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage, clock: HostClock) -> Result<(), Failure> {
     let Some(url) = &arguments.stage else { return Ok(()) };
     let weights = arguments.operator.statements().weights(arguments.force);
     let plan = calibration::plan(rig, weights, &stage.depths_m, &[])
         .map_err(|error| Complaint::about(&arguments.rig, error))?;
-    let mut positions: Vec<_> = plan.iter().map(|press| press.position).collect();
-    positions.dedup();
+    let positions = calibration::dry_run(&plan);
     let keys = keys();
-    let mut thread = open_stage(url, stage)?;
+    let mut thread = open_stage(url, stage, clock)?;
     remark!("the machine looks for its end stops");
     let orders = std::iter::once(Order::Home).chain(positions.iter().copied().map(Order::Travel));
     for order in orders {
@@ -419,16 +479,18 @@ fn step(
     machine: &mut Machine,
     key: Option<&str>,
     notes: &[Note],
+    now: Duration,
     calibration: &mut Calibration,
 ) -> Result<(), MachineError> {
     if key.is_some() {
         return machine.stop_by_hand();
     }
     machine.heed(notes)?;
-    match machine.step(calibration)? {
+    match machine.step(now, calibration)? {
         Some(MachineNote::Homing) => remark!("the machine looks for its end stops"),
         Some(MachineNote::Unseen) => remark!("left out: a press that no reading showed"),
         Some(MachineNote::NoRest) => remark!("left out: a press whose reading did not come to rest"),
+        Some(MachineNote::SetUp(note)) => remark!("{note}"),
         None => {}
     }
     Ok(())
@@ -453,48 +515,6 @@ fn cannot_go_on(arguments: &Arguments, calibration: &Calibration, error: Calibra
         CalibrationError::LoadCell { .. } => {
             Failure::GoalMissed(format!("{error}; {}", goes_on(arguments, calibration)))
         }
-    }
-}
-
-/// Says what happened; a person at `hand`, on this surface, is told what to do next.
-fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
-    for note in notes {
-        match note {
-            Note::Opened(name) => remark!("readings from {name}"),
-            Note::Lost(why) => remark!("the source went away: {why}; it is waited for"),
-            Note::Unread(words) => remark!("{words}"),
-            Note::Taken => {
-                let rows = calibration.journal().rows();
-                let off = calibration::last_deviation_percent(rows)
-                    .map_or(String::new(), |off| format!(", {off:.2} % off the others of its place"));
-                let force = rows.last().and_then(|row| row.force_n);
-                let force = force.map_or(String::new(), |force_n| format!(" of {force_n:.3} N"));
-                remark!("taken: press {}{force}{off}", calibration.journal().presses());
-            }
-            Note::Replaced => {
-                remark!("the reading grew: press {} is taken anew", calibration.journal().presses());
-            }
-            Note::AskedAgain(doubt) => remark!("not taken: {doubt}"),
-            Note::StillWaiting(words) => remark!("{words}"),
-            Note::Saturated(name) => remark!("channel {name} reads the end of its range"),
-            Note::Ended | Note::Waits(_) | Note::Untouched | Note::Overload(_) => {}
-        }
-        if let (Some(extent), Note::Taken | Note::AskedAgain(_) | Note::Waits(_)) = (hand, note) {
-            ask(calibration, extent);
-        }
-    }
-}
-
-fn ask(calibration: &Calibration, extent: Extent) {
-    let guide = calibration.guide();
-    match (guide.waiting(), guide.next_press()) {
-        (Waiting::Untouched, _) => remark!("leave the surface alone"),
-        (Waiting::Press, Some((number, press))) => {
-            remark!("press at {} ({} of {})", place(press, extent), number + 1, guide.plan().len());
-        }
-        (Waiting::Rest, _) => remark!("hold"),
-        (Waiting::Release, _) => remark!("let go"),
-        (Waiting::Press | Waiting::Nothing, _) => {}
     }
 }
 
@@ -559,7 +579,7 @@ fn press_key(
         }
         (_, replan) => remark!("{}", help(replan.is_some())),
     }
-    ask(calibration, extent);
+    operator::ask_for(calibration, extent);
     Ok(())
 }
 

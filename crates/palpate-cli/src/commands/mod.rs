@@ -7,6 +7,7 @@ pub mod evaluate;
 pub mod fit;
 pub mod init;
 pub mod inspect;
+mod jog;
 mod learnt;
 pub mod limit;
 pub mod locate;

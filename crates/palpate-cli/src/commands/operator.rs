@@ -4,7 +4,9 @@ use crate::failure::Failure;
 use crate::remark::remark;
 use crate::{input, output, progress};
 use palpate_estimators::recording::Row;
-use palpate_live::calibration::{Check, Press, Statements, deviation_percent};
+use palpate_live::calibration::{
+    Calibration, Check, Note, Press, Statements, Waiting, deviation_percent, last_deviation_percent,
+};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_length_mm;
@@ -134,6 +136,49 @@ pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Ext
     let placement = placement_sd_m
         .map_or_else(String::new, |sd_m| format!("; your placement of {} is in it", format_length_mm(sd_m)));
     output::say(format!("error at fresh places: median {median}, mean {mean}{covered}{placement}"))
+}
+
+/// Says what happened, and what a person who presses on a surface of the extent `hand` is to do next.
+pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
+    for note in notes {
+        match note {
+            Note::Opened(name) => remark!("readings from {name}"),
+            Note::Lost(why) => remark!("the source went away: {why}; it is waited for"),
+            Note::Unread(words) => remark!("{words}"),
+            Note::Taken => {
+                let rows = calibration.journal().rows();
+                let off = last_deviation_percent(rows)
+                    .map_or(String::new(), |off| format!(", {off:.2} % off the others of its place"));
+                let force = rows.last().and_then(|row| row.force_n);
+                let force = force.map_or(String::new(), |force_n| format!(" of {force_n:.3} N"));
+                remark!("taken: press {}{force}{off}", calibration.journal().presses());
+            }
+            Note::Replaced => {
+                remark!("the reading grew: press {} is taken anew", calibration.journal().presses());
+            }
+            Note::AskedAgain(doubt) => remark!("not taken: {doubt}"),
+            Note::StillWaiting(words) => remark!("{words}"),
+            Note::Saturated(name) => remark!("channel {name} reads the end of its range"),
+            Note::Ended | Note::Waits(_) | Note::Untouched | Note::Overload(_) => {}
+        }
+        if let (Some(extent), Note::Taken | Note::AskedAgain(_) | Note::Waits(_)) = (hand, note) {
+            ask_for(calibration, extent);
+        }
+    }
+}
+
+/// Asks for what the guide waits for.
+pub fn ask_for(calibration: &Calibration, extent: Extent) {
+    let guide = calibration.guide();
+    match (guide.waiting(), guide.next_press()) {
+        (Waiting::Untouched, _) => remark!("leave the surface alone"),
+        (Waiting::Press, Some((number, press))) => {
+            remark!("press at {} ({} of {})", place(press, extent), number + 1, guide.plan().len());
+        }
+        (Waiting::Rest, _) => remark!("hold"),
+        (Waiting::Release, _) => remark!("let go"),
+        (Waiting::Press | Waiting::Nothing, _) => {}
+    }
 }
 
 /// A press in words.

@@ -18,6 +18,7 @@ use palpate_live::server::{Access, AccessError, CalibrationPlan, Live, LiveError
 use palpate_live::simulated_board::BoardConfig;
 use palpate_live::source::SourceUrl;
 use palpate_live::stage::StageUrl;
+use palpate_live::stamp::HostClock;
 use palpate_mechanics::surface::Extent;
 use palpate_rig::Rig;
 use std::net::SocketAddr;
@@ -87,6 +88,9 @@ pub struct Arguments {
     /// Seed of fit and simulation
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    /// Run the clock of a calibration so many times as fast, for a simulated board and machine of the same --clock-speed
+    #[arg(long, value_name = "N", default_value_t = 1, hide = true, requires = "calibrate", value_parser = input::clock_speed())]
+    clock_speed: u32,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -107,7 +111,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let live = match calibration(arguments)? {
         Some(plan) => {
             let rules = rules_of(arguments, plan.rig.setup.surface().extent())?;
-            with_rules(configured(Live::calibrating(plan, PathBuf::new()), arguments), rules)
+            with_rules(
+                configured(
+                    Live::calibrating(plan, PathBuf::new(), HostClock::with_speed(arguments.clock_speed)),
+                    arguments,
+                ),
+                rules,
+            )
         }
         None => match (&arguments.locator, &arguments.from) {
             (None, Some(from)) => bringing_up(from, arguments)?,

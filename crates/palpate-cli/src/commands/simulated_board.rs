@@ -8,10 +8,11 @@ use palpate_live::simulated_board::{
     BoardConfig, FaultConfig, Finger, FrameForm, Link, LinkUrl, LoadCell, SimulatedBoard,
 };
 use palpate_live::stage::{Firmware, MachineConfig, SimulatedMachine};
+use palpate_live::stamp::HostClock;
 use palpate_mechanics::units::format_count;
 use palpate_rig::Rig;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Send what the board of a rig would send, with its noise and with faults, as a serial port or over a network.
 ///
@@ -87,6 +88,9 @@ pub struct Arguments {
     /// End after so long
     #[arg(long, value_name = "TIME", value_parser = input::time)]
     for_time: Option<f64>,
+    /// Run the clock of board and machine so many times as fast
+    #[arg(long, value_name = "N", default_value_t = 1, hide = true, value_parser = input::clock_speed())]
+    clock_speed: u32,
 }
 
 /// Name of a form of frames.
@@ -226,40 +230,40 @@ struct Plugged<'a> {
     board: SimulatedBoard<'a>,
     link: Link,
     machine: Option<PluggedMachine>,
-    away_until: Option<Instant>,
+    away_until: Option<Duration>,
     /// Commands that came from the other end.
     commands: u64,
 }
 
 impl Plugged<'_> {
     fn run(mut self, arguments: &Arguments) -> Result<(), Failure> {
-        let start = Instant::now();
+        let clock = HostClock::with_speed(arguments.clock_speed);
         let every = arguments.disconnect_every.map(Duration::from_secs_f64);
-        let mut next_disconnect = every.map(|every| start + every);
+        let mut next_disconnect = every;
         let mut unsent = 0_u64;
         loop {
-            let now = Instant::now();
-            let is_over = arguments.for_time.is_some_and(|most| (now - start).as_secs_f64() >= most);
+            let now = clock.elapsed();
+            let is_over = arguments.for_time.is_some_and(|most| now.as_secs_f64() >= most);
             if interrupted() || is_over {
                 return self.finish(unsent);
             }
-            self.obey()?;
+            self.obey(now)?;
             while let Some(news) = self.link.news() {
                 remark!("{news}");
             }
             if let Some(machine) = &mut self.machine {
-                machine.work(now - start).map_err(Complaint::new)?;
+                machine.work(now).map_err(Complaint::new)?;
                 self.board.finger_mut().hold(machine.machine.contact());
             }
             if next_disconnect.is_some_and(|at| now >= at) {
                 next_disconnect = every.map(|every| now + every);
-                self.disconnect()?;
+                self.disconnect(now)?;
             }
             if self.away_until.is_some_and(|until| now >= until) {
                 self.away_until = None;
                 remark!("{}", self.link.name());
             }
-            while self.board.next_at() <= now - start {
+            while self.board.next_at() <= now {
                 match self.board.next_frame() {
                     Some(_) if self.away_until.is_some() => unsent += 1,
                     Some(frame) => {
@@ -268,16 +272,16 @@ impl Plugged<'_> {
                     None => {}
                 }
             }
-            let next = self.board.next_at().saturating_sub(start.elapsed());
+            let next = self.board.next_at().saturating_sub(clock.elapsed()) / arguments.clock_speed;
             std::thread::sleep(next.clamp(Duration::from_micros(200), LOOK_EVERY));
         }
     }
 
-    fn obey(&mut self) -> Result<(), Failure> {
+    fn obey(&mut self, now: Duration) -> Result<(), Failure> {
         for line in self.link.lines() {
             let line = line.trim();
             if line == "disconnect" {
-                self.disconnect()?;
+                self.disconnect(now)?;
             } else if !Finger::knows(line) {
                 self.commands += 1;
                 remark!("command {}: {line}", self.commands);
@@ -288,9 +292,9 @@ impl Plugged<'_> {
         Ok(())
     }
 
-    fn disconnect(&mut self) -> Result<(), Failure> {
+    fn disconnect(&mut self, now: Duration) -> Result<(), Failure> {
         self.link.disconnect().map_err(Complaint::new)?;
-        self.away_until = Some(Instant::now() + AWAY);
+        self.away_until = Some(now + AWAY);
         Ok(())
     }
 

@@ -14,13 +14,18 @@ use std::path::{Path, PathBuf};
 /// Fresh places of a check.
 pub const CHECK_PLACES: usize = 5;
 
-/// Presses of a check: at places between those of the calibration, with its weights in turn. None where the calibration has one place.
-pub fn check_presses(rig: &Rig, rows: &[Row], weights: Weights) -> Vec<Press> {
+/// Presses of a check: at places between those of the calibration, with its weights in turn, or to `depths_m` in turn where a machine presses. None
+/// where the calibration has one place.
+pub fn check_presses(rig: &Rig, rows: &[Row], weights: Weights, depths_m: &[f64]) -> Vec<Press> {
     let extent = rig.setup.surface().extent();
     let calibrated: Vec<Position> = rows.iter().filter(|row| row.touches()).map(|row| row.position).collect();
-    let forces = [weights.first_n(rig), weights.second_n.or(weights.first_n(rig))];
-    let places = fresh_places(&calibrated, extent).into_iter().zip(forces.into_iter().cycle());
-    places.map(|(position, force_n)| Press { position, force_n, depth_m: None }).collect()
+    let first_n = weights.first_n(rig);
+    // Presses of several depths have several forces.
+    let by_depth = depths_m.iter().map(|depth_m| (first_n.filter(|_| depths_m.len() == 1), Some(*depth_m)));
+    let by_weight = [first_n, weights.second_n.or(first_n)].map(|force_n| (force_n, None));
+    let strengths: Vec<_> = if depths_m.is_empty() { by_weight.to_vec() } else { by_depth.collect() };
+    let places = fresh_places(&calibrated, extent).into_iter().zip(strengths.into_iter().cycle());
+    places.map(|(position, (force_n, depth_m))| Press { position, force_n, depth_m }).collect()
 }
 
 /// Places far from those of a calibration, one in each of [`CHECK_PLACES`] equal stretches of its longer side.
@@ -214,7 +219,7 @@ mod tests {
         let rig = rig();
         let task = rig.simulate(0).unwrap();
         let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &task)).unwrap();
-        let presses = check_presses(&rig, &task.rows, Weights::default());
+        let presses = check_presses(&rig, &task.rows, Weights::default(), &[]);
         let positions: Vec<Position> = presses.iter().map(|press| press.position).collect();
         let mut recording = palpate_estimators::simulate::simulate_at(&rig.setup, &positions, 1, 5).unwrap();
         let check = Check::new(&locator, &recording).unwrap().unwrap();

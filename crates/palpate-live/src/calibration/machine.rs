@@ -1,26 +1,28 @@
-//! A machine that presses where the guide of a calibration asks for it.
+//! A machine that presses where the guide of a calibration asks for it, or is set up before.
 
 use super::guide::Waiting;
 use super::press::Press;
 use super::run::{Calibration, Note};
+use super::set_up::{SetUp, SetUpAction, SetUpNote, SetUpTask};
 use crate::stage::{Done, Doubt, Finger, Order, StageError, StageThread, Stopping};
+use palpate_rig::Stage;
 use serde::Serialize;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// Readings that stay away for so long stop the machine: nobody sees what it does.
+/// Time without readings after which the machine is stopped.
 const SILENT: Duration = Duration::from_secs(2);
 /// Time in which a press must be seen in the readings, and in which its reading must come to rest.
 const SEEN_WITHIN: Duration = Duration::from_secs(3);
 const AT_REST_WITHIN: Duration = Duration::from_secs(60);
 /// Time in which the surface must be at rest when it has been let go.
 const RELEASED_WITHIN: Duration = Duration::from_secs(300);
-/// Presses in a row that no reading shows, after which no more are tried.
+/// Unseen presses in a row after which the run ends.
 const MOST_UNSEEN: u32 = 3;
 
 /// A machine that ended its work.
 #[derive(Debug, thiserror::Error)]
 pub enum MachineError {
-    /// It does not do what it is asked for.
+    /// The stage failed.
     #[error(transparent)]
     Stage(#[from] StageError),
     /// A channel reads the end of its range.
@@ -39,19 +41,19 @@ pub enum MachineError {
         /// The limit.
         limit_n: f64,
     },
-    /// Readings that stay away.
+    /// No readings.
     #[error("no reading came for {} s: the machine was stopped", SILENT.as_secs())]
     Silent,
-    /// Somebody stopped it.
+    /// A stop by hand.
     #[error("the machine was stopped by hand")]
     ByHand,
-    /// Nobody who could stop it.
+    /// No page is open.
     #[error("nobody has watched the machine for {seconds} s: its finger was lifted")]
     Unwatched {
-        /// Seconds that somebody was waited for.
+        /// Seconds without an open page.
         seconds: u64,
     },
-    /// Presses that nobody sees.
+    /// Unseen presses.
     #[error(
         "the readings have not shown the last {MOST_UNSEEN} presses: `touch` or `depths` of [stage] are wrong"
     )]
@@ -90,7 +92,7 @@ impl MachineError {
     }
 }
 
-/// Step of a machine that people are told of.
+/// Step of a machine, for messages.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MachineNote {
     /// It looks for its end stops.
@@ -99,17 +101,21 @@ pub enum MachineNote {
     Unseen,
     /// A press whose reading did not come to rest is left out.
     NoRest,
+    /// A task of the set-up has ended, or gone on.
+    SetUp(SetUpNote),
 }
 
 /// Motion of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Motion {
-    /// It waits for the first reading: nothing moves unseen.
+    /// It waits for the first reading.
     Blind,
     /// It looks for its end stops.
     Homing,
-    /// It travels to a place, and presses there.
+    /// It travels at the height of travel.
+    Travelling,
+    /// It travels to a place, and presses there; or it goes down in search of the touch.
     Pressing,
     /// It lifts its finger.
     Lifting,
@@ -119,17 +125,25 @@ pub enum Motion {
     Down,
 }
 
-/// A machine that presses where the guide of a calibration asks for it.
+/// A machine that presses where the guide of a calibration asks for it, or is set up before.
+///
+/// The instants of its steps are those of the clock of its [`StageThread`].
 #[derive(Debug)]
 pub struct Machine {
     thread: StageThread,
+    /// Tasks of a machine that is set up; `None` of one that presses.
+    set_up: Option<SetUp>,
     force_limit_n: f64,
     motion: Motion,
     /// The press that it was sent to last.
     press: Option<Press>,
-    since: Instant,
+    /// Position after the last move, in metres of the machine.
+    at_m: Option<[f64; 3]>,
+    now: Duration,
+    /// Instant of the last order, or of its end.
+    since: Duration,
     readings: u64,
-    read_at: Instant,
+    read_at: Duration,
     unseen: u32,
     /// Error with which it ends once its finger is lifted.
     ends_with: Option<MachineError>,
@@ -137,13 +151,30 @@ pub struct Machine {
 
 impl Machine {
     /// A machine whose stage is connected, and not homed yet.
-    pub fn new(thread: StageThread, force_limit_n: Option<f64>) -> Self {
-        let now = Instant::now();
+    pub fn new(thread: StageThread, force_limit_n: Option<f64>, now: Duration) -> Self {
+        Self::with_tasks(thread, force_limit_n, now, None)
+    }
+
+    /// A machine that is set up: it homes, and does what [`Self::ask`] asks for. No press is taken.
+    pub fn to_set_up(thread: StageThread, stage: Stage, now: Duration) -> Self {
+        let limit_n = stage.force_limit_n;
+        Self::with_tasks(thread, limit_n, now, Some(SetUp::new(stage)))
+    }
+
+    fn with_tasks(
+        thread: StageThread,
+        force_limit_n: Option<f64>,
+        now: Duration,
+        set_up: Option<SetUp>,
+    ) -> Self {
         Self {
             thread,
+            set_up,
             force_limit_n: force_limit_n.unwrap_or(f64::INFINITY),
             motion: Motion::Blind,
             press: None,
+            at_m: None,
+            now,
             since: now,
             readings: 0,
             read_at: now,
@@ -165,6 +196,31 @@ impl Machine {
     /// The press that it was sent to last; `None` before the first.
     pub fn press(&self) -> Option<Press> {
         self.press
+    }
+
+    /// Position after its last move, in metres of the machine; `None` before homing.
+    pub fn position_m(&self) -> Option<[f64; 3]> {
+        self.at_m
+    }
+
+    /// Asks for a task of a machine that is set up, which follows those before it; false of one that presses.
+    pub fn ask(&mut self, task: SetUpTask) -> bool {
+        let Some(set_up) = &mut self.set_up else { return false };
+        set_up.ask(task);
+        true
+    }
+
+    /// True where it rests, has no task of a set-up any more, and waits for one.
+    pub fn is_idle(&self) -> bool {
+        self.motion == Motion::Up && self.set_up.as_ref().is_some_and(SetUp::is_idle)
+    }
+
+    /// True once nothing is left to do, so that it is to be finished.
+    pub fn is_done(&self, calibration: &Calibration) -> bool {
+        match &self.set_up {
+            None => calibration.guide().waiting() == Waiting::Nothing,
+            Some(set_up) => set_up.has_ended(),
+        }
     }
 
     /// Stops it at once, where what the calibration noted asks for that.
@@ -190,29 +246,76 @@ impl Machine {
         self.fail(MachineError::ByHand)
     }
 
-    /// Has it do what the guide waits for; to be called often.
+    /// Has it do what is next, at an instant; to be called often.
     ///
     /// # Errors
     /// [`MachineError`] once it has ended its work.
-    pub fn step(&mut self, calibration: &mut Calibration) -> Result<Option<MachineNote>, MachineError> {
+    pub fn step(
+        &mut self,
+        now: Duration,
+        calibration: &mut Calibration,
+    ) -> Result<Option<MachineNote>, MachineError> {
+        self.now = now;
         if calibration.readings() > self.readings {
-            (self.readings, self.read_at) = (calibration.readings(), Instant::now());
+            (self.readings, self.read_at) = (calibration.readings(), now);
         }
-        if self.motion != Motion::Blind && self.read_at.elapsed() > SILENT {
+        if self.needs_readings() && now.saturating_sub(self.read_at) > SILENT {
             return self.fail(MachineError::Silent);
         }
         match self.thread.done() {
-            Some(Ok(Done::Up)) => {
+            Some(Ok(Done::Up(at_m))) => {
                 if let Some(error) = self.ends_with.take() {
                     self.thread.close();
                     return Err(error);
                 }
+                self.at_m = Some(at_m);
                 self.enter(Motion::Up, calibration);
             }
-            Some(Ok(Done::Down)) => self.enter(Motion::Down, calibration),
+            Some(Ok(Done::Down(at_m))) => {
+                self.at_m = Some(at_m);
+                self.enter(Motion::Down, calibration);
+            }
             Some(Err(error)) => return Err(error.into()),
             None => {}
         }
+        match self.set_up {
+            None => self.press_next(calibration),
+            Some(_) => Ok(self.set_up_next(calibration)),
+        }
+    }
+
+    /// True where its work depends on readings.
+    fn needs_readings(&self) -> bool {
+        match &self.set_up {
+            None => self.motion != Motion::Blind,
+            Some(set_up) => set_up.needs_readings(),
+        }
+    }
+
+    /// Does what the next task of the set-up asks for, where it rests.
+    fn set_up_next(&mut self, calibration: &mut Calibration) -> Option<MachineNote> {
+        if self.motion == Motion::Blind {
+            self.order(Order::Home, calibration);
+            return Some(MachineNote::Homing);
+        }
+        let at_m = self.at_m.filter(|_| matches!(self.motion, Motion::Up | Motion::Down))?;
+        let set_up = self.set_up.as_mut()?;
+        if set_up.is_between_tasks() {
+            // The next task waits, and needs readings, from now on.
+            (self.since, self.read_at) = (self.now, self.now);
+        }
+        let waited = self.now.saturating_sub(self.since);
+        match set_up.next(at_m, waited, calibration) {
+            SetUpAction::Wait => {}
+            SetUpAction::Note(note) => return Some(MachineNote::SetUp(note)),
+            SetUpAction::Order(order) => self.order(order, calibration),
+        }
+        None
+    }
+
+    /// Does what the guide waits for.
+    fn press_next(&mut self, calibration: &mut Calibration) -> Result<Option<MachineNote>, MachineError> {
+        let waited = self.now.saturating_sub(self.since);
         match (self.motion, calibration.guide().waiting()) {
             (Motion::Blind, _) if self.readings > 0 => {
                 self.order(Order::Home, calibration);
@@ -225,7 +328,7 @@ impl Machine {
                     self.order(Order::Press { position: press.position, depth_m }, calibration);
                 }
             }
-            (Motion::Up, Waiting::Untouched | Waiting::Release) if self.since.elapsed() > RELEASED_WITHIN => {
+            (Motion::Up, Waiting::Untouched | Waiting::Release) if waited > RELEASED_WITHIN => {
                 self.thread.close();
                 return Err(MachineError::NoRest);
             }
@@ -233,7 +336,7 @@ impl Machine {
                 self.unseen = 0;
                 self.order(Order::Lift, calibration);
             }
-            (Motion::Down, Waiting::Press) if self.since.elapsed() > SEEN_WITHIN => {
+            (Motion::Down, Waiting::Press) if waited > SEEN_WITHIN => {
                 self.leave_out(calibration);
                 self.unseen += 1;
                 if self.unseen == MOST_UNSEEN {
@@ -241,7 +344,7 @@ impl Machine {
                 }
                 return Ok(Some(MachineNote::Unseen));
             }
-            (Motion::Down, Waiting::Rest) if self.since.elapsed() > AT_REST_WITHIN => {
+            (Motion::Down, Waiting::Rest) if waited > AT_REST_WITHIN => {
                 self.leave_out(calibration);
                 return Ok(Some(MachineNote::NoRest));
             }
@@ -266,7 +369,7 @@ impl Machine {
     }
 
     fn enter(&mut self, motion: Motion, calibration: &mut Calibration) {
-        (self.motion, self.since) = (motion, Instant::now());
+        (self.motion, self.since) = (motion, self.now);
         calibration.set_guided(true);
     }
 
@@ -274,10 +377,11 @@ impl Machine {
         calibration.set_guided(false);
         let motion = match order {
             Order::Home => Motion::Homing,
-            Order::Travel(_) | Order::Press { .. } => Motion::Pressing,
+            Order::Travel(_) | Order::Jog(_) => Motion::Travelling,
+            Order::Press { .. } | Order::Lower(_) => Motion::Pressing,
             Order::Lift => Motion::Lifting,
         };
-        (self.motion, self.since) = (motion, Instant::now());
+        (self.motion, self.since) = (motion, self.now);
         self.thread.order(order);
     }
 

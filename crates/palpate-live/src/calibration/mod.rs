@@ -3,7 +3,7 @@
 //! The [`Guide`] takes readings with their instants and says what it waits for; it uses no device, file or clock. A [`Calibration`] passes the readings of
 //! a source to it, and writes every press to the file of a [`Journal`] before the next one is asked for. A [`Machine`] presses in place of a person; an
 //! [`Assessment`] estimates the error of the locator, and the gain of more presses; a [`Check`] measures the error at fresh places. [`Statements`] are
-//! what the operator says before the first press.
+//! what the operator says before the first press; a [`SetUpTask`] has a machine show its way or find the height of the touch before it.
 
 mod assessment;
 mod baseline;
@@ -16,8 +16,10 @@ mod press;
 mod repeat_check;
 mod repeats;
 mod run;
+mod set_up;
 mod statements;
 mod stretch;
+mod touch_off;
 mod trace;
 
 pub use assessment::{Assessment, Gain, HeldOut};
@@ -30,7 +32,9 @@ pub use press::Press;
 pub use repeat_check::Doubt;
 pub use repeats::{Place, deviation_percent, last_deviation_percent, places};
 pub use run::{Calibration, CalibrationError, Note};
+pub use set_up::{LONGEST_JOG_M, SetUpNote, SetUpTask, dry_run};
 pub use statements::Statements;
+pub use touch_off::TouchOffFailure;
 pub use trace::Trace;
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use super::journal::{Journal, JournalError};
 use super::press::Press;
 use super::repeat_check::Doubt;
 use super::repeats::untouched_before;
+use super::touch_off::TouchDetector;
 use super::trace::RecentReadings;
 use crate::event::{ChannelState, Event};
 use crate::frame::{BadFrame, Channel, ColumnsError, Decoder, Frame};
@@ -90,8 +91,10 @@ pub struct Calibration {
     readings: u64,
     last: Vec<f64>,
     recent: RecentReadings,
-    /// True while readings are shown to the guide: not while a machine moves.
+    /// True while readings are shown to the guide and to the detector: not while a machine moves.
     is_guided: bool,
+    /// Detector of a touch-off.
+    touch_detector: Option<TouchDetector>,
     /// Step that is waited for, and the instant of its last explanation.
     explained: (Waiting, Duration),
 }
@@ -136,6 +139,7 @@ impl Calibration {
             last: Vec::new(),
             recent: RecentReadings::default(),
             is_guided: true,
+            touch_detector: None,
         })
     }
 
@@ -172,7 +176,9 @@ impl Calibration {
 
     /// Untouched reading of the load cell, in newtons; 0 before it is learnt.
     fn cell_untouched_n(&self) -> f64 {
-        self.guide.untouched_reading().and_then(|reading| reading.last().copied()).unwrap_or(0.0)
+        let of_guide = self.guide.untouched_reading().and_then(|reading| reading.last().copied());
+        let of_detector = || self.touch_detector.as_ref().and_then(TouchDetector::untouched_last);
+        of_guide.or_else(of_detector).unwrap_or(0.0)
     }
 
     /// Takes what a source brought; what follows is added to `notes`.
@@ -249,6 +255,11 @@ impl Calibration {
         if !self.is_guided {
             return Ok(());
         }
+        if let Some(detector) = &mut self.touch_detector {
+            // A load cell sees the touch best: its value alone decides.
+            let from = if self.load_cell.is_some() { channels } else { 0 };
+            detector.add(at, &reading[from..]);
+        }
         let last_press = |guide: &Guide| Some(guide.plan()[guide.taken().checked_sub(1)?]);
         let progress = self.guide.add(at, reading);
         let depth_m = last_press(&self.guide).and_then(|press| press.depth_m);
@@ -321,8 +332,21 @@ impl Calibration {
     pub(super) fn set_guided(&mut self, is_guided: bool) {
         if is_guided != self.is_guided {
             self.guide.forget_readings();
+            if let Some(detector) = &mut self.touch_detector {
+                detector.forget_readings();
+            }
         }
         self.is_guided = is_guided;
+    }
+
+    /// Begins to look for a touch in the readings, or ends that.
+    pub(super) fn detect_touch(&mut self, is_wanted: bool) {
+        self.touch_detector = is_wanted.then(TouchDetector::default);
+    }
+
+    /// The detector of a touch-off; `None` outside one.
+    pub(super) fn touch_detector(&mut self) -> Option<&mut TouchDetector> {
+        self.touch_detector.as_mut()
     }
 
     /// Takes back the last press, which is asked for again; false where there is none.

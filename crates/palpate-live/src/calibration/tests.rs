@@ -85,7 +85,7 @@ fn presses_are_struck_out_redone_fitted_and_checked() {
     assert_eq!(locator.provenance.recording.placement_sd_m, Some(2e-3));
     // Fresh places, in a file of their own.
     let checked = check_path(&path);
-    let mut check = begun(&rig, &checked, check_presses(&rig, &recording.rows, Weights::default()));
+    let mut check = begun(&rig, &checked, check_presses(&rig, &recording.rows, Weights::default(), &[]));
     hand.obey(&mut check, |_| false);
     let recording = read(&rig, &checked);
     let check = Check::new(&locator, &recording).unwrap().unwrap();

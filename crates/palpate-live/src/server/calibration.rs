@@ -6,8 +6,8 @@ use super::press_records::{CheckRecord, PressRecord, press_records};
 use super::pressing::{MachineRun, listen};
 use super::shared::Shared;
 use crate::calibration::{
-    Assessment, Calibration, Check, DepthKnowledge, Journal, JournalError, PlanError, Press, Statements,
-    Trace, Waiting, check_path, check_presses, places, plan,
+    Assessment, Calibration, Check, DepthKnowledge, Journal, JournalError, LONGEST_JOG_M, PlanError, Press,
+    SetUpTask, Statements, Trace, Waiting, check_path, check_presses, dry_run, places, plan,
 };
 use crate::frame::{Channel, ColumnsError};
 use crate::input::Input;
@@ -25,6 +25,7 @@ use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 use palpate_rig::{Rig, Stage};
 use serde::Serialize;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
@@ -69,8 +70,12 @@ impl CalibrationPlan {
 
     /// The presses that are not among these rows.
     fn to_come(&self, statements: &Statements, rows: &[Row]) -> Result<Vec<Press>, PlanError> {
-        let depths_m = self.machine().map_or(&[][..], |(_, stage)| &stage.depths_m);
-        plan(&self.rig, statements.weights(self.force_n), depths_m, rows)
+        plan(&self.rig, statements.weights(self.force_n), self.depths_m(), rows)
+    }
+
+    /// Depths of the presses; none where a person presses.
+    fn depths_m(&self) -> &[f64] {
+        self.machine().map_or(&[], |(_, stage)| &stage.depths_m)
     }
 
     /// The comment of a file of presses.
@@ -94,6 +99,12 @@ pub enum CalibratorError {
     /// There is no machine that could be stopped.
     #[error("no machine runs")]
     NoMachine,
+    /// No machine is set up, which a jog or a touch-off needs.
+    #[error("the machine is not connected for a jog or a touch-off")]
+    NotSetUp,
+    /// A jog that is too long, or no move.
+    #[error("a jog moves one axis by at most {} mm, and not by 0", LONGEST_JOG_M * 1e3)]
+    Jog,
     /// There is nothing to fit, or to take back.
     #[error("no press was taken yet")]
     NoPress,
@@ -146,6 +157,8 @@ enum Phase {
     Done,
     /// Presses at fresh places are asked for, which check the locator.
     Checking,
+    /// A machine is set up: a dry run, jogs, touch-off.
+    SettingUp,
 }
 
 /// State of a calibration as a record of JSON.
@@ -176,8 +189,10 @@ pub struct CalibrationRecord {
     outcome: Option<OutcomeRecord>,
     /// The last check of the locator.
     check: Option<CheckRecord>,
-    /// True where the locator can be checked by hand.
+    /// True where the locator can be checked.
     can_check: bool,
+    /// True where a machine can be set up.
+    can_set_up: bool,
 }
 
 /// A place of a calibration.
@@ -209,6 +224,9 @@ struct OutcomeRecord {
 /// A calibration, its state behind a lock.
 pub struct Calibrator {
     plan: CalibrationPlan,
+    /// Folder of the paths of sources.
+    folder: PathBuf,
+    clock: HostClock,
     channels: Vec<Channel>,
     state: Mutex<State>,
     /// The stop of the machine that was started last: apart from the state, which may be waited for.
@@ -224,8 +242,12 @@ struct State {
     traces: Vec<Option<Trace>>,
     errors_m: Vec<Option<f64>>,
     statements: Statements,
+    /// Height of the touch that a touch-off found, in metres of the machine.
+    touch_z_m: Option<f64>,
     running: Option<Running>,
     problem: Option<String>,
+    /// Outcome of the last set-up.
+    hint: Option<String>,
     outcome: Option<OutcomeRecord>,
     check: Option<CheckRecord>,
 }
@@ -239,6 +261,8 @@ enum Purpose {
     Press,
     /// Presses are taken at fresh places.
     Check,
+    /// A machine is set up.
+    SetUp,
 }
 
 /// A calibration that runs, with its thread and its source.
@@ -253,8 +277,8 @@ struct Running {
 }
 
 impl Calibrator {
-    /// A calibration that has not begun.
-    pub fn new(mut plan: CalibrationPlan) -> Self {
+    /// A calibration that has not begun, whose source may be a path in a folder.
+    pub fn new(mut plan: CalibrationPlan, folder: PathBuf, clock: HostClock) -> Self {
         let rows = std::mem::take(&mut plan.before);
         let state = State {
             phase: Phase::Ready,
@@ -262,17 +286,21 @@ impl Calibrator {
             rows,
             errors_m: Vec::new(),
             statements: plan.statements,
+            touch_z_m: None,
             running: None,
             problem: None,
+            hint: None,
             outcome: None,
             check: None,
         };
         Self {
             channels: Channel::all_of(&plan.rig.setup),
             plan,
+            folder,
+            clock,
             state: Mutex::new(state),
             stop: Mutex::default(),
-            attendance: Arc::default(),
+            attendance: Arc::new(Attendance::new(clock)),
         }
     }
 
@@ -291,18 +319,12 @@ impl Calibrator {
     ///
     /// # Errors
     /// [`CalibratorError`] where it goes on already, the source cannot be opened, or the presses cannot be kept.
-    pub fn begin(
-        &self,
-        stated: Statements,
-        folder: &Path,
-        clock: HostClock,
-        free_source: impl FnOnce(),
-    ) -> Result<(), CalibratorError> {
+    pub fn begin(&self, stated: Statements, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
         stated.check()?;
         let mut state = self.lock();
         match state.phase() {
             Phase::Ready | Phase::Pressed | Phase::Done => {}
-            Phase::Pressing | Phase::Fitting | Phase::Assessing | Phase::Checking => {
+            Phase::Pressing | Phase::Fitting | Phase::Assessing | Phase::Checking | Phase::SettingUp => {
                 return Err(CalibratorError::GoesOn);
             }
         }
@@ -310,27 +332,91 @@ impl Calibrator {
         let CalibrationPlan { rig, presses, .. } = &self.plan;
         state.state(stated);
         let to_come = self.plan.to_come(&state.statements, &state.rows)?;
-        let machine = self.plan.machine().filter(|_| !to_come.is_empty());
-        let stage = machine.map(|(_, stage)| stage);
+        let machine = self.machine_run(&state, None).filter(|_| !to_come.is_empty());
+        let depths = DepthKnowledge::for_stage(machine.as_ref().map(|machine| &machine.stage));
         let (rows, comment) = (state.rows.clone(), self.plan.comment(&state.statements));
-        let journal = Journal::new(&rig.setup, presses, comment, rows, DepthKnowledge::for_stage(stage))?
-            .with_traces(state.traces.clone());
-        let machine = machine.map(|(url, stage)| MachineRun {
-            url: url.clone(),
-            stage: stage.clone(),
-            stop: self.new_stop(),
-            attendance: Arc::clone(&self.attendance),
-        });
+        let journal =
+            Journal::new(&rig.setup, presses, comment, rows, depths)?.with_traces(state.traces.clone());
         // Many sources have room for one.
         free_source();
-        let running = self.run(Purpose::Press, to_come, journal, machine, folder, clock)?;
-        (state.phase, state.problem) = (Phase::Pressing, None);
+        let running = self.run(Purpose::Press, to_come, journal, machine)?;
+        (state.phase, state.problem, state.hint) = (Phase::Pressing, None, None);
         state.running = Some(running);
         Ok(())
     }
 
+    /// Connects to the machine, which homes; with `dry_run` it travels over all places at the height of travel, and ends. Nothing is recorded.
+    ///
+    /// # Errors
+    /// [`CalibratorError`] where there is no machine, something goes on, or the source cannot be opened.
+    pub fn begin_set_up(&self, is_dry_run: bool, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
+        let mut state = self.lock();
+        if self.plan.machine().is_none() {
+            return Err(CalibratorError::NoMachine);
+        }
+        if !self.can_set_up(&state) {
+            return Err(CalibratorError::GoesOn);
+        }
+        let CalibrationPlan { rig, presses, comment, .. } = &self.plan;
+        let first = match is_dry_run {
+            true => Some(SetUpTask::DryRun(dry_run(&self.plan.to_come(&state.statements, &[])?))),
+            false => None,
+        };
+        let machine = self.machine_run(&state, Some(first.into_iter().collect()));
+        let journal =
+            Journal::new(&rig.setup, presses, comment.clone(), Vec::new(), DepthKnowledge::Unknown)?;
+        free_source();
+        let running = self.run(Purpose::SetUp, Vec::new(), journal, machine)?;
+        (state.problem, state.hint) = (None, None);
+        state.running = Some(running);
+        Ok(())
+    }
+
+    fn can_set_up(&self, state: &State) -> bool {
+        let is_free = matches!(state.phase, Phase::Ready | Phase::Pressed) && state.running.is_none();
+        is_free && self.plan.machine().is_some()
+    }
+
+    /// Has a machine that is set up do a task.
+    ///
+    /// # Errors
+    /// [`CalibratorError::NotSetUp`], or [`CalibratorError::Jog`] for one that is too long.
+    pub fn ask_set_up(&self, task: SetUpTask) -> Result<(), CalibratorError> {
+        if let SetUpTask::Jog(by_m) = &task {
+            let is_short = by_m.iter().all(|by_m| by_m.abs() <= LONGEST_JOG_M);
+            if !is_short || *by_m == [0.0; 3] {
+                return Err(CalibratorError::Jog);
+            }
+        }
+        let state = self.lock();
+        let running = state.running.as_ref().filter(|running| running.purpose == Purpose::SetUp);
+        let running = running.ok_or(CalibratorError::NotSetUp)?;
+        locked(&running.shared).tasks.push_back(task);
+        Ok(())
+    }
+
+    /// A run of the machine, with its tasks where it is set up; `None` where a person presses.
+    fn machine_run(&self, state: &State, set_up: Option<Vec<SetUpTask>>) -> Option<MachineRun> {
+        let (url, _) = self.plan.machine()?;
+        Some(MachineRun {
+            url: url.clone(),
+            stage: self.stage(state)?,
+            set_up,
+            stop: self.new_stop(),
+            attendance: Arc::clone(&self.attendance),
+            clock: self.clock,
+        })
+    }
+
+    /// The stage of the rig, with the height that a touch-off found.
+    fn stage(&self, state: &State) -> Option<Stage> {
+        let (_, stage) = self.plan.machine()?;
+        let touch_z_m = state.touch_z_m.unwrap_or(stage.touch_z_m);
+        Some(Stage { touch_z_m, ..stage.clone() })
+    }
+
     /// Shows readings before it begins, where a person presses and the source can be opened.
-    pub fn preview(&self, folder: &Path, clock: HostClock) {
+    pub fn preview(&self) {
         let mut state = self.lock();
         let waits = state.phase == Phase::Ready && state.running.is_none() && state.problem.is_none();
         if !waits || state.outcome.is_some() || self.plan.machine().is_some() {
@@ -340,52 +426,53 @@ impl Calibrator {
         let journal = Journal::new(&rig.setup, presses, comment.clone(), Vec::new(), DepthKnowledge::Unknown);
         let running = journal
             .map_err(CalibratorError::from)
-            .and_then(|journal| self.run(Purpose::Preview, Vec::new(), journal, None, folder, clock));
+            .and_then(|journal| self.run(Purpose::Preview, Vec::new(), journal, None));
         match running {
             Ok(running) => state.running = Some(running),
             Err(error) => state.problem = Some(error.to_string()),
         }
     }
 
-    /// Asks for presses at fresh places, which check the locator on disk. `free_source` ends the session that has the source.
+    /// Has a person or the machine press at fresh places, which check the locator on disk. `free_source` ends the session that has the source.
     ///
     /// # Errors
-    /// [`CalibratorError`] where there is nothing to check, the source cannot be opened, or a machine presses.
-    pub fn begin_check(
-        &self,
-        folder: &Path,
-        clock: HostClock,
-        free_source: impl FnOnce(),
-    ) -> Result<(), CalibratorError> {
+    /// [`CalibratorError`] where there is nothing to check, or the source cannot be opened.
+    pub fn begin_check(&self, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if !self.can_check(&state) {
             return Err(CalibratorError::NothingToCheck);
         }
         let CalibrationPlan { rig, presses, force_n, .. } = &self.plan;
-        let to_press = check_presses(rig, &state.rows, state.statements.weights(*force_n));
+        let weights = state.statements.weights(*force_n);
+        let to_press = check_presses(rig, &state.rows, weights, self.plan.depths_m());
         if to_press.is_empty() {
             return Err(CalibratorError::NothingToCheck);
         }
         let (path, comment) = (check_path(presses), self.plan.comment(&state.statements));
-        let journal = Journal::new(&rig.setup, &path, comment, Vec::new(), DepthKnowledge::Unknown)?;
+        let machine = self.machine_run(&state, None);
+        let depths = DepthKnowledge::for_stage(machine.as_ref().map(|machine| &machine.stage));
+        let journal = Journal::new(&rig.setup, &path, comment, Vec::new(), depths)?;
         free_source();
-        let running = self.run(Purpose::Check, to_press, journal, None, folder, clock)?;
+        let running = self.run(Purpose::Check, to_press, journal, machine)?;
         (state.phase, state.problem, state.check) = (Phase::Checking, None, None);
         state.running = Some(running);
         Ok(())
     }
 
     fn can_check(&self, state: &State) -> bool {
-        state.phase == Phase::Done && state.running.is_none() && self.plan.machine().is_none()
+        state.phase == Phase::Done && state.running.is_none()
     }
 
-    /// Ends a check whose presses are all taken, and measures the locator by them; false where none has come to its end. The session may
-    /// have the source again then.
+    /// Ends a check whose presses are all taken, or whose machine has ended, and measures the locator by them; false where none has come to
+    /// its end. The session may have the source again then.
     pub fn finish_check(&self) -> bool {
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         let is_over = |running: &Running| {
             running.purpose == Purpose::Check
-                && locked(&running.shared).calibration.guide().waiting() == Waiting::Nothing
+                && match running.by_machine {
+                    true => running.thread.is_finished(),
+                    false => locked(&running.shared).calibration.guide().waiting() == Waiting::Nothing,
+                }
         };
         let Some(running) = state.running.as_ref().filter(|running| is_over(running)) else { return false };
         let path = locked(&running.shared).calibration.journal().path().to_owned();
@@ -420,8 +507,6 @@ impl Calibrator {
         to_come: Vec<Press>,
         journal: Journal,
         machine: Option<MachineRun>,
-        folder: &Path,
-        clock: HostClock,
     ) -> Result<Running, CalibratorError> {
         let CalibrationPlan { rig, from, .. } = &self.plan;
         let stage = machine.as_ref().map(|machine| &machine.stage);
@@ -434,13 +519,14 @@ impl Calibrator {
             problem: None,
             hint: None,
             machine: MachineState::default(),
+            tasks: VecDeque::new(),
         };
         let shared = Arc::new(Mutex::new(shared));
         let (inputs, received) = sync_channel(WAITING);
-        let source = Source::open(from, folder, clock, inputs.clone())?;
+        let source = Source::open(from, &self.folder, self.clock, inputs.clone())?;
         let heard = Arc::clone(&shared);
         let run = move || match machine {
-            Some(machine) => machine.press(&received, &heard),
+            Some(machine) => machine.run(&received, &heard),
             None => listen(&received, &heard),
         };
         let thread = std::thread::Builder::new().name("calibration".to_owned()).spawn(run)?;
@@ -498,11 +584,14 @@ impl Calibrator {
         })
     }
 
-    /// Ends the presses early; a machine lifts its finger first.
+    /// Ends the presses, or the set-up, early; a machine lifts its finger first.
     ///
     /// # Errors
     /// [`CalibratorError::NotBegun`].
     pub fn stop(&self) -> Result<(), CalibratorError> {
+        if self.ask_set_up(SetUpTask::End).is_ok() {
+            return Ok(());
+        }
         self.with_calibration(|calibration| {
             calibration.stop();
             Ok(())
@@ -518,7 +607,7 @@ impl Calibrator {
         if state.machine_presses() {
             return Err(CalibratorError::MachinePresses);
         }
-        if matches!(state.phase(), Phase::Fitting | Phase::Assessing | Phase::Checking) {
+        if matches!(state.phase(), Phase::Fitting | Phase::Assessing | Phase::Checking | Phase::SettingUp) {
             return Err(CalibratorError::GoesOn);
         }
         let index = press.wrapping_sub(1);
@@ -591,7 +680,7 @@ impl Calibrator {
     /// [`CalibratorError::NoPress`], or [`CalibratorError::GoesOn`] where they are fitted already.
     pub fn begin_fit(&self) -> Result<(), CalibratorError> {
         let mut state = self.lock();
-        if matches!(state.phase(), Phase::Fitting | Phase::Assessing | Phase::Checking) {
+        if matches!(state.phase(), Phase::Fitting | Phase::Assessing | Phase::Checking | Phase::SettingUp) {
             return Err(CalibratorError::GoesOn);
         }
         if state.machine_presses() {
@@ -681,15 +770,16 @@ impl Calibrator {
                 Some(_) => None,
             },
             problem: state.problem.clone(),
-            hint: None,
+            hint: state.hint.clone(),
             machine: None,
             outcome: state.outcome.clone(),
             check: state.check.clone(),
             can_check: self.can_check(&state),
+            can_set_up: self.can_set_up(&state),
         };
         let running = state.running.as_ref();
         match running.filter(|running| running.purpose != Purpose::Preview) {
-            Some(running) => self.write_running(&locked(&running.shared), &mut record, extent),
+            Some(running) => self.write_running(&state, running, &mut record),
             None => {
                 let to_come = match state.phase {
                     Phase::Ready => self.plan.to_come(&state.statements, &state.rows),
@@ -697,7 +787,7 @@ impl Calibrator {
                 };
                 let to_come = to_come.unwrap_or_default();
                 write_places(&state.rows, &to_come, extent, &mut record);
-                record.machine = self.machine_record(&state.rows, &to_come);
+                record.machine = self.machine_record(&state, &state.rows, &to_come);
                 if let Some(preview) = running {
                     self.write_readings(&locked(&preview.shared), &mut record);
                 }
@@ -706,13 +796,25 @@ impl Calibrator {
         record
     }
 
-    fn write_running(&self, shared: &Shared, record: &mut CalibrationRecord, extent: Extent) {
+    fn write_running(&self, state: &State, running: &Running, record: &mut CalibrationRecord) {
+        let (shared, extent) = (&*locked(&running.shared), self.plan.rig.setup.surface().extent());
         let calibration = &shared.calibration;
         let guide = calibration.guide();
         record.waiting = guide.waiting();
         let next = guide.next_press();
-        let to_come = &guide.plan()[next.map_or(guide.plan().len(), |(number, _)| number)..];
-        write_places(calibration.journal().rows(), to_come, extent, record);
+        let planned = match running.purpose {
+            // What a calibration would press, as nothing is pressed now.
+            Purpose::SetUp => self.plan.to_come(&state.statements, &state.rows).unwrap_or_default(),
+            _ => guide.plan()[next.map_or(guide.plan().len(), |(number, _)| number)..].to_vec(),
+        };
+        let (to_come, rows) = (
+            planned.as_slice(),
+            match running.purpose {
+                Purpose::SetUp => &state.rows,
+                _ => calibration.journal().rows(),
+            },
+        );
+        write_places(rows, to_come, extent, record);
         record.next = next.map(|(_, press)| PlaceRecord {
             force_n: press.force_n,
             ..PlaceRecord::of_position(press.position, extent)
@@ -721,7 +823,7 @@ impl Calibrator {
         record.presses = calibration.journal().path().display().to_string();
         self.write_readings(shared, record);
         record.machine = self
-            .machine_record(calibration.journal().rows(), to_come)
+            .machine_record(state, rows, to_come)
             .map(|machine| machine.running(&shared.machine, calibration, extent, record.left));
     }
 
@@ -736,17 +838,21 @@ impl Calibrator {
         record.problem = record.problem.take().or_else(|| shared.problem.clone());
     }
 
-    fn machine_record(&self, rows: &[Row], to_come: &[Press]) -> Option<MachineRecord> {
-        let (url, stage) = self.plan.machine()?;
+    fn machine_record(&self, state: &State, rows: &[Row], to_come: &[Press]) -> Option<MachineRecord> {
+        let (url, _) = self.plan.machine()?;
+        let stage = self.stage(state)?;
         let pressed = rows.iter().filter(|row| row.touches()).map(|row| row.position);
         let places: Vec<Position> = pressed.chain(to_come.iter().map(|press| press.position)).collect();
-        Some(MachineRecord::new(url, stage, &places))
+        Some(MachineRecord::new(url, &stage, &places, state.touch_z_m))
     }
 
-    /// The state, in which a machine that has ended is no more.
+    /// The state, in which a machine that has ended is no more; [`Self::finish_check`] ends that of a check.
     fn lock(&self) -> MutexGuard<'_, State> {
         let mut state = locked(&self.state);
-        if state.running.as_ref().is_some_and(|running| running.by_machine && running.thread.is_finished()) {
+        let has_ended = |running: &Running| {
+            running.by_machine && running.purpose != Purpose::Check && running.thread.is_finished()
+        };
+        if state.running.as_ref().is_some_and(has_ended) {
             state.end_running();
         }
         state
@@ -760,6 +866,7 @@ impl State {
         match running.purpose {
             Purpose::Preview => self.phase,
             Purpose::Check => Phase::Checking,
+            Purpose::SetUp => Phase::SettingUp,
             Purpose::Press if running.by_machine => Phase::Pressing,
             Purpose::Press => match locked(&running.shared).calibration.guide().waiting() {
                 Waiting::Nothing => Phase::Pressed,
@@ -803,6 +910,11 @@ impl State {
             Purpose::Check => {
                 self.problem.clone_from(&shared.problem);
                 self.phase = Phase::Done;
+            }
+            Purpose::SetUp => {
+                self.problem.clone_from(&shared.problem);
+                self.hint.clone_from(&shared.hint);
+                self.touch_z_m = shared.machine.touch_z_m.or(self.touch_z_m);
             }
         }
     }
@@ -848,24 +960,28 @@ mod tests {
     fn calibrator(folder: &Path) -> Calibrator {
         let rig = include_str!("../../../../examples/fsi-like.toml");
         let rig = Rig::from_toml(&rig.replace("count = 9\nrepeats = 3", "count = 2\nrepeats = 2")).unwrap();
-        Calibrator::new(CalibrationPlan {
-            rig,
-            from: "tcp://127.0.0.1:9".parse().unwrap(),
-            presses: folder.join("presses.csv"),
-            out: folder.join("locator.json"),
-            comment: "palpate 0.1.0, pressed for a test".to_owned(),
-            force_n: None,
-            machine: None,
-            before: vec![
-                row(0.0, 0.0, 0.0),
-                row(0.025, 1.0, 0.7),
-                row(0.025, 1.0, 0.9),
-                row(0.0, 0.0, 0.0),
-                row(0.075, 1.0, 0.3),
-            ],
-            statements: Statements { placement_sd_m: Some(1e-3), ..Statements::default() },
-            seed: 0,
-        })
+        Calibrator::new(
+            CalibrationPlan {
+                rig,
+                from: "tcp://127.0.0.1:9".parse().unwrap(),
+                presses: folder.join("presses.csv"),
+                out: folder.join("locator.json"),
+                comment: "palpate 0.1.0, pressed for a test".to_owned(),
+                force_n: None,
+                machine: None,
+                before: vec![
+                    row(0.0, 0.0, 0.0),
+                    row(0.025, 1.0, 0.7),
+                    row(0.025, 1.0, 0.9),
+                    row(0.0, 0.0, 0.0),
+                    row(0.075, 1.0, 0.3),
+                ],
+                statements: Statements { placement_sd_m: Some(1e-3), ..Statements::default() },
+                seed: 0,
+            },
+            folder.to_owned(),
+            HostClock::new(),
+        )
     }
 
     fn record(calibrator: &Calibrator) -> Value {
@@ -900,11 +1016,10 @@ mod tests {
     fn nothing_is_checked_before_a_fit_and_no_statement_is_taken_that_is_no_number() {
         let folder = tempfile::tempdir().unwrap();
         let calibrator = calibrator(folder.path());
-        let clock = HostClock::new();
-        let checked = calibrator.begin_check(folder.path(), clock, || panic!("the session goes on"));
+        let checked = calibrator.begin_check(|| panic!("the session goes on"));
         assert!(matches!(checked, Err(CalibratorError::NothingToCheck)));
         let stated = Statements { second_force_n: Some(f64::NAN), ..Statements::default() };
-        let begun = calibrator.begin(stated, folder.path(), clock, || panic!("the session goes on"));
+        let begun = calibrator.begin(stated, || panic!("the session goes on"));
         assert!(matches!(begun, Err(CalibratorError::Statement(_))));
         assert!(!calibrator.finish_check());
         assert_eq!(record(&calibrator)["can_check"], json!(false));

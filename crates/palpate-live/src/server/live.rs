@@ -140,16 +140,16 @@ impl Live {
         Self::of_subject(subject, simulated, folder)
     }
 
-    /// A rig without a locator, which browsers calibrate first.
-    pub fn calibrating(plan: CalibrationPlan, folder: PathBuf) -> Self {
+    /// A rig without a locator, which browsers calibrate first; times are those of the clock.
+    pub fn calibrating(plan: CalibrationPlan, folder: PathBuf, clock: HostClock) -> Self {
         let subject = Subject {
             locator: None,
             channels: Channel::all_of(&plan.rig.setup),
             info: SessionInfo::of_setup(&plan.rig.setup),
         };
-        let live = Self::of_subject(subject, None, folder);
+        let live = Self { clock, ..Self::of_subject(subject, None, folder) };
         // It was empty.
-        let _ = live.calibrator.set(Calibrator::new(plan));
+        let _ = live.calibrator.set(Calibrator::new(plan, live.folder.clone(), clock));
         live
     }
 
@@ -442,7 +442,7 @@ impl Live {
             seed: 0,
         };
         // It was empty: the board had no rig.
-        let _ = self.calibrator.set(Calibrator::new(plan));
+        let _ = self.calibrator.set(Calibrator::new(plan, self.folder.clone(), self.clock));
         Ok(made.record)
     }
 
@@ -455,7 +455,7 @@ impl Live {
         if calibrator.finish_check() {
             self.begin(&calibrator.plan().from)?;
         }
-        calibrator.preview(&self.folder, self.clock);
+        calibrator.preview();
         Ok(calibrator.record())
     }
 
@@ -480,7 +480,7 @@ impl Live {
     /// # Errors
     /// [`LiveError`] where the source cannot be opened, or the presses cannot be kept.
     pub(super) fn begin_calibration(&self, stated: Statements) -> Result<(), LiveError> {
-        Ok(self.calibrator()?.begin(stated, &self.folder, self.clock, || self.end_session())?)
+        Ok(self.calibrator()?.begin(stated, || self.end_session())?)
     }
 
     /// Asks for presses at fresh places, which check the locator.
@@ -488,7 +488,15 @@ impl Live {
     /// # Errors
     /// [`LiveError`] where there is nothing to check, or the source cannot be opened.
     pub(super) fn begin_check(&self) -> Result<(), LiveError> {
-        Ok(self.calibrator()?.begin_check(&self.folder, self.clock, || self.end_session())?)
+        Ok(self.calibrator()?.begin_check(|| self.end_session())?)
+    }
+
+    /// Connects to the machine of the calibration, to set it up.
+    ///
+    /// # Errors
+    /// [`LiveError`] where there is none, something goes on, or the source cannot be opened.
+    pub(super) fn begin_set_up(&self, is_dry_run: bool) -> Result<(), LiveError> {
+        Ok(self.calibrator()?.begin_set_up(is_dry_run, || self.end_session())?)
     }
 
     /// Fits the presses in a thread of its own; a session with the locator begins as soon as there is one.

@@ -2,32 +2,32 @@
 
 use crate::calibration::{Calibration, Machine, Motion, Note};
 use crate::stage::{StageUrl, Stopping};
+use crate::stamp::HostClock;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_rig::Stage;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// A machine that nobody has watched for so long lifts its finger, and ends.
+/// Time without an open page after which a machine lifts its finger and ends.
 pub const UNWATCHED: Duration = Duration::from_secs(5);
 
 /// Attendance of the people who can stop a machine: the last sign of a page.
 #[derive(Debug)]
 pub struct Attendance {
-    start: Instant,
+    clock: HostClock,
     seen_ms: AtomicU64,
     /// True while a machine needs somebody.
     is_needed: AtomicBool,
 }
 
-impl Default for Attendance {
-    fn default() -> Self {
-        Self { start: Instant::now(), seen_ms: AtomicU64::new(0), is_needed: AtomicBool::new(false) }
-    }
-}
-
 impl Attendance {
+    /// Attendance by a clock, without a sign so far.
+    pub fn new(clock: HostClock) -> Self {
+        Self { clock, seen_ms: AtomicU64::new(0), is_needed: AtomicBool::new(false) }
+    }
+
     /// Notes a sign of somebody.
     pub fn note(&self) {
         self.seen_ms.store(self.now_ms(), Ordering::Relaxed);
@@ -49,7 +49,7 @@ impl Attendance {
     }
 
     fn now_ms(&self) -> u64 {
-        self.start.elapsed().as_millis() as u64
+        self.clock.elapsed().as_millis() as u64
     }
 }
 
@@ -61,20 +61,26 @@ pub struct MachineState {
     pub motion: Option<Motion>,
     position: Option<Position>,
     depth_m: Option<f64>,
-    /// The instant of its first press, and the presses taken since.
-    pressing_since: Option<Instant>,
+    /// The instant of its first press, the present one, and the presses taken since.
+    pressing_since: Option<Duration>,
+    now: Duration,
     taken: usize,
     pub left_out: usize,
+    /// Position after the last move, and the height of the touch that was found, in metres of the machine.
+    at_m: Option<[f64; 3]>,
+    pub touch_z_m: Option<f64>,
 }
 
 impl MachineState {
     /// Takes the machine's motion, and what came of it.
-    pub fn take(&mut self, machine: &Machine, notes: &[Note]) {
+    pub fn take(&mut self, now: Duration, machine: &Machine, notes: &[Note]) {
+        self.now = now;
         self.motion = Some(machine.motion());
+        self.at_m = machine.position_m();
         self.position = machine.press().map(|press| press.position);
         self.depth_m = machine.press().and_then(|press| press.depth_m);
         if self.position.is_some() {
-            self.pressing_since.get_or_insert_with(Instant::now);
+            self.pressing_since.get_or_insert(now);
         }
         self.taken += notes.iter().filter(|note| **note == Note::Taken).count();
     }
@@ -97,6 +103,10 @@ pub struct MachineRecord {
     /// Force at the load cell.
     force_n: Option<f64>,
     left_s: Option<f64>,
+    /// Position after the last move by the machine's own axes; `None` before homing, and while it does not run.
+    at_mm: Option<[f64; 3]>,
+    /// Height of the touch that a touch-off found.
+    found_touch_mm: Option<f64>,
     moves: MovesRecord,
 }
 
@@ -116,7 +126,8 @@ struct MovesRecord {
 
 impl MachineRecord {
     /// A machine that does not run, over places of a surface.
-    pub fn new(url: &StageUrl, stage: &Stage, places: &[Position]) -> Self {
+    /// `found_touch_m` is the height of its stage, where a touch-off found it.
+    pub fn new(url: &StageUrl, stage: &Stage, places: &[Position], found_touch_m: Option<f64>) -> Self {
         let (from_x_m, from_y_m) = stage.origin_m;
         let span_mm = |at_m: &dyn Fn(Position) -> f64| {
             let (low_m, high_m) = places
@@ -136,10 +147,12 @@ impl MachineRecord {
             depth_mm: None,
             force_n: None,
             left_s: None,
+            at_mm: None,
+            found_touch_mm: found_touch_m.map(|z_m| z_m * 1e3),
             moves: MovesRecord {
                 x_mm: span_mm(&|place| from_x_m + place.x_m),
                 y_mm: span_mm(&|place| from_y_m + place.y_m),
-                travel_z_mm: (stage.touch_z_m + stage.clearance_m) * 1e3,
+                travel_z_mm: stage.travel_z_m() * 1e3,
                 touch_z_mm: stage.touch_z_m * 1e3,
                 depths_mm: stage.depths_m.iter().map(|depth_m| depth_m * 1e3).collect(),
                 travel_mm_per_s: stage.travel_m_per_s * 1e3,
@@ -150,7 +163,7 @@ impl MachineRecord {
         }
     }
 
-    /// The same, while it runs with `left` presses to come.
+    /// The record of a machine that runs with `left` presses to come.
     pub fn running(
         self,
         state: &MachineState,
@@ -161,7 +174,7 @@ impl MachineRecord {
         let left_s = state
             .pressing_since
             .filter(|_| state.taken > 0)
-            .map(|since| since.elapsed().as_secs_f64() / state.taken as f64 * left as f64);
+            .map(|since| state.now.saturating_sub(since).as_secs_f64() / state.taken as f64 * left as f64);
         Self {
             firmware: state.firmware,
             stopping: state
@@ -175,6 +188,8 @@ impl MachineRecord {
             depth_mm: state.depth_m.map(|depth_m| depth_m * 1e3),
             force_n: calibration.cell_force_n(),
             left_s,
+            at_mm: state.at_m.map(|at_m| at_m.map(|at_m| at_m * 1e3)),
+            found_touch_mm: state.touch_z_m.map(|z_m| z_m * 1e3).or(self.found_touch_mm),
             ..self
         }
     }

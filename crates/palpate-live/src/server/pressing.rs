@@ -3,19 +3,20 @@
 use super::lock::locked;
 use super::machine::{Attendance, UNWATCHED};
 use super::shared::Shared;
-use crate::calibration::{Machine, MachineError, MachineNote, Motion, Waiting};
+use crate::calibration::{Machine, MachineError, MachineNote, Motion, SetUpTask};
 use crate::input::Input;
-use crate::stage::{StageThread, StageUrl};
+use crate::stage::{StageError, StageThread, StageUrl};
+use crate::stamp::HostClock;
 use palpate_rig::Stage;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// Longest wait until the machine and its stop are looked at again.
+/// Longest wait between two looks at the machine and its stop.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Takes what the source brings, until it is told to stop.
+/// Takes the arrivals of the source until a stop arrives.
 pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
     /// Longest wait for what is next.
     const LOOK: Duration = Duration::from_millis(100);
@@ -34,17 +35,26 @@ pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
 pub struct MachineRun {
     pub url: StageUrl,
     pub stage: Stage,
-    /// Set, the machine is stopped whatever it does.
+    /// First tasks of a machine that is set up; `None` of one that presses.
+    pub set_up: Option<Vec<SetUpTask>>,
+    /// Setting it stops the machine at any time.
     pub stop: Arc<AtomicBool>,
     pub attendance: Arc<Attendance>,
+    pub clock: HostClock,
 }
 
 impl MachineRun {
-    /// Presses until all is pressed or the machine ends; what ended it early is the problem of `shared`.
-    pub fn press(self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
+    /// Has the machine work until all is done or it ends; what ended it early is the problem of `shared`.
+    pub fn run(self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
         self.attendance.note();
         self.attendance.set_needed(true);
-        let outcome = self.try_to_press(inputs, shared);
+        let outcome = self.try_to_run(inputs, shared).map_err(|error| match error {
+            // Its thread may heed the stop first.
+            MachineError::Stage(StageError::Stopped) if self.stop.load(Ordering::Relaxed) => {
+                MachineError::ByHand
+            }
+            error => error,
+        });
         self.attendance.set_needed(false);
         let mut shared = locked(shared);
         let left_out = shared.machine.left_out;
@@ -57,14 +67,24 @@ impl MachineRun {
         }
     }
 
-    fn try_to_press(&self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) -> Result<(), MachineError> {
-        let thread = StageThread::open(&self.url, self.stage.clone(), Arc::clone(&self.stop))?;
+    fn try_to_run(&self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) -> Result<(), MachineError> {
+        let thread = StageThread::open(&self.url, self.stage.clone(), Arc::clone(&self.stop), self.clock)?;
         {
             let machine = &mut locked(shared).machine;
             machine.firmware = Some(thread.firmware().name());
             machine.stopping = Some(thread.stopping());
         }
-        let mut machine = Machine::new(thread, self.stage.force_limit_n);
+        let now = self.clock.elapsed();
+        let mut machine = match &self.set_up {
+            None => Machine::new(thread, self.stage.force_limit_n, now),
+            Some(tasks) => {
+                let mut machine = Machine::to_set_up(thread, self.stage.clone(), now);
+                tasks.iter().cloned().for_each(|task| {
+                    machine.ask(task);
+                });
+                machine
+            }
+        };
         loop {
             let arrived = match inputs.recv_timeout(LOOK) {
                 Ok(Input::Arrived(arrived)) => Some(arrived),
@@ -83,11 +103,17 @@ impl MachineRun {
             let mut shared = locked(shared);
             let notes = arrived.map(|arrived| shared.receive(&arrived)).unwrap_or_default();
             machine.heed(&notes)?;
-            if let Some(MachineNote::Unseen | MachineNote::NoRest) = machine.step(&mut shared.calibration)? {
-                shared.machine.left_out += 1;
+            while let Some(task) = shared.tasks.pop_front() {
+                machine.ask(task);
             }
-            shared.machine.take(&machine, &notes);
-            if shared.calibration.guide().waiting() == Waiting::Nothing {
+            let now = self.clock.elapsed();
+            match machine.step(now, &mut shared.calibration)? {
+                Some(MachineNote::Unseen | MachineNote::NoRest) => shared.machine.left_out += 1,
+                Some(MachineNote::SetUp(note)) => shared.take_set_up(note),
+                Some(MachineNote::Homing) | None => {}
+            }
+            shared.machine.take(now, &machine, &notes);
+            if machine.is_done(&shared.calibration) {
                 shared.machine.motion = Some(Motion::Lifting);
                 break;
             }

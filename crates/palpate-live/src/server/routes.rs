@@ -9,7 +9,7 @@ use super::press_records::PressRecord;
 use super::rig_maker::{MadeRigRecord, RigForm, RigFormError};
 use super::session_info::SessionInfo;
 use super::{page, stream};
-use crate::calibration::Statements;
+use crate::calibration::{SetUpTask, Statements};
 use crate::input::Command;
 use crate::recording::{Excerpt, RecordingError, RecordingSummary};
 use axum::extract::rejection::{PathRejection, QueryRejection};
@@ -192,6 +192,19 @@ enum Step {
     Finish,
     Strike,
     Check,
+    DryRun,
+    SetUp,
+    Jog,
+    TouchOff,
+}
+
+/// An axis of a machine.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Axis {
+    X,
+    Y,
+    Z,
 }
 
 #[derive(Deserialize)]
@@ -199,6 +212,9 @@ struct Calibrate {
     step: Step,
     /// Of `strike`: the number of the press.
     press: Option<usize>,
+    /// Of `jog`: the axis, and the distance.
+    axis: Option<Axis>,
+    by_mm: Option<f64>,
     /// Of `begin`: what the operator states.
     placement_mm: Option<f64>,
     second_force_n: Option<f64>,
@@ -207,6 +223,17 @@ struct Calibrate {
 }
 
 impl Calibrate {
+    /// The distances of a jog along x, y and z; 0 where it names none.
+    fn jog(&self) -> SetUpTask {
+        let by_m = self.by_mm.unwrap_or_default() * 1e-3;
+        SetUpTask::Jog(match self.axis {
+            Some(Axis::X) => [by_m, 0.0, 0.0],
+            Some(Axis::Y) => [0.0, by_m, 0.0],
+            Some(Axis::Z) => [0.0, 0.0, by_m],
+            None => [0.0; 3],
+        })
+    }
+
     fn statements(&self) -> Statements {
         Statements {
             placement_sd_m: self.placement_mm.map(|sd_mm| sd_mm * 1e-3),
@@ -228,6 +255,10 @@ async fn calibrate(
             Step::Begin => live.begin_calibration(wish.statements())?,
             Step::Strike => live.calibrator()?.strike(wish.press.unwrap_or_default())?,
             Step::Check => live.begin_check()?,
+            Step::DryRun => live.begin_set_up(true)?,
+            Step::SetUp => live.begin_set_up(false)?,
+            Step::Jog => live.calibrator()?.ask_set_up(wish.jog())?,
+            Step::TouchOff => live.calibrator()?.ask_set_up(SetUpTask::TouchOff)?,
             Step::Redo => live.calibrator()?.redo()?,
             Step::Skip => live.calibrator()?.skip()?,
             Step::Untouched => live.calibrator()?.relearn_untouched()?,
@@ -253,6 +284,12 @@ fn refusal(error: &LiveError) -> Refusal {
         ),
         LiveError::Calibrator(CalibratorError::NoMachine) => {
             (StatusCode::CONFLICT, "start `palpate serve` with --stage MACHINE")
+        }
+        LiveError::Calibrator(CalibratorError::NotSetUp) => {
+            (StatusCode::CONFLICT, "connect it first: the step `set_up`")
+        }
+        LiveError::Calibrator(CalibratorError::Jog) => {
+            (StatusCode::BAD_REQUEST, "give an `axis`, x, y or z, and a distance `by_mm`")
         }
         LiveError::Calibrator(CalibratorError::MachinePresses) => {
             (StatusCode::CONFLICT, "end it early, or wait until it has ended")

@@ -1,8 +1,9 @@
 //! A calibration that runs, between the thread that presses and the requests that look at it.
 
 use super::machine::MachineState;
-use crate::calibration::{Calibration, CalibrationError, Note, last_deviation_percent};
+use crate::calibration::{Calibration, CalibrationError, Note, SetUpNote, SetUpTask, last_deviation_percent};
 use crate::input::Arrived;
+use std::collections::VecDeque;
 
 /// A calibration that runs, as its thread leaves it for others to see.
 pub struct Shared {
@@ -13,6 +14,8 @@ pub struct Shared {
     /// Why a press is asked for again, or what a step that takes long waits for.
     pub hint: Option<String>,
     pub machine: MachineState,
+    /// Tasks of a machine that is set up, which its thread has not taken yet.
+    pub tasks: VecDeque<SetUpTask>,
 }
 
 impl Shared {
@@ -54,9 +57,24 @@ impl Shared {
         }
     }
 
+    /// Takes what a task of the set-up brought.
+    pub fn take_set_up(&mut self, note: SetUpNote) {
+        if let SetUpNote::Touch(z_m) = note {
+            self.machine.touch_z_m = Some(z_m);
+        }
+        self.hint = Some(sentence(&note.to_string()));
+    }
+
     /// A press that is not on disk: the guide must not go on from it.
     fn fail(&mut self, error: &CalibrationError) {
         self.calibration.stop();
         self.problem = Some(error.to_string());
     }
+}
+
+/// Words as a sentence: with a capital letter and a full stop.
+fn sentence(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str())
 }

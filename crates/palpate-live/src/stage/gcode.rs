@@ -168,7 +168,7 @@ impl<L: StageLink> GcodeStage<L> {
     /// # Errors
     /// [`StageError`].
     pub fn travel(&mut self, position: Position) -> Result<(), StageError> {
-        if self.at_mm.is_some_and(|[_, _, z_mm]| z_mm < self.travel_z_mm() - TOLERANCE_MM) {
+        if self.is_below_travel() {
             self.lift()?;
         }
         let (x_m, y_m) = self.setup.origin_m;
@@ -185,6 +185,38 @@ impl<L: StageLink> GcodeStage<L> {
         let z_mm = (self.setup.touch_z_m - depth_m) * 1e3;
         let gone = self.go([None, None, Some(z_mm)], self.setup.press_m_per_s);
         self.end_of(gone)
+    }
+
+    /// Moves by distances along x, y and z, in metres, at the height of travel or above: what would lead below it ends there.
+    ///
+    /// # Errors
+    /// [`StageError`].
+    pub fn jog(&mut self, by_m: [f64; 3]) -> Result<(), StageError> {
+        if self.is_below_travel() {
+            self.lift()?;
+        }
+        self.heed_stop()?;
+        let at_mm = self.at_mm.ok_or(StageError::NotHomed)?;
+        let lowest_mm = [f64::NEG_INFINITY, f64::NEG_INFINITY, self.travel_z_mm()];
+        let to_mm: [f64; 3] =
+            std::array::from_fn(|axis| (at_mm[axis] + by_m[axis] * 1e3).max(lowest_mm[axis]));
+        let gone = self.go(to_mm.map(Some), self.setup.travel_m_per_s);
+        self.end_of(gone)
+    }
+
+    /// Goes down where it is, to a z in metres of the machine, but never lower than the deepest press.
+    ///
+    /// # Errors
+    /// [`StageError`].
+    pub fn lower(&mut self, z_m: f64) -> Result<(), StageError> {
+        let z_mm = z_m.max(self.setup.lowest_z_m()) * 1e3;
+        let gone = self.go([None, None, Some(z_mm)], self.setup.press_m_per_s);
+        self.end_of(gone)
+    }
+
+    /// Position after the last move, in metres of the machine; `None` before homing and after a stop.
+    pub fn position_m(&self) -> Option<[f64; 3]> {
+        self.at_mm.map(|at_mm| at_mm.map(|at_mm| at_mm * 1e-3))
     }
 
     /// Lifts the finger to the height of travel.
@@ -228,7 +260,11 @@ impl<L: StageLink> GcodeStage<L> {
     }
 
     pub(super) fn travel_z_mm(&self) -> f64 {
-        (self.setup.touch_z_m + self.setup.clearance_m) * 1e3
+        self.setup.travel_z_m() * 1e3
+    }
+
+    fn is_below_travel(&self) -> bool {
+        self.at_mm.is_some_and(|[_, _, z_mm]| z_mm < self.travel_z_mm() - TOLERANCE_MM)
     }
 
     fn try_to_home(&mut self) -> Result<(), Fault> {

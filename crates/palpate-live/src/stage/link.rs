@@ -1,11 +1,12 @@
 //! The line to a machine: bytes both ways, a clock, and the reset line of a serial port.
 
 use super::url::StageUrl;
+use crate::stamp::HostClock;
 use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// Link to a machine, whose reads end after some 10 ms at most.
+/// Link to a machine; a read ends after some 10 ms at most.
 pub trait StageLink: Read + Write + Send {
     /// Time since some instant.
     fn now(&self) -> Duration;
@@ -13,7 +14,7 @@ pub trait StageLink: Read + Write + Send {
     /// Resets the board by its DTR line; false for links without one.
     ///
     /// # Errors
-    /// Those of the port.
+    /// [`io::Error`] of the port.
     fn reset_by_dtr(&mut self) -> io::Result<bool>;
 
     /// True for links with a DTR line.
@@ -43,13 +44,13 @@ const CONNECT: Duration = Duration::from_secs(2);
 const DTR: Duration = Duration::from_millis(20);
 
 impl StageUrl {
-    /// Opens the link.
-    pub(super) fn open(&self) -> io::Result<Box<dyn StageLink>> {
-        let start = Instant::now();
+    /// Opens the link; the clock gives its time.
+    pub(super) fn open(&self, clock: HostClock) -> io::Result<Box<dyn StageLink>> {
         match self {
             Self::Serial { port, baud } => {
-                let port = serialport::new(port.to_string_lossy(), *baud).timeout(READ).open()?;
-                Ok(Box::new(SerialLink { port, start }))
+                let port =
+                    serialport::new(port.to_string_lossy(), *baud).timeout(clock.real_time(READ)).open()?;
+                Ok(Box::new(SerialLink { port, clock }))
             }
             Self::Tcp(server) => {
                 let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
@@ -57,9 +58,9 @@ impl StageUrl {
                     match TcpStream::connect_timeout(&address, CONNECT) {
                         Ok(stream) => {
                             stream.set_nodelay(true)?;
-                            stream.set_read_timeout(Some(READ))?;
+                            stream.set_read_timeout(Some(clock.real_time(READ)))?;
                             stream.set_write_timeout(Some(WRITE))?;
-                            return Ok(Box::new(TcpLink { stream, start }));
+                            return Ok(Box::new(TcpLink { stream, clock }));
                         }
                         Err(error) => last = error,
                     }
@@ -72,7 +73,7 @@ impl StageUrl {
 
 struct SerialLink {
     port: Box<dyn serialport::SerialPort>,
-    start: Instant,
+    clock: HostClock,
 }
 
 impl Read for SerialLink {
@@ -94,7 +95,7 @@ impl Write for SerialLink {
 
 impl StageLink for SerialLink {
     fn now(&self) -> Duration {
-        self.start.elapsed()
+        self.clock.elapsed()
     }
 
     fn reset_by_dtr(&mut self) -> io::Result<bool> {
@@ -111,7 +112,7 @@ impl StageLink for SerialLink {
 
 struct TcpLink {
     stream: TcpStream,
-    start: Instant,
+    clock: HostClock,
 }
 
 impl Read for TcpLink {
@@ -132,7 +133,7 @@ impl Write for TcpLink {
 
 impl StageLink for TcpLink {
     fn now(&self) -> Duration {
-        self.start.elapsed()
+        self.clock.elapsed()
     }
 
     fn reset_by_dtr(&mut self) -> io::Result<bool> {

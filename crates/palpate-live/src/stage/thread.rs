@@ -1,10 +1,11 @@
-//! The thread of a machine: orders to it, and the stop that it heeds whatever it does.
+//! The thread of a machine: it takes orders, and heeds a stop at any time.
 
 use super::error::StageError;
 use super::firmware::Firmware;
 use super::gcode::{GcodeStage, Stopping};
 use super::link::StageLink;
 use super::url::StageUrl;
+use crate::stamp::HostClock;
 use palpate_mechanics::contact::Position;
 use palpate_rig::Stage;
 use std::sync::Arc;
@@ -28,15 +29,19 @@ pub enum Order {
     },
     /// To lift its finger.
     Lift,
+    /// To move by these distances along x, y and z, in metres, at the height of travel or above.
+    Jog([f64; 3]),
+    /// To go down to this z, in metres of the machine, no lower than the deepest press.
+    Lower(f64),
 }
 
-/// State of a machine after its work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// State of a machine after its work, with its position in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Done {
     /// The finger is lifted.
-    Up,
-    /// The finger presses.
-    Down,
+    Up([f64; 3]),
+    /// The finger is below the height of travel.
+    Down([f64; 3]),
 }
 
 /// A machine in a thread of its own, which is stopped when this is dropped while it moves.
@@ -51,12 +56,17 @@ pub struct StageThread {
 }
 
 impl StageThread {
-    /// Opens the link, and greets the machine. Setting `stop` stops it whatever it does, as [`Self::stop`] does.
+    /// Opens the link and greets the machine; the clock gives the link's time. Setting `stop` stops the machine at any time, as [`Self::stop`] does.
     ///
     /// # Errors
     /// [`StageError`] where it is not there, or does not answer.
-    pub fn open(url: &StageUrl, stage: Stage, stop: Arc<AtomicBool>) -> Result<Self, StageError> {
-        let machine = GcodeStage::connect(url.open()?, stage, Arc::clone(&stop))?;
+    pub fn open(
+        url: &StageUrl,
+        stage: Stage,
+        stop: Arc<AtomicBool>,
+        clock: HostClock,
+    ) -> Result<Self, StageError> {
+        let machine = GcodeStage::connect(url.open(clock)?, stage, Arc::clone(&stop))?;
         let (firmware, stopping) = (machine.firmware(), machine.stopping());
         let (orders, received) = channel();
         let (tell, done) = channel();
@@ -132,12 +142,7 @@ fn run(
 ) {
     loop {
         let done = match orders.try_recv() {
-            Ok(Order::Home) => machine.home().map(|()| Done::Up),
-            Ok(Order::Travel(position)) => machine.travel(position).map(|()| Done::Up),
-            Ok(Order::Lift) => machine.lift().map(|()| Done::Up),
-            Ok(Order::Press { position, depth_m }) => {
-                machine.travel(position).and_then(|()| machine.press(depth_m)).map(|()| Done::Down)
-            }
+            Ok(order) => obey(&mut machine, order),
             // Waits for a line as long as a read takes, and heeds a stop.
             Err(TryRecvError::Empty) => match machine.watch() {
                 Ok(()) => continue,
@@ -154,4 +159,23 @@ fn run(
             return;
         }
     }
+}
+
+fn obey(machine: &mut GcodeStage<Box<dyn StageLink>>, order: Order) -> Result<Done, StageError> {
+    match order {
+        Order::Home => machine.home()?,
+        Order::Travel(position) => machine.travel(position)?,
+        Order::Lift => machine.lift()?,
+        Order::Jog(by_m) => machine.jog(by_m)?,
+        Order::Press { position, depth_m } => {
+            machine.travel(position)?;
+            machine.press(depth_m)?;
+        }
+        Order::Lower(z_m) => machine.lower(z_m)?,
+    }
+    let at_m = machine.position_m().ok_or(StageError::NotHomed)?;
+    Ok(match order {
+        Order::Press { .. } | Order::Lower(_) => Done::Down(at_m),
+        Order::Home | Order::Travel(_) | Order::Lift | Order::Jog(_) => Done::Up(at_m),
+    })
 }

@@ -5,6 +5,7 @@ use palpate_live::calibration::Statements;
 use palpate_live::server::{Access, CalibrationPlan, Live, Server};
 use palpate_live::simulated_board::{BoardConfig, Finger, Link, LoadCell, SimulatedBoard};
 use palpate_live::stage::{Firmware, MachineConfig, SimulatedMachine};
+use palpate_live::stamp::HostClock;
 use palpate_rig::Rig;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
@@ -16,6 +17,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+/// Factor by which the clocks of server, board and machine run fast.
+const SPEED: u32 = 5;
 /// Longest time that anything may take on a machine that has other things to do.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -35,10 +38,10 @@ struct Bench {
 
 impl Bench {
     fn start() -> Self {
-        Self::with(MachineConfig::default())
+        Self::with(Firmware::Marlin, MachineConfig::default())
     }
 
-    fn with(config: MachineConfig) -> Self {
+    fn with(firmware: Firmware, config: MachineConfig) -> Self {
         let open = || Link::open(&"tcp://:0".parse().unwrap()).unwrap();
         let (mut to, mut way) = (open(), open());
         let at = |link: &Link| link.name().rsplit(' ').next().unwrap().to_owned();
@@ -46,16 +49,16 @@ impl Bench {
         let rig = rig();
         let setup = rig.stage.clone().unwrap();
         let extent = rig.setup.surface().extent();
-        let machine = SimulatedMachine::with_config(Firmware::Marlin, setup, extent, 1.0, config);
+        let machine = SimulatedMachine::with_config(firmware, setup, extent, 1.0, config);
         let ends = Arc::new(AtomicBool::new(false));
         let (moved, over) = (machine.clone(), Arc::clone(&ends));
         let thread = std::thread::spawn(move || {
             let load_cell = Some(LoadCell { name: "F".to_owned(), noise_n: 2e-3 });
-            let config = BoardConfig { rate_hz: 200.0, seed: 1, load_cell, ..BoardConfig::default() };
+            let config = BoardConfig { rate_hz: 100.0, seed: 1, load_cell, ..BoardConfig::default() };
             let mut board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, 1)).unwrap();
-            let (start, machine, mut was_there) = (Instant::now(), moved, false);
+            let (clock, machine, mut was_there) = (HostClock::with_speed(SPEED), moved, false);
             while !over.load(Ordering::Relaxed) {
-                machine.advance_to(start.elapsed());
+                machine.advance_to(clock.elapsed());
                 match way.bytes().unwrap() {
                     Some(bytes) => {
                         if !std::mem::replace(&mut was_there, true) {
@@ -67,7 +70,7 @@ impl Bench {
                     None => was_there = false,
                 }
                 board.finger_mut().hold(machine.contact());
-                while board.next_at() <= start.elapsed() {
+                while board.next_at() <= clock.elapsed() {
                     if let Some(frame) = board.next_frame() {
                         to.send(&frame).unwrap();
                     }
@@ -110,7 +113,7 @@ fn served(folder: &Path, from: &str, stage: Option<&str>) -> (Arc<Live>, Server)
         statements: Statements::default(),
         seed: 0,
     };
-    let live = Arc::new(Live::calibrating(plan, PathBuf::new()));
+    let live = Arc::new(Live::calibrating(plan, PathBuf::new(), HostClock::with_speed(SPEED)));
     let address: SocketAddr = "127.0.0.1:0".parse().unwrap();
     let access = Access::new(address, None, Vec::new()).unwrap();
     let server = Server::start(address, access, Arc::clone(&live)).unwrap();
@@ -169,7 +172,27 @@ fn a_machine_is_stopped_gone_on_with_and_ends_in_a_locator() {
     assert_eq!(bench.machine.contact(), None);
     assert_eq!(step(&server, "finish").0, 200);
     let done = waited(&server, |state| state["phase"] == "done" || state["problem"].is_string());
-    assert_eq!(done["outcome"]["presses"], 8, "{done}");
+    assert_eq!((&done["outcome"]["presses"], &done["can_check"]), (&json!(8), &json!(true)), "{done}");
+    assert_eq!(get(&server, "/api/session").1["source"], bench.from.as_str());
+
+    assert_eq!(step(&server, "check").0, 200);
+    let checked = waited(&server, |state| state["phase"] == "done");
+    let check = &checked["check"];
+    assert_eq!(
+        (&checked["problem"], check["places"].as_array().unwrap().len()),
+        (&Value::Null, 5),
+        "{checked}"
+    );
+    assert!(check["median_mm"].as_f64().unwrap() < 1.0 && check["covered"].is_u64(), "{check}");
+    assert!(!bench.machine.is_stopped() && bench.machine.contact().is_none());
+    // A check that is stopped leaves the locator in use, and measures it by the presses that were taken.
+    assert_eq!(step(&server, "check").0, 200);
+    waited(&server, |state| state["phase"] == "checking" && state["taken"] == 2);
+    assert_eq!(post(&server, "/api/emergency-stop", "{}").0, 200);
+    let stopped = waited(&server, |state| state["phase"] == "done");
+    assert!(stopped["problem"].as_str().unwrap().contains("stopped by hand"), "{stopped}");
+    let places = stopped["check"]["places"].as_array().unwrap().len();
+    assert!((2..5).contains(&places) && bench.machine.is_stopped(), "{stopped}");
     assert_eq!(get(&server, "/api/session").1["source"], bench.from.as_str());
     live.end();
 }
@@ -193,7 +216,7 @@ fn a_machine_that_nobody_watches_lifts_its_finger_and_ends() {
     let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
     step(&server, "begin");
     // 8 presses of 0.8 s each are not done in the 5 s after which nobody is held to be there.
-    std::thread::sleep(Duration::from_secs(8));
+    std::thread::sleep(Duration::from_secs(8) / SPEED);
     let state = get(&server, "/api/calibration").1;
     assert_eq!((&state["phase"], &state["machine"]["runs"]), (&json!("ready"), &json!(false)));
     assert!(state["problem"].as_str().unwrap().contains("nobody has watched the machine for 5 s"), "{state}");
@@ -257,32 +280,192 @@ fn a_stop_reaches_a_machine_that_is_in_the_middle_of_a_press() {
     live.end();
 }
 
-/// Faults in the middle of a run, from the browser: the page quotes the line, and no row is of a press that did not happen.
+/// A fault of a machine in the middle of a run, and what the page says of it.
+struct FaultCase {
+    config: String,
+    /// Words of the problem, of Marlin and of GRBL.
+    words: [&'static str; 2],
+    finger: &'static str,
+    /// Presses that were taken before.
+    taken: usize,
+}
+
+const UP: &str = "it was stopped with its finger up";
+const LIFTED: &str = "it was stopped, and its finger is lifted";
+const UNKNOWN: &str = "it may still press, so lift it by hand";
+
+fn fault_cases(firmware: Firmware) -> Vec<FaultCase> {
+    let wait = if firmware == Firmware::Marlin { "M400" } else { "G4" };
+    let case = |config: &str, words, finger, taken| FaultCase {
+        config: config.replace("WAIT", wait),
+        words,
+        finger,
+        taken,
+    };
+    // The first `G1 Z` is the lift after homing, the second the first press, the third its lift; the third wait is that of the first press.
+    vec![
+        case("unknown@G1 X:2", ["`echo:Unknown command: \"G1 X", "`error:20` to `G1 X"], UP, 1),
+        case("no-greeting,unknown@G1 Z:2", ["to `G1 Z21.000 F120.000`", "to `G1 Z21.000 F120.000`"], UP, 0),
+        case("lost@G1 Z:3", ["did not answer `G1 Z27.000 F3000.000` within 5 s"; 2], LIFTED, 1),
+        case("silence@G1 X:2", ["did not answer `"; 2], UP, 1),
+        case("silence@WAIT:3", ["did not answer `M400`", "did not answer `G4 P0.01`"], UNKNOWN, 0),
+        case("resend@G1 Z:3", ["`Error:Line Number is not Last Line Number+1", "`error:2`"], LIFTED, 1),
+        case("home-first@G1 X:2", ["`echo:Home XYZ First`", "`error:9`"], UP, 1),
+        case("error@WAIT:3", ["`Error:Printer halted. kill() called!`", "`ALARM:1`"], UNKNOWN, 0),
+        case("reset@G1 Z:4", ["was reset: it sent `start`", "was reset: it sent `Grbl 1.1h"], UNKNOWN, 1),
+        case(
+            "reset-moving@G1 Z:2,paced",
+            ["was reset: it sent `start`", "was reset: it sent `Grbl"],
+            UNKNOWN,
+            0,
+        ),
+        case("endstop@G1 X:2", ["`echo:endstops hit", "`ALARM:1`"], UP, 1),
+        case("extra-ok@G1 Z:3", ["`ok`"; 2], "it was stopped", 1),
+        case("soft-limit-x=90mm", ["reports X 90.00 mm and was sent to X 97.50 mm", "`ALARM:2`"], UP, 2),
+    ]
+}
+
+/// Every kind of fault, of either firmware, from the browser: the page quotes the line, and no row is of a press that did not happen.
 #[test]
 fn fault_of_a_machine_ends_the_run_with_its_words() {
-    // The first `G1 Z` is the lift after homing, the second the first press, the fourth the second press.
-    for (config, words, presses) in [
-        ("unknown@G1 X:2", "the machine answered `echo:Unknown command: \"G1 X", 1),
-        ("no-greeting,unknown@G1 Z:2", "to `G1 Z21.000 F120.000`; it was stopped with its finger up", 0),
-        (
-            "lost@G1 Z:3",
-            "did not answer `G1 Z27.000 F3000.000` within 5 s; it was stopped, and its finger is lifted",
-            1,
-        ),
-        ("reset@G1 Z:4", "the machine was reset: it sent `start`", 1),
-        ("soft-limit-x=60mm", "the machine reports X 60.00 mm", 0),
-    ] {
-        let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::with(config.parse().unwrap()));
+    let runs = [Firmware::Marlin, Firmware::Grbl].into_iter().enumerate().flat_map(|(of, firmware)| {
+        fault_cases(firmware)
+            .into_iter()
+            .map(move |case| std::thread::spawn(move || ends_with_its_words(firmware, &case, case.words[of])))
+    });
+    let runs: Vec<_> = runs.collect();
+    runs.into_iter().for_each(|run| run.join().unwrap());
+}
+
+fn ends_with_its_words(firmware: Firmware, case: &FaultCase, words: &str) {
+    let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::with(firmware, case.config.parse().unwrap()));
+    let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
+    assert_eq!(step(&server, "begin").0, 200);
+    let ended = waited(&server, |state| state["machine"]["runs"] == false);
+    let problem = ended["problem"].as_str().unwrap_or_default();
+    let name = format!("{firmware:?} {}: {problem}", case.config);
+    assert!(problem.contains(words) && problem.contains(case.finger), "{name}");
+    assert!(problem.contains("reset it"), "the remedy of {name}");
+    assert_eq!(ended["taken"], case.taken, "{name}");
+    assert_eq!(bench.machine.doubtful_moves(), 0, "{name}");
+    // A Marlin that halts by itself reads no stop any more.
+    assert!(bench.machine.is_stopped() || case.config.starts_with("error@"), "{name}");
+    assert!(case.finger == UNKNOWN || bench.machine.contact().is_none(), "{name}");
+    live.end();
+}
+
+/// A board that is reset while its finger rests on the surface is not driven on.
+#[test]
+fn reset_at_rest_ends_the_run() {
+    of_both_firmwares(|firmware| {
+        let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::with(firmware, MachineConfig::default()));
         let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
         assert_eq!(step(&server, "begin").0, 200);
-        let ended = waited(&server, |state| state["problem"].is_string());
-        let problem = ended["problem"].as_str().unwrap();
-        assert!(problem.contains("it was stopped") && problem.contains("reset it"), "{config}: {problem}");
-        assert!(problem.contains(words), "{config}: {problem}");
-        assert_eq!(ended["taken"], presses, "{config}: {ended}");
-        assert!(bench.machine.is_stopped() && bench.machine.doubtful_moves() == 0, "{config}: {problem}");
+        waited(&server, |state| state["machine"]["motion"] == "down");
+        bench.machine.open();
+        let ended = waited(&server, |state| state["machine"]["runs"] == false);
+        let problem = ended["problem"].as_str().unwrap_or_default();
+        assert!(problem.contains("the machine was reset: it sent `"), "{firmware:?}: {problem}");
+        assert_eq!(bench.machine.doubtful_moves(), 0, "{firmware:?}: {problem}");
         live.end();
-    }
+    });
+}
+
+/// Homing that takes longer than any other answer, with the `busy` of Marlin and the silence of GRBL, is waited for.
+#[test]
+fn slow_homing_is_waited_for() {
+    of_both_firmwares(|firmware| {
+        let config = "homing=6s,delay=50ms".parse().unwrap();
+        let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::with(firmware, config));
+        let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
+        assert_eq!(step(&server, "begin").0, 200);
+        let pressed = waited(&server, |state| state["taken"] == 1 || state["problem"].is_string());
+        assert_eq!(pressed["problem"], Value::Null, "{firmware:?}");
+        live.end();
+    });
+}
+
+/// Does the same with either firmware, both at once: their time is waiting.
+fn of_both_firmwares(test: fn(Firmware)) {
+    let runs = [Firmware::Marlin, Firmware::Grbl].map(|firmware| std::thread::spawn(move || test(firmware)));
+    runs.into_iter().for_each(|run| run.join().unwrap());
+}
+
+/// A dry run, jogs and a touch-off from the browser, whose height the presses use.
+#[test]
+fn a_machine_is_set_up_before_its_presses() {
+    of_both_firmwares(|firmware| {
+        let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::with(firmware, MachineConfig::default()));
+        let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
+        let ask = |body: Value| post(&server, "/api/calibration", &body.to_string()).0;
+        assert_eq!(step(&server, "touch_off").0, 409, "it is not connected");
+        assert_eq!(step(&server, "dry_run").0, 200);
+        let flown = waited(&server, |state| state["phase"] == "ready");
+        assert_eq!(flown["hint"], "Dry run: 4 positions reached at the height of travel, none pressed.");
+        assert_eq!((&flown["taken"], &flown["problem"]), (&json!(0), &Value::Null));
+
+        assert_eq!(step(&server, "set_up").0, 200);
+        assert_eq!(step(&server, "begin").0, 409);
+        waited(&server, |state| state["machine"]["motion"] == "up");
+        for wrong in [json!(0), json!(10.5), json!(-1e9), Value::Null] {
+            assert_eq!(ask(json!({ "step": "jog", "axis": "x", "by_mm": wrong })), 400, "{wrong}");
+        }
+        assert_eq!(ask(json!({ "step": "jog", "by_mm": 1 })), 400);
+        for _ in 0..7 {
+            assert_eq!(ask(json!({ "step": "jog", "axis": "x", "by_mm": 10 })), 200);
+        }
+        // No jog leads below the height of travel.
+        assert_eq!(ask(json!({ "step": "jog", "axis": "z", "by_mm": -10 })), 200);
+        waited(&server, |state| state["hint"] == "The finger is at x 70, y 0, z 27 mm of the machine.");
+        assert_eq!(step(&server, "touch_off").0, 200);
+        let touched = waited(&server, |state| state["machine"]["found_touch_mm"].is_number());
+        let touch_mm = touched["machine"]["found_touch_mm"].as_f64().unwrap();
+        assert!((touch_mm - 22.0).abs() < 0.06, "{firmware:?}: {touch_mm}");
+        assert_eq!(bench.machine.contact(), None);
+        assert_eq!(step(&server, "stop").0, 200);
+        let ready = waited(&server, |state| state["phase"] == "ready");
+        assert_eq!((&ready["problem"], &ready["taken"]), (&Value::Null, &json!(0)));
+        assert_eq!(ready["machine"]["moves"]["touch_z_mm"], touched["machine"]["found_touch_mm"]);
+        assert!(!bench.machine.is_stopped() && !folder.path().join("presses.csv").exists());
+        live.end();
+    });
+}
+
+/// A touch-off is stopped as presses are: by the button at once, by a fault with its words, and where nobody watches with its finger up.
+#[test]
+fn a_machine_that_is_set_up_stops_as_one_that_presses() {
+    of_both_firmwares(|firmware| {
+        let down = |config: &str| {
+            let (folder, bench) =
+                (tempfile::tempdir().unwrap(), Bench::with(firmware, config.parse().unwrap()));
+            let (live, server) = served(folder.path(), &bench.from, Some(&bench.stage));
+            assert_eq!(step(&server, "set_up").0, 200);
+            assert_eq!(step(&server, "touch_off").0, 200);
+            (folder, bench, live, server)
+        };
+        let (_folder, bench, live, server) = down("");
+        waited(&server, |state| state["machine"]["motion"] == "down");
+        assert_eq!(post(&server, "/api/emergency-stop", "{}").0, 200);
+        let stopped = waited(&server, |state| state["phase"] == "ready");
+        assert!(stopped["problem"].as_str().unwrap().contains("stopped by hand"), "{stopped}");
+        bench.is_told_to_stop();
+        live.end();
+
+        // The third step down.
+        let (_folder, bench, live, server) = down("unknown@G1 Z:4");
+        let ended = waited(&server, |state| state["phase"] == "ready");
+        let problem = ended["problem"].as_str().unwrap();
+        assert!(problem.contains("to `G1 Z26.700 ") && problem.contains(LIFTED), "{firmware:?}: {problem}");
+        assert!(bench.machine.is_stopped() && bench.machine.doubtful_moves() == 0);
+        live.end();
+
+        let (_folder, bench, live, server) = down("");
+        std::thread::sleep(Duration::from_secs(8) / SPEED);
+        let ended = get(&server, "/api/calibration").1;
+        assert!(ended["problem"].as_str().unwrap().contains("nobody has watched the machine"), "{ended}");
+        assert!(!bench.machine.is_stopped() && bench.machine.contact().is_none());
+        live.end();
+    });
 }
 
 #[test]
