@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from . import _palpate
-from ._errors import PalpateError
 from ._palpate import Locator, Recording, Rig, Setup, Training
+
+
+# Endings of the names of tables.
+_TABLES = {".csv", ".txt", ".tsv", ".dat", ".lvm"}
 
 
 @dataclass(frozen=True, repr=False)
@@ -47,9 +50,9 @@ def inspect(
     Parameters
     ----------
     what : path or Setup, Rig, Locator, Recording or Training
-        A file of palpate's: a rig or study (``.toml``), a recording (``.csv``), a locator; or an object.
+        A file of palpate's: a rig or study (``.toml``), a table (``.csv``, ``.txt``, ``.tsv``, ``.dat``, ``.lvm``), a locator; or an object.
     bench : Setup or Rig, optional
-        The bench whose recording a CSV file is.
+        The bench whose recording a table is; without it the table itself is described.
 
     Returns
     -------
@@ -75,9 +78,10 @@ def inspect(
             if any(line.lstrip().startswith("[[arm]]") for line in text.splitlines()):
                 return Inspection(_palpate.inspect_study(str(path), text))
             what = Rig.load(path)
-        elif path.suffix.lower() == ".csv":
+        elif path.suffix.lower() in _TABLES:
             if bench is None:
-                raise PalpateError(f"{path} is a table; `bench` says whose recording it is")
+                lines = _palpate.inspect_table(str(path), path.read_bytes())
+                return Inspection([*lines, "`bench` says of which bench it is a recording"])
             setup = bench.setup if isinstance(bench, Rig) else bench
             what = setup.read_csv(path)
         else:

@@ -3,13 +3,13 @@
 use palpate::estimators::description;
 use palpate::estimators::estimator;
 use palpate::estimators::influence::ForceLinearLocator;
-use palpate::rig::Study;
+use palpate::rig::{Study, table_in_words};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use serde_json::{Value, json};
 
 use crate::bench::{Recording, Setup};
-use crate::errors::of_rig;
+use crate::errors::{of_csv, of_rig};
 use crate::locator::Locator;
 use crate::rig::Rig;
 use crate::training::Training;
@@ -50,6 +50,12 @@ pub fn inspect<'py>(
 pub fn inspect_study(source: &str, text: &str) -> PyResult<Vec<String>> {
     let study = Study::from_toml(text).map_err(|error| of_rig(&error, source, text))?;
     Ok(study.in_words())
+}
+
+/// Description of a table, line by line.
+#[pyfunction]
+pub fn inspect_table(source: &str, bytes: &[u8]) -> PyResult<Vec<String>> {
+    table_in_words(source, bytes).map_err(|error| of_csv(&error))
 }
 
 /// Numbers learnt of a surface without a model; sizes in the units of the channels.

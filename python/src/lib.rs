@@ -46,7 +46,7 @@ mod _palpate {
         estimates::{Estimate, Estimates},
         estimator::Estimator,
         evaluation::Evaluation,
-        inspect::{inspect, inspect_study},
+        inspect::{inspect, inspect_study, inspect_table},
         limit::limit,
         load_profile::{load_profile, simulate_loads},
         locator::Locator,

@@ -69,10 +69,18 @@ def test_a_recording_is_told_as_the_command_tells_it(command, examples, tmp_path
     assert pp.inspect(recording)._repr_html_().startswith("<div>a recording: ")
 
 
+@pytest.mark.parametrize("name", ["table.csv", "table.txt"])
+def test_a_table_is_described_as_by_the_command(command, tmp_path, name):
+    (tmp_path / name).write_text("# bench 3\nx,left,right\n1,20,30\n2,19,31\n")
+    lines = pp.inspect(tmp_path / name).says
+    assert lines[:-1] == said(command, tmp_path / name)["says"][:-1]
+    assert "`bench`" in lines[-1]
+
+
 def test_what_cannot_be_inspected_is_refused_in_words(tmp_path):
-    (tmp_path / "table.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(pp.PalpateError, match="`bench` says whose recording it is"):
-        pp.inspect(tmp_path / "table.csv")
+    (tmp_path / "empty.csv").write_text("")
+    with pytest.raises(pp.FileError):
+        pp.inspect(tmp_path / "empty.csv")
     (tmp_path / "study.toml").write_text('[[arm]]\nnam = "x"\n')
     with pytest.raises(pp.FileError, match="did you mean `name`"):
         pp.inspect(tmp_path / "study.toml")

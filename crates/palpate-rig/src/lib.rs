@@ -59,6 +59,7 @@ mod sensors;
 mod stage;
 mod study;
 mod surface;
+mod table_in_words;
 mod training;
 mod values;
 
@@ -68,6 +69,7 @@ pub use rig::{Rig, RigSimulationError};
 pub use sections::RigSections;
 pub use stage::Stage;
 pub use study::{Arm, AskedLayout, Judging, Study};
+pub use table_in_words::table_in_words;
 
 #[cfg(test)]
 mod tests;

@@ -5,8 +5,7 @@ use crate::failure::Failure;
 use crate::json::object;
 use crate::{input, output};
 use palpate_estimators::description;
-use palpate_estimators::recording::{Header, Table};
-use palpate_rig::{FirstRig, Hints, Rig};
+use palpate_rig::table_in_words;
 use std::path::{Path, PathBuf};
 
 /// Say in words what a file holds: a rig, a study, a locator, a recording or a study's networks.
@@ -58,31 +57,10 @@ fn csv(path: &Path, bytes: &[u8], rig: Option<&Path>) -> Result<Vec<String>, Fai
 }
 
 fn table(path: &Path, bytes: &[u8]) -> Result<Vec<String>, Failure> {
-    let text = String::from_utf8_lossy(bytes);
-    let comments = text.lines().take_while(|line| line.starts_with('#'));
-    let mut lines: Vec<String> =
-        comments.map(|line| line.trim_start_matches(['#', ' ']).to_owned()).collect();
-    let table = Table::read(&path.display().to_string(), bytes, None, None);
-    let Table { header, columns, rows } = table.map_err(|error| input::csv_complaint(&error))?;
-    lines.push(format!("a table of {rows} rows"));
-    lines.push(match header {
-        Header::Present => {
-            let headings: Vec<&str> = columns.iter().map(|column| column.heading.as_str()).collect();
-            format!("columns: {}", headings.join(", "))
-        }
-        Header::Absent => format!("{} columns without names", columns.len()),
-    });
-    lines.extend(repeats(&path.display().to_string(), bytes));
+    let lines = table_in_words(&path.display().to_string(), bytes);
+    let mut lines = lines.map_err(|error| input::csv_complaint(&error))?;
     lines.push(
         "--rig RIG reads it as a recording of that rig; palpate init writes a first rig for it".to_owned(),
     );
     Ok(lines)
-}
-
-/// Rows that repeat the reading before them, where the table is a recording by its headings.
-fn repeats(name: &str, bytes: &[u8]) -> Option<String> {
-    let first = FirstRig::guess(name, bytes, &Hints::default()).ok()?;
-    let rig = Rig::from_toml(&first.to_toml(name)).ok()?;
-    let recording = rig.setup.read_recording(name, bytes).ok()?;
-    recording.provenance.repeats.filter(|repeats| repeats.left_out > 0).map(|repeats| repeats.to_string())
 }
