@@ -292,7 +292,8 @@ impl Bench<'_> {
     ) -> Result<(), Failure> {
         let Self { arguments, rig, keys } = self;
         let (to, inputs) = sync_channel(WAITING);
-        let _source = Source::open(&arguments.from, Path::new("."), HostClock::new(), to)
+        let clock = HostClock::new();
+        let _source = Source::open(&arguments.from, Path::new("."), clock, to)
             .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
         let mut machine = machine(arguments, stage)?;
         let extent = rig.setup.surface().extent();
@@ -312,7 +313,9 @@ impl Bench<'_> {
                 Ok(Input::Arrived(arrived)) => calibration
                     .receive(&arrived, &mut notes)
                     .map_err(|error| cannot_go_on(arguments, &calibration, error))?,
-                Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {}
+                Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {
+                    calibration.check_feed(clock.now().elapsed, &mut notes);
+                }
                 Err(RecvTimeoutError::Disconnected) => ended = true,
             }
             ended |= notes.contains(&Note::Ended);
@@ -333,10 +336,11 @@ impl Bench<'_> {
                 // No reading shows its finger any more.
                 machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error))?;
             }
-            return Err(Failure::DataLost(format!(
-                "the source ended before all was pressed; {}",
-                goes_on(arguments, &calibration)
-            )));
+            let cause = calibration.fault().unwrap_or("the source ended before all was pressed".to_owned());
+            return Err(Failure::DataLost(format!("{cause}; {}", goes_on(arguments, &calibration))));
+        }
+        if let Some(fault) = calibration.fault().filter(|_| calibration.readings() == 0) {
+            return Err(Failure::DataLost(format!("{fault}; {}", goes_on(arguments, &calibration))));
         }
         match machine {
             Some(machine) => machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error)),
@@ -461,8 +465,9 @@ fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
     for note in notes {
         match note {
             Note::Opened(name) => remark!("readings from {name}"),
-            Note::Lost(why) => remark!("the source went away: {why}; it is waited for"),
-            Note::Unread(words) => remark!("{words}"),
+            Note::Lost(why) => remark!("the source is lost: {why}; it is opened again once it is there"),
+            Note::NoReadings(words) => remark!("{words}"),
+            Note::ReadingsAgain => remark!("readings arrive again"),
             Note::Taken => {
                 let rows = calibration.journal().rows();
                 let off = calibration::last_deviation_percent(rows)
@@ -564,7 +569,10 @@ fn press_key(
 }
 
 fn stopped(arguments: &Arguments, calibration: &Calibration) -> Failure {
-    Failure::Interrupted(format!("stopped; {}", goes_on(arguments, calibration)))
+    match calibration.fault() {
+        Some(fault) => Failure::DataLost(format!("stopped; {fault}; {}", goes_on(arguments, calibration))),
+        None => Failure::Interrupted(format!("stopped; {}", goes_on(arguments, calibration))),
+    }
 }
 
 /// Words on what is kept.

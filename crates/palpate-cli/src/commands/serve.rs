@@ -132,8 +132,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         std::thread::sleep(LOOK_EVERY);
     }
     // First the session, so that browsers get what it has told; both end within milliseconds.
-    live.end();
+    let fault = live.end();
     drop(server);
+    if let Some(fault) = fault {
+        return Err(Failure::DataLost(fault));
+    }
     Err(Failure::Interrupted("the server was ended".to_owned()))
 }
 

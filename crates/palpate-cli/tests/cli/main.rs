@@ -31,6 +31,7 @@ mod support;
 mod supported_beams;
 mod tare;
 mod track;
+mod unread_sources;
 mod verbs;
 #[cfg(all(feature = "foxglove", feature = "ros"))]
 mod wire;

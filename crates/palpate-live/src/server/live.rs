@@ -64,7 +64,8 @@ struct Subject {
 struct Running {
     url: String,
     inputs: SyncSender<Input>,
-    thread: JoinHandle<()>,
+    /// Returns the fault of a source that brought no reading.
+    thread: JoinHandle<Option<String>>,
     switch: RecordingSwitch,
     /// Its thread ends with it.
     _source: Source,
@@ -302,9 +303,10 @@ impl Live {
         self.hub.forget_past();
         let run = move || {
             // What is refused was refused above.
-            let Ok(mut session) = Session::new(&locator, &config) else { return };
+            let mut session = Session::new(&locator, &config).ok()?;
             let _ = session.set_columns(&columns);
-            pipeline::run(&mut session, clock, &received, &mut sinks);
+            let fault = pipeline::run(&mut session, clock, &received, &mut sinks);
+            fault.filter(|_| session.frames().readings() == 0)
         };
         let thread = std::thread::Builder::new().name("session".to_owned()).spawn(run)?;
         *running = Some(Running { url, inputs, thread, switch, _source: source });
@@ -480,7 +482,7 @@ impl Live {
     /// # Errors
     /// [`LiveError`] where the source cannot be opened, or the presses cannot be kept.
     pub(super) fn begin_calibration(&self, stated: Statements) -> Result<(), LiveError> {
-        Ok(self.calibrator()?.begin(stated, &self.folder, self.clock, || self.end_session())?)
+        Ok(self.calibrator()?.begin(stated, &self.folder, self.clock, || drop(self.end_session()))?)
     }
 
     /// Asks for presses at fresh places, which check the locator.
@@ -488,7 +490,7 @@ impl Live {
     /// # Errors
     /// [`LiveError`] where there is nothing to check, or the source cannot be opened.
     pub(super) fn begin_check(&self) -> Result<(), LiveError> {
-        Ok(self.calibrator()?.begin_check(&self.folder, self.clock, || self.end_session())?)
+        Ok(self.calibrator()?.begin_check(&self.folder, self.clock, || drop(self.end_session()))?)
     }
 
     /// Fits the presses in a thread of its own; a session with the locator begins as soon as there is one.
@@ -512,21 +514,16 @@ impl Live {
         Ok(())
     }
 
-    /// Ends the session and the calibration, where they run.
-    pub fn end(&self) {
-        if let Some(calibrator) = self.calibrator.get() {
-            calibrator.end();
-        }
-        if let Some(board) = &self.bring_up {
-            board.end();
-        }
-        self.end_session();
+    /// Ends the session and the calibration, where they run; returns the fault of a source that brought no reading.
+    pub fn end(&self) -> Option<String> {
+        let of_calibration = self.calibrator.get().and_then(Calibrator::end);
+        let of_board = self.bring_up.as_ref().and_then(BringUp::end);
+        let of_session = self.end_session();
+        of_calibration.or(of_board).or(of_session)
     }
 
-    fn end_session(&self) {
-        if let Some(running) = self.lock().take() {
-            running.end();
-        }
+    fn end_session(&self) -> Option<String> {
+        self.lock().take()?.end()
     }
 
     /// URL of the source, while its session runs.
@@ -586,12 +583,13 @@ impl Subject {
 }
 
 impl Running {
-    fn end(self) {
+    fn end(self) -> Option<String> {
         let Self { inputs, thread, switch, _source: source, .. } = self;
         drop(source);
         // Refused only by a session that has ended.
         let _ = inputs.send(Input::Stop);
-        let _ = thread.join();
+        let fault = thread.join().ok().flatten();
         switch.end();
+        fault
     }
 }

@@ -3,10 +3,13 @@
 use super::machine::MachineState;
 use crate::calibration::{Calibration, CalibrationError, Note, last_deviation_percent};
 use crate::input::Arrived;
+use crate::stamp::HostClock;
 
 /// A calibration that runs, as its thread leaves it for others to see.
 pub struct Shared {
     pub calibration: Calibration,
+    /// Clock of the arrivals.
+    pub clock: HostClock,
     pub source: Option<String>,
     pub last_percent: Option<f64>,
     pub problem: Option<String>,
@@ -27,13 +30,22 @@ impl Shared {
         notes
     }
 
+    /// Looks at the source while nothing arrives; returns what follows from it.
+    pub fn look(&mut self) -> Vec<Note> {
+        let mut notes = Vec::new();
+        self.calibration.check_feed(self.clock.now().elapsed, &mut notes);
+        notes.iter().cloned().for_each(|note| self.take(note));
+        notes
+    }
+
     fn take(&mut self, note: Note) {
         match note {
             Note::Opened(name) => (self.source, self.problem) = (Some(name), None),
             Note::Lost(why) => {
-                (self.source, self.problem) = (None, Some(format!("the source went away: {why}")));
+                (self.source, self.problem) = (None, Some(format!("the source is lost: {why}")));
             }
-            Note::Unread(words) => self.problem = Some(words),
+            Note::NoReadings(words) => self.problem = Some(words),
+            Note::ReadingsAgain => self.problem = None,
             Note::Ended => {
                 (self.source, self.problem) = (None, Some("the source has ended".to_owned()));
             }
