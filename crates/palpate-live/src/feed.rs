@@ -4,6 +4,9 @@ use crate::frame::{FrameReader, quote};
 use crate::input::Arrival;
 use std::time::Duration;
 
+/// Words on a source that repeats readings.
+pub const REPEATED_READINGS: &str =
+    "the board repeats readings: it sends faster than its sensors measure; each reading counts once";
 /// Frames in a row, and time since the last reading, from which on frames without a reading among them are reported: a board that starts prints some lines
 /// for people first, and a serial line tears one now and then.
 const FRAMES: u64 = 5;

@@ -13,6 +13,7 @@ use palpate_live::calibration::{
     self, Assessment, Calibration, CalibrationError, Check, DepthKnowledge, Journal, JournalError, Machine,
     MachineError, MachineNote, Note, Press, Statements, Waiting, Weights,
 };
+use palpate_live::feed::REPEATED_READINGS;
 use palpate_live::input::Input;
 use palpate_live::pipeline::WAITING;
 use palpate_live::source::{Source, SourceUrl};
@@ -476,6 +477,7 @@ fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
                 let force = force.map_or(String::new(), |force_n| format!(" of {force_n:.3} N"));
                 remark!("taken: press {}{force}{off}", calibration.journal().presses());
             }
+            Note::RepeatedReadings => remark!("{REPEATED_READINGS}"),
             Note::Replaced => {
                 remark!("the reading grew: press {} is taken anew", calibration.journal().presses());
             }

@@ -58,6 +58,8 @@ pub enum Note {
     Replaced,
     /// The untouched surface was recorded, and is on disk where presses have a force.
     Untouched,
+    /// The source repeats readings because it is faster than its sensors: each counts once.
+    RepeatedReadings,
     /// The press is asked for again.
     AskedAgain(Doubt),
     /// A step takes long: what is waited for and what is read.
@@ -92,6 +94,8 @@ pub struct Calibration {
     recent: RecentReadings,
     /// True while readings are shown to the guide: not while a machine moves.
     is_guided: bool,
+    /// True once it was noted that the source repeats readings.
+    notes_repeats: bool,
     /// Step that is waited for, and the instant of its last explanation.
     explained: (Waiting, Duration),
 }
@@ -135,6 +139,7 @@ impl Calibration {
             last: Vec::new(),
             recent: RecentReadings::default(),
             is_guided: true,
+            notes_repeats: false,
         })
     }
 
@@ -238,11 +243,18 @@ impl Calibration {
         }
         let last_press = |guide: &Guide| Some(guide.plan()[guide.taken().checked_sub(1)?]);
         let progress = self.guide.add(at, reading);
+        if self.guide.is_sample_and_hold() && !std::mem::replace(&mut self.notes_repeats, true) {
+            notes.push(Note::RepeatedReadings);
+        }
         let depth_m = last_press(&self.guide).and_then(|press| press.depth_m);
         match progress {
             Progress::None => self.explain(at, notes),
             Progress::Waits(waiting) => notes.push(Note::Waits(waiting)),
             Progress::AskedAgain(doubt) => notes.push(Note::AskedAgain(doubt)),
+            Progress::TakenBack(doubt) => {
+                self.journal.take_back()?;
+                notes.push(Note::AskedAgain(doubt));
+            }
             Progress::Pressed { untouched, press } => {
                 if let Some(untouched) = untouched {
                     self.journal.add(self.without_cell(untouched.row), None)?;

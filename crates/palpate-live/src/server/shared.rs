@@ -2,6 +2,7 @@
 
 use super::machine::MachineState;
 use crate::calibration::{Calibration, CalibrationError, Note, last_deviation_percent};
+use crate::feed::REPEATED_READINGS;
 use crate::input::Arrived;
 use crate::stamp::HostClock;
 
@@ -62,6 +63,7 @@ impl Shared {
             Note::Saturated(name) => {
                 self.problem = Some(format!("channel {name} reads the end of its range: press less, redo"));
             }
+            Note::RepeatedReadings => self.hint = Some(format!("Note: {REPEATED_READINGS}.")),
             Note::Waits(_) | Note::Untouched | Note::Overload(_) => {}
         }
     }

@@ -14,6 +14,7 @@ pub use health::ChannelHealth;
 pub(crate) use health::HealthWatch;
 
 use crate::event::{Event, EventRecord};
+use crate::feed::REPEATED_READINGS;
 use crate::frame::{BadFrame, Channel, ColumnsError, Frame, FrameReader};
 use crate::input::{Arrival, Arrived, Command};
 use crate::sample::Sample;
@@ -249,9 +250,8 @@ impl<'a> Session<'a> {
         let before = self.repeats.is_sample_and_hold();
         let is_repeat = self.repeats.add(reading, self.was_untouched);
         if self.repeats.is_sample_and_hold() && !before {
-            let text = "the board repeats readings: it sends faster than its sensors measure; repeats do not \
-                        count for noise and tare";
-            out.push(Output::Event(EventRecord { time_s, event: Event::Trouble { text: text.to_owned() } }));
+            let text = REPEATED_READINGS.to_owned();
+            out.push(Output::Event(EventRecord { time_s, event: Event::Trouble { text } }));
         }
         is_repeat
     }
