@@ -11,6 +11,7 @@ mod design;
 mod digit;
 mod feeds;
 mod init;
+mod kept_alarms;
 mod learnt;
 mod limit;
 mod live;

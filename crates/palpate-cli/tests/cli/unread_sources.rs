@@ -1,21 +1,17 @@
 //! Every command that opens a source, with sources that bring no readings: the cause is said while the command runs, and the exit code is 3.
 #![cfg(unix)]
 
-use crate::support::command::{Running, folder, palpate, run, said};
+use crate::support::attempt::{Attempt, PATIENCE, get};
+use crate::support::command::{folder, run, said};
 use palpate_live::simulated_board::Link;
-use serde_json::Value;
 use std::fs::{self, File};
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::Write;
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// Longest wait for a message, under load too; a silence is reported after 3 s.
-const PATIENCE: Duration = Duration::from_secs(30);
 const READING: &str = "100.5,200.5,300.0,399.7\n";
 const RIG: &str = include_str!("../field/base.toml");
 
@@ -103,59 +99,6 @@ fn bench() -> TempDir {
     .unwrap();
     said(&run(bench.path(), &["fit", "rig.toml", "--data", "base.csv", "-o", "locator.json"]));
     bench
-}
-
-/// A command that runs, and the lines of its stderr.
-struct Attempt {
-    child: Running,
-    lines: Receiver<String>,
-    said: String,
-}
-
-impl Attempt {
-    fn begin(folder: &Path, arguments: &[&str]) -> Self {
-        let mut command = palpate(folder);
-        command.args(arguments).stdin(Stdio::piped()).stderr(Stdio::piped());
-        let mut child = command.spawn().unwrap();
-        let stderr = BufReader::new(child.stderr.take().unwrap());
-        let (to, lines) = channel();
-        thread::spawn(move || stderr.lines().map_while(Result::ok).try_for_each(|line| to.send(line)));
-        Self { child: Running(child), lines, said: String::new() }
-    }
-
-    /// Waits until its stderr has all these words.
-    fn wait_for(&mut self, words: &[&str]) {
-        let end = Instant::now() + PATIENCE;
-        while !words.iter().all(|words| self.said.contains(words)) {
-            let line = self.lines.recv_timeout(end.saturating_duration_since(Instant::now()));
-            let line = line.unwrap_or_else(|_| panic!("no {words:?} in {}", self.said));
-            self.said += &(line + "\n");
-        }
-    }
-
-    /// Address of the server that it is.
-    fn address(&mut self) -> String {
-        self.wait_for(&["http://"]);
-        let (_, rest) = self.said.split_once("http://").unwrap();
-        rest.split('/').next().unwrap().to_owned()
-    }
-
-    /// Interrupts it; returns its exit code and the last words on stderr.
-    fn interrupt(mut self) -> (Option<i32>, String) {
-        Command::new("kill").args(["-INT", &self.child.0.id().to_string()]).status().unwrap();
-        let code = self.child.0.wait().unwrap().code();
-        (code, self.lines.iter().collect::<Vec<_>>().join("\n"))
-    }
-}
-
-/// The JSON that a server answers.
-fn get(address: &str, path: &str) -> Value {
-    let mut stream = TcpStream::connect(address).unwrap();
-    write!(stream, "GET {path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").unwrap();
-    let mut answer = String::new();
-    stream.read_to_string(&mut answer).unwrap();
-    let (_, body) = answer.split_once("\r\n\r\n").unwrap();
-    serde_json::from_str(body).unwrap_or_else(|error| panic!("{error}: {answer}"))
 }
 
 /// Waits until the problem on a page has these words.

@@ -1,5 +1,6 @@
 //! A locator in live use: the session that runs, and the beginning of another.
 
+use super::alarm_file::AlarmFile;
 use super::bring_up::{BringUp, BringUpError, BringUpRecord};
 use super::calibration::{CalibrationPlan, CalibrationRecord, Calibrator, CalibratorError};
 use super::lock::locked;
@@ -43,8 +44,8 @@ pub struct Live {
     commands: Rules,
     /// Rules that raise alarms, which browsers set.
     alarms: Alarms,
-    /// Their text, as it was set.
-    alarm_text: Mutex<String>,
+    /// Text of these rules, as it was set, and the file that keeps it.
+    alarm_text: Mutex<(String, Option<AlarmFile>)>,
     /// Sinks of each session beside browsers and recordings.
     sinks: Vec<OpenSink>,
     clock: HostClock,
@@ -125,6 +126,14 @@ pub enum LiveError {
     /// Alarms cannot be set.
     #[error("{0}")]
     Rule(String),
+    /// Alarms cannot be kept.
+    #[error("cannot keep the alarms in {path}: {error}")]
+    AlarmFile {
+        /// The file.
+        path: String,
+        /// Why.
+        error: std::io::Error,
+    },
     /// Sessions are not recorded.
     #[error("there is no folder for recordings")]
     NoFolder,
@@ -205,20 +214,28 @@ impl Live {
     /// Adds rules that raise alarms.
     #[must_use]
     pub fn with_alarms(self, rules: Rules) -> Self {
-        *locked(&self.alarm_text) = rules.to_toml();
+        locked(&self.alarm_text).0 = rules.to_toml();
         self.alarms.set(rules);
         self
     }
 
-    /// Text of the rules that raise alarms.
-    pub(super) fn alarm_text(&self) -> String {
+    /// Keeps alarms in a file, whose text and rules these are.
+    #[must_use]
+    pub fn with_alarm_file(self, file: AlarmFile, text: String, rules: Rules) -> Self {
+        *locked(&self.alarm_text) = (text, Some(file));
+        self.alarms.set(rules);
+        self
+    }
+
+    /// Text of the rules that raise alarms, and the file that keeps it.
+    pub(super) fn alarm_text(&self) -> (String, Option<AlarmFile>) {
         locked(&self.alarm_text).clone()
     }
 
-    /// Replaces the rules that raise alarms by those of a file's text; none for a text without rules.
+    /// Replaces the rules that raise alarms by those of a file's text; none for a text without rules. They are on disk afterwards, where a file keeps them.
     ///
     /// # Errors
-    /// [`LiveError::NoLocator`], or [`LiveError::Rule`] for a text that is no rule file, a rule that does something else, and a rule that would never act.
+    /// [`LiveError::NoLocator`], [`LiveError::AlarmFile`], or [`LiveError::Rule`] for a text that is no rule file, a rule that does something else, and a rule that would never act.
     pub(super) fn set_alarms(&self, text: &str) -> Result<(), LiveError> {
         let subject = self.subject();
         let locator = subject.locator.as_ref().ok_or(LiveError::NoLocator)?;
@@ -229,8 +246,12 @@ impl Live {
         };
         rules.check_alarms(locator).map_err(LiveError::Rule)?;
         let mut kept = locked(&self.alarm_text);
+        if let Some(file) = &kept.1 {
+            let path = || file.path().display().to_string();
+            file.write(text).map_err(|error| LiveError::AlarmFile { path: path(), error })?;
+        }
         self.alarms.set(rules);
-        text.clone_into(&mut kept);
+        text.clone_into(&mut kept.0);
         Ok(())
     }
 
@@ -431,6 +452,7 @@ impl Live {
             channels: Channel::all_of(&made.rig.setup),
             info: SessionInfo::of_setup(&made.rig.setup),
         });
+        *locked(&self.alarm_text) = (String::new(), Some(AlarmFile::beside(&made.out)));
         let plan = CalibrationPlan {
             comment: format!("presses for {}", made.record.file),
             rig: made.rig,
@@ -438,7 +460,7 @@ impl Live {
             presses: made.presses,
             out: made.out,
             force_n: None,
-            statements: Statements::default(),
+            statements: made.statements,
             machine: None,
             before: Vec::new(),
             seed: 0,
