@@ -10,6 +10,7 @@ mod connections;
 mod design;
 mod digit;
 mod feeds;
+mod hand_at_terminal;
 mod init;
 mod kept_alarms;
 mod learnt;

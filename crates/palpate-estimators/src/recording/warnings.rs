@@ -49,7 +49,8 @@ pub enum Warning {
     ///
     /// Repeats are rows with the same position and force. The standard deviation is 1.4826/√2 times the median magnitude of
     /// the difference between one repeat and the next, equal ones aside, so that a few bad rows do not hide themselves. The drift is a polyline through
-    /// the medians of up to 20 blocks of 5 rows or more, fitted in turns with the medians of the repeats.
+    /// the medians of up to 20 blocks of 5 rows or more, fitted in turns with the medians of the repeats. Where the drift has a warning of its own, the
+    /// blocks have 5 rows, and contacts and untouched rows may have a polyline each.
     RepeatsDisagree {
         /// The channel's name.
         channel: String,
@@ -217,7 +218,8 @@ impl<'a> Channel<'a> {
             return if self.values.len() > 1 { vec![dead] } else { Vec::new() };
         }
         let saturated = [self.lowest, self.highest].into_iter().filter_map(|extreme| self.saturated(extreme));
-        saturated.chain(self.repeats_disagree(repeats)).chain(self.drift(repeats)).collect()
+        let drift = self.drift(repeats);
+        saturated.chain(self.repeats_disagree(repeats, drift.as_ref())).chain(drift).collect()
     }
 
     fn saturated(&self, extreme: f64) -> Option<Warning> {
@@ -228,8 +230,25 @@ impl<'a> Channel<'a> {
         much.then(|| Warning::Saturated { channel: self.name(), at: self.quantity(extreme), rows, of })
     }
 
-    fn repeats_disagree(&self, repeats: &[Vec<usize>]) -> Option<Warning> {
-        let values = self.without_drift(repeats);
+    /// Rows far off their repeats, beside a drift that has a warning of its own.
+    ///
+    /// That drift need not be slow: its blocks have few rows. Contacts drift with the untouched rows or by themselves, whichever explains more rows.
+    fn repeats_disagree(&self, repeats: &[Vec<usize>], drift: Option<&Warning>) -> Option<Warning> {
+        if drift.is_none() {
+            return self.far_off(&self.without_drift(repeats, MOST_BLOCKS), repeats);
+        }
+        let touches = |group: &Vec<usize>| self.recording.rows[group[0]].touches();
+        let (touched, untouched) = repeats.iter().cloned().partition::<Vec<_>, _>(touches);
+        let mut apart = self.without_drift(&touched, usize::MAX);
+        let of_untouched = self.without_drift(&untouched, usize::MAX);
+        untouched.iter().flatten().for_each(|i| apart[*i] = of_untouched[*i]);
+        let together = self.without_drift(repeats, usize::MAX);
+        let far_off = [apart, together].map(|values| self.far_off(&values, repeats));
+        far_off.into_iter().min_by_key(|warning| warning.as_ref().map_or(0, Warning::extent)).flatten()
+    }
+
+    /// Rows whose values are far off the median of their repeats.
+    fn far_off(&self, values: &[f64], repeats: &[Vec<usize>]) -> Option<Warning> {
         // Equal repeats of a slow or coarse channel do not tell the scatter.
         let pairs = repeats.iter().flat_map(|rows| rows.windows(2));
         let pairs = pairs.filter(|pair| self.values[pair[1]] != self.values[pair[0]]);
@@ -239,7 +258,7 @@ impl<'a> Channel<'a> {
         let mut rows = 0;
         let mut worst = (0, 0.0);
         for group in repeats {
-            let Some(middle) = median_of(&values, group) else { continue };
+            let Some(middle) = median_of(values, group) else { continue };
             for i in group {
                 let deviation = values[*i] - middle;
                 rows += usize::from(deviation.abs() > bound);
@@ -258,11 +277,11 @@ impl<'a> Channel<'a> {
         })
     }
 
-    /// The values less the course of a slow drift, which is fitted in turns with the medians of the repeats.
-    fn without_drift(&self, repeats: &[Vec<usize>]) -> Vec<f64> {
+    /// The values less the course of a drift over as many blocks of rows at most, which is fitted in turns with the medians of the repeats.
+    fn without_drift(&self, repeats: &[Vec<usize>], most_blocks: usize) -> Vec<f64> {
         let mut rows: Vec<usize> = repeats.iter().flatten().copied().collect();
         rows.sort_unstable();
-        let blocks = (rows.len() / LEAST_BLOCK).min(MOST_BLOCKS);
+        let blocks = (rows.len() / LEAST_BLOCK).min(most_blocks);
         let mut values = self.values.clone();
         if blocks < 2 {
             return values;

@@ -42,6 +42,23 @@ impl Attempt {
         }
     }
 
+    /// The next line of its stderr, where one is there.
+    pub fn line(&mut self) -> Option<String> {
+        let line = self.lines.try_recv().ok()?;
+        self.said += &format!("{line}\n");
+        Some(line)
+    }
+
+    /// All lines so far.
+    pub fn said(&self) -> &str {
+        &self.said
+    }
+
+    /// Its exit code, once it has ended; the outer `None` while it runs.
+    pub fn ended(&mut self) -> Option<Option<i32>> {
+        self.child.0.try_wait().unwrap().map(|status| status.code())
+    }
+
     /// Address of the server that it is.
     pub fn address(&mut self) -> String {
         self.wait_for(&["http://"]);
