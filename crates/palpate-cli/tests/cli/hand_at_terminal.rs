@@ -107,7 +107,7 @@ fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
     let is_untouched = |reading: &[f64], position| {
         distance(reading, &[]) < distance(reading, &[Contact { position, force_n: FORCE_N }])
     };
-    let rows = recording.touched().rows;
+    let rows = &recording.touched().rows;
     Outcome {
         presses: rows.len(),
         without_touch: rows.iter().filter(|row| is_untouched(&row.reading, row.position)).count(),
