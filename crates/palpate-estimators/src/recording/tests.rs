@@ -528,7 +528,7 @@ fn drift_alone_is_one_warning() {
                 assert!(lines[0].contains("drift"), "{course}, {bench}, {count}: {lines:#?}");
                 // A bad row among them is still found.
                 let mut bad = recording.clone();
-                bad.rows[count / 2 / 3 * 3].reading[0] += 15.0;
+                bad.rows[count / 2 / 3 * 3].reading[0] += 30.0;
                 let lines = bad.warning_lines();
                 assert_eq!(lines.len(), 2, "{course}, {bench}, {count}: {lines:#?}");
             }
