@@ -493,11 +493,13 @@ fn drift_of_untouched_rows_is_named_and_channels_share_a_line() {
     insta::assert_snapshot!(recording.warning_lines().join("\n"));
 }
 
+/// Course of a drift over a recording, by the share of its rows.
+type Course = fn(f64) -> f64;
+
 #[test]
 fn drift_alone_is_one_warning() {
     let layout = Layout::even(SensorKind::Raw, 2, 0.1);
-    // Course of a drift over the recording, by the share of its rows.
-    let courses: [(&str, fn(f64) -> f64); 4] = [
+    let courses: [(&str, Course); 4] = [
         ("linear", |at| 20.0 * at),
         ("quadratic", |at| 20.0 * at * at),
         ("settling", |at| 20.0 * (1.0 - (-at / 0.2).exp())),
