@@ -23,11 +23,11 @@ export class Bench {
     readonly from: string,
   ) {}
 
-  /** A board on the bench of a rig of the examples, of which parts are replaced. */
-  static async start(example: string, replaced: [string, string][]): Promise<Bench> {
+  /** A board on the bench of a rig of the examples, of which parts are replaced, with these further options. */
+  static async start(example: string, replaced: [string, string][], options: string[] = []): Promise<Bench> {
     const folder = written(example, replaced, STAGE);
     const [board, stage] = [await freePort(), await freePort()];
-    const args = ["simulated-board", "rig.toml", "--rate", "200 Hz", "--to", `tcp://:${board}`, "--stage", `tcp://:${stage}`];
+    const args = ["simulated-board", "rig.toml", "--rate", "200 Hz", "--to", `tcp://:${board}`, "--stage", `tcp://:${stage}`, ...options];
     const child = start(BINARY, args, { cwd: folder, stdio: "ignore" });
     const machine = await connected(stage);
     machine.write("G28\n");
@@ -41,6 +41,11 @@ export class Bench {
   /** Presses at a place with the rig's force. */
   press(x_mm: number): void {
     this.machine.write(`G1 Z15\nG1 X${x_mm} Y0\nG1 Z9\n`);
+  }
+
+  /** Presses at a place after so many quick taps. */
+  tap(x_mm: number, taps: number): void {
+    this.machine.write(`G1 Z15\nG1 X${x_mm} Y0\n${"G1 Z9\nG1 Z15\n".repeat(taps)}G1 Z9\n`);
   }
 
   lift(): void {

@@ -66,9 +66,30 @@ describe.skipIf(!hasChromium())("a board without a rig", () => {
     say(() => `{"${LONG}":1,"b":12}`);
     await page.locator("#bring-up-problem").waitFor({ state: "hidden" });
 
+    // What is wrong stands beside the field, whether the page or the server finds it.
+    await page.locator("#rig-length").fill("-300");
+    await page.locator("#rig-places").focus();
+    await says(page, "rig-length-problem", /^This must be greater than 0\.$/);
+    await page.locator("#rig-make").click();
+    await says(page, "rig-force-problem", /^This is needed\.$/);
+    await picture(page, "bring-up-problems");
     await page.locator("#rig-length").fill("300");
+    await page.locator("#rig-length-problem").waitFor({ state: "hidden" });
     await page.locator("#rig-force").fill("200");
     await says(page, "rig-text", /length = "300 mm"[^]*force = "1\.96133 N"/);
+    await page.locator("#rig-placement").fill("300");
+    await says(page, "rig-placement-problem", /^the placement is 300 mm; it must be less than 300 mm/);
+    await page.locator("#rig-placement").fill("2");
+    await page.locator("#rig-placement-problem").waitFor({ state: "hidden" });
+    await page.locator("#rig-sensor-place-0").fill("400");
+    await page.locator("#rig-sensor-place-1").fill("250");
+    await says(page, "rig-channels-problem", /is at 400 mm; it must be from 0 mm to 300 mm/);
+    await page.locator("#rig-sensor-place-0").fill("50");
+    await page.locator("#rig-second-force").fill("500");
+    await says(page, "rig-text", /positions = \["50 mm", "250 mm"\][^]*placement = "2 mm"/);
+    await page.locator("#rig-force-unknown").check();
+    await page.waitForFunction(() => !document.getElementById("rig-text")!.textContent.includes("force"));
+    await page.locator("#rig-force-unknown").uncheck();
     writeFileSync(join(folder, "rig.toml"), "mine");
     await page.locator("#rig-places").fill("6");
     await says(page, "rig-overwrite-words", /^Replace rig\.toml, which is there already$/);
@@ -81,7 +102,7 @@ describe.skipIf(!hasChromium())("a board without a rig", () => {
     expect(readFileSync(join(folder, "rig.toml"), "utf8")).toContain(`channels = ["${LONG}", "b"]`);
     expect(await page.locator("#bring-up").isVisible()).toBe(false);
     await says(page, "connection", /^Calibration$/);
-    expect(await says(page, "calibration-progress", /./)).toBe("0 of 12 presses, in rig-presses.csv");
+    expect(await says(page, "calibration-progress", /./)).toBe("0 of 18 presses, in rig-presses.csv");
     await picture(page, "bring-up-calibration");
     await page.context().close();
     await server.stop();

@@ -18,7 +18,12 @@ async function step(page: Page): Promise<string> {
 }
 
 /** Does what the page asks for until `until` holds. */
-async function obey(page: Page, bench: Bench, until: (step: string, taken: number) => boolean): Promise<void> {
+async function obey(
+  page: Page,
+  bench: Bench,
+  until: (step: string, taken: number) => boolean,
+  press: (x_mm: number) => void = (x_mm) => bench.press(x_mm),
+): Promise<void> {
   const end = Date.now() + 90_000;
   let pressed = "";
   for (;;) {
@@ -26,7 +31,7 @@ async function obey(page: Page, bench: Bench, until: (step: string, taken: numbe
     const taken = await page.locator("#calibration-bar").evaluate((bar) => (bar as HTMLProgressElement).value);
     if (until(asked, taken)) return;
     const place = /^Press at ([\d.]+) mm/.exec(asked)?.[1];
-    if (place !== undefined && place !== pressed) bench.press(Number((pressed = place)));
+    if (place !== undefined && place !== pressed) press(Number((pressed = place)));
     if (/^(Let go|Leave)/.test(asked)) {
       bench.lift();
       pressed = "";
@@ -60,6 +65,30 @@ describe.skipIf(!hasChromium())("calibration", () => {
   });
   afterEach(endAll);
   afterAll(() => browser?.close());
+
+  test("records no press without a touch by a hand that taps, on a board with hysteresis, creep, drift and repeated readings", async () => {
+    const faults = ["--hysteresis", "0.01", "--creep", "0.02", "--drift", "0.000005", "--repeats", "1"];
+    const bench = await Bench.start("noisy-beam.toml", SIX_TWICE, faults);
+    const server = await started(bench);
+    const { page } = await open(browser, server.url);
+    await says(page, "calibration-step", /^Ready to calibrate$/);
+    await page.locator("#calibration-begin").click();
+    const done = (asked: string) => asked === "No more presses are asked for";
+    await obey(page, bench, done, (x_mm) => bench.tap(x_mm, 2));
+    const lines = readFileSync(bench.path("presses.csv"), "utf8").split("\n");
+    const rows = lines.filter((line) => /^[\d.]+,/.test(line)).map((line) => line.split(",").map(Number));
+    // Columns are time, position, force and the channels.
+    const force = 2;
+    const pressed = rows.filter((row) => row[force]! > 0);
+    const untouched = rows.find((row) => row[force] === 0)!;
+    expect(pressed.length).toBe(12);
+    const size = (row: number[], from: number[]) => Math.hypot(...row.slice(force + 1).map((value, i) => value - from[force + 1 + i]!));
+    for (const row of pressed) {
+      const other = pressed.find((one) => one !== row && one[1] === row[1])!;
+      expect(size(row, other)).toBeLessThan(0.2 * size(other, untouched));
+    }
+    await page.context().close();
+  });
 
   test("goes from nothing to a live dot by clicks", async () => {
     const bench = await Bench.start("noisy-beam.toml", SIX_TWICE);

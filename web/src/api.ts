@@ -21,6 +21,8 @@ export class ApiError extends Error {
     readonly status: number,
     words: string,
     readonly help: string | null,
+    /** Field of a form that is to be corrected. */
+    readonly field: string | null = null,
   ) {
     super(help === null ? words : `${words}: ${help}`);
   }
@@ -38,8 +40,8 @@ async function request(path: string, init: RequestInit): Promise<Response> {
   const response = await fetch(`api/${path}`, { ...init, headers, signal: AbortSignal.timeout(TIMEOUT_MS) });
   if (response.ok) return response;
   const body: unknown = await response.json().catch(() => null);
-  const { error, help } = (body ?? {}) as { error?: string; help?: string };
-  throw new ApiError(response.status, error ?? `the server answered ${response.status}`, help ?? null);
+  const { error, help, field } = (body ?? {}) as { error?: string; help?: string; field?: string };
+  throw new ApiError(response.status, error ?? `the server answered ${response.status}`, help ?? null, field ?? null);
 }
 
 async function get<T>(path: string): Promise<T> {

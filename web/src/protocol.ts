@@ -290,7 +290,13 @@ export interface RigForm {
   width_mm: number | null;
   places: number[];
   repeats: number;
-  force_n: number;
+  /** Force of every press; null where it is unknown. */
+  force_n: number | null;
+  second_force_n: number | null;
+  /** How far off the asked place a person presses, as a standard deviation. */
+  placement_mm: number | null;
+  /** Place of each sensor: along the length and, on a plane, across it. */
+  sensor_places_mm: number[][] | null;
   force_is_known: boolean;
   overwrite: boolean;
   write: boolean;
@@ -308,4 +314,6 @@ export interface MadeRigRecord {
 
 export interface AlarmFile {
   text: string;
+  /** File that keeps the text; null where it ends with the server. */
+  file: string | null;
 }

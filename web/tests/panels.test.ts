@@ -5,8 +5,9 @@ import type { EventRecord, SessionInfo, StateRecord } from "../src/protocol";
 
 // The address of the page is read as the module of requests is loaded.
 vi.stubGlobal("location", { search: "", href: "http://127.0.0.1/" });
-const { ruleText } = await import("../src/panel/alarms");
-const { tracePoints } = await import("../src/panel/bring_up");
+const { alarmsSet, ruleText } = await import("../src/panel/alarms");
+const { sensorPlaces, tracePoints } = await import("../src/panel/bring_up");
+const { fieldProblem } = await import("../src/panel/field_problems");
 
 const SESSION = { source: "serial:///dev/ttyACM0", calibrates: false, brings_up: false } as SessionInfo;
 const STATE = { source: "/dev/ttyACM0", counters: { readings: 5 } } as StateRecord;
@@ -60,6 +61,37 @@ describe("rules of alarms", () => {
     expect(ruleText(filled)).toBe('[[rule]]\nname = "near"\nx = ["0 mm", "50 mm"]\nforce = ["2 N", "1000000 N"]\nhold = "20 ms"\nalarm = "back"\n');
     const event = { ...filled, when: "gap", name: 'a "b" \\ c' };
     expect(ruleText(event)).toBe('[[rule]]\nname = "a \\"b\\" \\\\ c"\nevent = "gap"\nalarm = "back"\n');
+  });
+});
+
+describe("alarms that are set", () => {
+  test("are kept in a file, or end with the server", () => {
+    expect(alarmsSet(0, "strip.alarms.toml")).toBe("No alarms are set.");
+    expect(alarmsSet(1, "strip.alarms.toml")).toBe("1 alarm is set, and kept in strip.alarms.toml.");
+    expect(alarmsSet(2, null)).toBe("2 alarms are set until the server ends.");
+  });
+});
+
+describe("form of a rig", () => {
+  test("takes the places of sensors, or none", () => {
+    expect(sensorPlaces(["", " "])).toBeNull();
+    expect(sensorPlaces(["50", "", "250.5"])).toEqual([[50], [], [250.5]]);
+    expect(sensorPlaces(["50, 20", "250 100"])).toEqual([[50, 20], [250, 100]]);
+  });
+
+  test("says what is wrong with a field", () => {
+    const field = { value: "", disabled: false, min: "0.001", max: "100", title: "digits", validationMessage: "other", validity: {} };
+    const words = (validity: Partial<ValidityState>, more = {}) => fieldProblem({ ...field, ...more, validity });
+    expect(words({ valid: true })).toBeNull();
+    expect(words({ valueMissing: true }, { disabled: true })).toBeNull();
+    expect(words({ valueMissing: true })).toBe("This is needed.");
+    expect(words({ badInput: true })).toBe("This is no number.");
+    expect(words({ rangeUnderflow: true })).toBe("This must be greater than 0.");
+    expect(words({ rangeUnderflow: true }, { min: "2" })).toBe("This must be at least 2.");
+    expect(words({ rangeOverflow: true })).toBe("This must be at most 100.");
+    expect(words({ stepMismatch: true })).toBe("This must be a whole number.");
+    expect(words({ patternMismatch: true })).toBe("This must have digits.");
+    expect(words({ tooLong: true })).toBe("other");
   });
 });
 

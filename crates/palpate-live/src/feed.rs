@@ -1,10 +1,12 @@
-//! Watch over the feed of a session: notices when a source brings no readings, and says why.
+//! Watch over the feed of a session or a calibration: notices when a source brings no readings, and says why.
 
-use crate::frame::quote;
+use crate::frame::{FrameReader, quote};
 use crate::input::Arrival;
-use crate::session::Session;
 use std::time::Duration;
 
+/// Words on a source that repeats readings.
+pub const REPEATED_READINGS: &str =
+    "the board repeats readings: it sends faster than its sensors measure; each reading counts once";
 /// Frames in a row, and time since the last reading, from which on frames without a reading among them are reported: a board that starts prints some lines
 /// for people first, and a serial line tears one now and then.
 const FRAMES: u64 = 5;
@@ -14,15 +16,18 @@ const MANY_FRAMES: u64 = 100;
 /// Silence that is reported: longer than a board takes to start that was reset by opening its port.
 const SILENCE: Duration = Duration::from_secs(3);
 /// Least silence in periods of the readings.
-const PERIODS: f64 = 5.0;
+const PERIODS: u32 = 5;
 
-/// Watch over the feed of a session.
+/// Watch over a feed of readings.
 #[derive(Debug, Default)]
 pub struct FeedWatch {
     state: FeedState,
     /// Instant of the last reading, or else of the opening.
     since: Duration,
-    /// Readings of the session at the last look.
+    /// Instant of the last reading, and time between the last two arrivals with readings.
+    last_reading: Option<Duration>,
+    period: Duration,
+    /// Readings at the last look.
     readings: u64,
     /// Bytes since the last reading, or the opening.
     bytes: u64,
@@ -45,8 +50,8 @@ enum FeedState {
 }
 
 impl FeedWatch {
-    /// Takes an arrival that the session has taken by `now`: time that the session needs is no silence.
-    pub fn receive(&mut self, arrival: &Arrival, now: Duration, session: &Session) {
+    /// Takes an arrival that was read into `frames` and processed by `now`. Time for processing is no silence.
+    pub fn receive(&mut self, arrival: &Arrival, now: Duration, frames: &FrameReader) {
         match arrival {
             Arrival::Opened(_) | Arrival::Joined(_) | Arrival::Piped(_) => {
                 *self =
@@ -61,61 +66,61 @@ impl FeedWatch {
             Arrival::Ended if self.state == FeedState::Open => self.state = FeedState::Ended,
             Arrival::Backlog(_) | Arrival::Ended => {}
         }
-        let readings = session.counters().readings;
-        if readings > self.readings {
-            self.readings = readings;
+        if frames.readings() > self.readings {
+            self.readings = frames.readings();
+            self.period = self.last_reading.map_or(Duration::ZERO, |last| now.saturating_sub(last));
+            self.last_reading = Some(now);
             (self.since, self.bytes, self.is_reported) = (now, 0, false);
         }
     }
 
     /// Report that there are no readings, once in each stretch without any; `None` while there are.
-    pub fn report(&mut self, now: Duration, session: &Session) -> Option<String> {
+    pub fn report(&mut self, now: Duration, frames: &FrameReader) -> Option<String> {
         let since = now.saturating_sub(self.since);
-        let frames = session.bad_in_a_row();
+        let bad = frames.bad_in_a_row();
         let is_fault = matches!(self.state, FeedState::Open | FeedState::Ended)
-            && (frames >= MANY_FRAMES
-                || (frames >= FRAMES && since >= FRAMES_FOR)
-                || (self.state == FeedState::Open && since >= longest_silence(session)));
+            && (bad >= MANY_FRAMES
+                || (bad >= FRAMES && since >= FRAMES_FOR)
+                || (self.state == FeedState::Open && since >= SILENCE.max(PERIODS * self.period)));
         if !is_fault || self.is_reported {
             return None;
         }
         self.is_reported = true;
-        Some(format!("no readings: {}", self.reason(session)))
+        Some(format!("no readings: {}", self.reason(frames)))
     }
 
-    /// Fault of a session that ends now: that it had no reading at all, or none towards its end. `None` of one that had readings to its end.
-    pub fn fault(&self, session: &Session) -> Option<String> {
+    /// Fault of a feed that ends now: no reading at all, or none towards its end. `None` of one that had readings to its end.
+    pub fn fault(&self, frames: &FrameReader) -> Option<String> {
         let is_cut_short = match &self.state {
             FeedState::Lost(_) => true,
             FeedState::Away => false,
             FeedState::Open | FeedState::Ended => {
-                session.bad_in_a_row() >= FRAMES
+                frames.bad_in_a_row() >= FRAMES
                     || (self.state == FeedState::Open && self.is_reported && !self.has_messages)
             }
         };
-        match session.counters().readings {
-            0 => Some(format!("there was no reading: {}", self.reason(session))),
-            _ if is_cut_short => Some(format!("the readings ended early: {}", self.reason(session))),
+        match frames.readings() {
+            0 => Some(format!("there was no reading: {}", self.reason(frames))),
+            _ if is_cut_short => Some(format!("the readings ended early: {}", self.reason(frames))),
             _ => None,
         }
     }
 
     /// Cause of the lack of readings, and its remedy.
-    fn reason(&self, session: &Session) -> String {
+    fn reason(&self, frames: &FrameReader) -> String {
         match &self.state {
             FeedState::Lost(why) => return why.clone(),
             FeedState::Away => return "the source did not open".to_owned(),
             FeedState::Open | FeedState::Ended => {}
         }
-        if let Some((cause, frame)) = session.last_bad_frame().filter(|_| session.bad_in_a_row() > 0) {
-            let labels = session.channels().iter().map(|channel| channel.label.as_str());
-            let (cause, remedy) = (cause.describe(), cause.remedy(labels));
-            let frames = session.bad_in_a_row();
-            let are = if frames == 1 { "frame is" } else { "frames in a row are" };
-            return format!("{frames} {are} no reading: {cause}; the last is `{frame}`; {remedy}");
+        let bad = frames.bad_in_a_row();
+        if let Some((cause, frame)) = frames.last_bad_frame().filter(|_| bad > 0) {
+            let (cause, remedy) = (cause.describe(), cause.remedy(frames.labels()));
+            let are = if bad == 1 { "frame is" } else { "frames in a row are" };
+            return format!("{bad} {are} no reading: {cause}; the last is `{frame}`; {remedy}");
         }
         if self.bytes > 0 {
-            let (bytes, last) = (self.bytes, quote(session.unfinished()));
+            let (bytes, last) = (self.bytes, quote(frames.unfinished()));
             return format!("{bytes} bytes without the end of a line: `{last}`; check the baud rate");
         }
         if self.state == FeedState::Ended {
@@ -123,10 +128,4 @@ impl FeedWatch {
         }
         "the source is open and sends nothing; check that the board is on and sends to this port".to_owned()
     }
-}
-
-fn longest_silence(session: &Session) -> Duration {
-    let rate_hz = session.rate_hz();
-    let periods = if rate_hz > 0.0 { Duration::from_secs_f64(PERIODS / rate_hz) } else { Duration::ZERO };
-    SILENCE.max(periods)
 }

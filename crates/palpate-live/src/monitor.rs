@@ -1,6 +1,6 @@
 //! Monitor of a board without a rig: its last lines, the values in them, and their rate.
 
-use crate::frame::{BadFrame, Channel, Decoder, Frame, is_reserved};
+use crate::frame::{BadFrame, Channel, Decoder, Frame, is_reserved, quote};
 use crate::input::{Arrival, Arrived};
 use palpate_mechanics::units::Unit;
 use serde::Serialize;
@@ -281,14 +281,22 @@ impl Monitor {
         }
         let is_text =
             self.lines.iter().rev().take(UNEXPLAINED as usize).all(|line| !line.text.contains("\\x"));
+        // A quotation has at most 80 characters.
+        let last = self.lines.back().map_or(String::new(), |line| line.text.clone());
+        let last = if last.is_empty() { quote(&self.partial) } else { quote(last.as_bytes()) };
         Some(match (self.lines.is_empty(), is_text) {
-            (true, _) if self.bytes < MOST_PARTIAL as u64 => "no line has ended yet".to_owned(),
-            (false, true) => {
-                "lines arrive, and no values are found in them: send one line a reading, such as `12,34,56`"
-                    .to_owned()
-            }
-            _ => "the bytes are not text: try another baud rate".to_owned(),
+            (true, _) if self.bytes < MOST_PARTIAL as u64 => format!("no line has ended yet: `{last}`"),
+            (false, true) => format!(
+                "lines arrive, and no values are found in them; the last is `{last}`; send one line a reading, such as `12,34,56`"
+            ),
+            _ => format!("the bytes are not text: `{last}`; try another baud rate"),
         })
+    }
+
+    /// Fault of a source that brought no reading; `None` of any other.
+    pub fn fault(&self) -> Option<String> {
+        let reason = || self.problem().unwrap_or("the source did not open".to_owned());
+        (self.readings == 0).then(|| format!("there was no reading: {}", reason()))
     }
 
     /// Names of the channels that were found, in their order; none before that.

@@ -65,14 +65,14 @@ pub fn run(
                     Arrival::Backlog(_) | Arrival::Bytes(_) | Arrival::Message(_) => {}
                 }
                 session.receive(&arrived, &mut outputs);
-                feed.receive(&arrived.arrival, clock.now().elapsed, session);
+                feed.receive(&arrived.arrival, clock.now().elapsed, session.frames());
             }
             Ok(Input::Command(command)) => session.command(clock.now(), command, &mut outputs),
             Err(RecvTimeoutError::Timeout) => {}
             Ok(Input::Stop) | Err(RecvTimeoutError::Disconnected) => goes_on = false,
         }
         let now = clock.now();
-        if let Some(text) = feed.report(now.elapsed, session) {
+        if let Some(text) = feed.report(now.elapsed, session.frames()) {
             session.command(now, Command::Trouble(text), &mut outputs);
         }
         give(outputs, sinks);
@@ -82,7 +82,7 @@ pub fn run(
             next_state = Instant::now() + STATE_EVERY;
         }
         if !goes_on {
-            return feed.fault(session);
+            return feed.fault(session.frames());
         }
     }
 }
@@ -108,7 +108,7 @@ fn state(session: &Session, source: Option<&str>) -> StateRecord {
         source: source.map(str::to_owned),
         rate_hz: session.rate_hz(),
         touched: session.is_touched(),
-        counters: session.counters().clone(),
+        counters: session.counters(),
         channels: channels.collect(),
     }
 }

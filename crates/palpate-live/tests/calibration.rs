@@ -272,6 +272,32 @@ fn a_firm_press_replaces_a_light_touch_before_it() {
 }
 
 #[test]
+fn a_press_that_grows_and_is_lifted_at_once_is_taken_back() {
+    let mut guide = Guide::new(presses_at(2));
+    // A finger rests lightly, presses for 0.3 s and lifts; then it does so again, and holds.
+    let force = |s: f64| match s {
+        2.0..2.7 | 5.0..5.7 => 0.05,
+        2.7..3.0 | 5.7..8.0 => 1.0,
+        _ => 0.0,
+    };
+    let mut taken_back = Vec::new();
+    let mut recorded = Vec::new();
+    for (at, reading) in course(3, 10.0, |s| [3000.0 * force(s), 1000.0 * force(s)]) {
+        match guide.add(at, &reading) {
+            Progress::TakenBack(doubt) => {
+                taken_back.push(doubt);
+                recorded.pop();
+            }
+            Progress::Pressed { press, .. } => recorded.push(press.mean[0]),
+            _ => {}
+        }
+    }
+    assert_eq!(taken_back, [Doubt::Grew]);
+    assert!(matches!(recorded[..], [mean] if (mean - 3000.0).abs() < 5.0), "{recorded:?}");
+    assert_eq!((guide.waiting(), guide.taken()), (Waiting::Press, 1));
+}
+
+#[test]
 fn a_touch_that_stays_is_released_by_learning_the_untouched_reading_anew() {
     let mut guide = Guide::new(presses_at(2));
     // The offsets step once and stay.

@@ -54,6 +54,8 @@ struct Outcome {
     asked_again: usize,
     /// Longest time in one step, in seconds.
     longest_s: f64,
+    /// Notes that the board repeats readings.
+    repeats_noted: usize,
     is_finished: bool,
 }
 
@@ -74,7 +76,7 @@ fn rig() -> (Rig, f64) {
     (Rig::from_toml(&text).unwrap(), noise)
 }
 
-fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
+fn calibrate(style: HandStyle, faults: FaultConfig, rate_hz: f64, seed: u64) -> Outcome {
     let (rig, noise) = rig();
     let hysteresis = faults.hysteresis;
     let folder = tempfile::tempdir().unwrap();
@@ -83,7 +85,7 @@ fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
         Journal::new(&rig.setup, &presses, "test".to_owned(), Vec::new(), DepthKnowledge::Unknown).unwrap();
     let plan = plan(&rig, Weights::default(), &[], &[]).unwrap();
     let mut calibration = Calibration::new(&rig.setup, None, &[], plan, journal).unwrap();
-    let config = BoardConfig { seed, ..BoardConfig::default() };
+    let config = BoardConfig { seed, rate_hz, ..BoardConfig::default() };
     let finger = Finger::random(&rig, seed);
     let mut board = SimulatedBoard::new(&rig.setup, &config, finger).unwrap().with_faults(faults, seed);
     let mut hand = Hand::new(style, rig.setup.surface().extent(), seed);
@@ -114,6 +116,7 @@ fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
         let at = palpate_live::stamp::Stamp { elapsed: time, ..start };
         let mut notes = Vec::new();
         calibration.receive(&Arrived { at, arrival: Arrival::Bytes(bytes) }, &mut notes).unwrap();
+        outcome.repeats_noted += notes.iter().filter(|note| **note == Note::RepeatedReadings).count();
         outcome.asked_again += notes.iter().filter(|note| matches!(note, Note::AskedAgain(_))).count();
         if waiting == Waiting::Nothing || time > Duration::from_secs(1000) {
             break;
@@ -174,7 +177,7 @@ fn every_press_of_any_hand_has_a_touch() {
     let (mut presses, mut asked_again) = (0, 0);
     for (i, (hand, style)) in hands.into_iter().enumerate() {
         for (j, (bench, faults)) in benches.iter().enumerate() {
-            let outcome = calibrate(style, faults.clone(), (10 * i + j) as u64);
+            let outcome = calibrate(style, faults.clone(), 100.0, (10 * i + j) as u64);
             println!("{hand}, {bench}: {outcome:?}");
             assert!(outcome.is_finished && outcome.presses == 20, "{hand}, {bench}: {outcome:?}");
             assert!(outcome.longest_s < 10.0, "{hand}, {bench}: {outcome:?}");
@@ -185,4 +188,41 @@ fn every_press_of_any_hand_has_a_touch() {
     }
     println!("{asked_again} of {presses} presses were asked for again");
     assert!(asked_again * 50 <= presses, "{asked_again} of {presses} presses were asked for again");
+}
+
+#[test]
+fn presses_on_slow_boards_and_on_boards_that_repeat_readings_have_a_touch() {
+    let (_, noise) = rig();
+    let exact = HandStyle { placement_m: 5e-4, ..HandStyle::default() };
+    let early = HandStyle { early_lift: 0.3, lift_s: 0.5, ..exact };
+    let slow = HandStyle { press_s: 1.0, lift_s: 1.0, ..exact };
+    let hovering = HandStyle { hover_share: 0.08, hover_s: 0.3, lift_s: 0.3, ..exact };
+    let ideal = FaultConfig::default();
+    let repeating = |repeats| FaultConfig { repeats, ..ideal.clone() };
+    let worn = FaultConfig { hysteresis: 0.01, converter_step: noise, drift_per_s: noise, ..ideal.clone() };
+    let runs = [
+        ("quick, each reading twice", exact, 100.0, repeating(1)),
+        ("slow, each reading 10 times", slow, 100.0, repeating(9)),
+        (
+            "early lift, each reading 5 times, hysteresis, drift",
+            early,
+            100.0,
+            FaultConfig { repeats: 4, ..worn.clone() },
+        ),
+        ("tapping, each reading 25 times", HandStyle { taps: 2, ..exact }, 200.0, repeating(24)),
+        ("quick, 10 readings a second", exact, 10.0, ideal.clone()),
+        ("hovering, 10 readings a second, hysteresis, drift", hovering, 10.0, worn),
+    ];
+    let mut asked_again = 0;
+    for (i, (name, style, rate_hz, faults)) in runs.into_iter().enumerate() {
+        let repeats_noted = usize::from(faults.repeats > 0);
+        let outcome = calibrate(style, faults, rate_hz, i as u64);
+        println!("{name}: {outcome:?}");
+        assert!(outcome.is_finished && outcome.presses == 20, "{name}: {outcome:?}");
+        assert!(outcome.longest_s < 10.0, "{name}: {outcome:?}");
+        assert_eq!((outcome.without_touch, outcome.touched), (0, 0), "{name}: {outcome:?}");
+        assert_eq!(outcome.repeats_noted, repeats_noted, "{name}: {outcome:?}");
+        asked_again += outcome.asked_again;
+    }
+    assert!(asked_again * 50 <= 120, "{asked_again} of 120 presses were asked for again");
 }

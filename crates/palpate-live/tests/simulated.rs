@@ -356,12 +356,12 @@ impl FeedBench<'_> {
         let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
         let arrived = Arrived { at, arrival };
         self.session.receive(&arrived, &mut Vec::new());
-        self.feed.receive(&arrived.arrival, elapsed, &self.session);
-        self.feed.report(elapsed, &self.session)
+        self.feed.receive(&arrived.arrival, elapsed, self.session.frames());
+        self.feed.report(elapsed, self.session.frames())
     }
 
     fn report_at(&mut self, ms: u64) -> Option<String> {
-        self.feed.report(Duration::from_millis(ms), &self.session)
+        self.feed.report(Duration::from_millis(ms), self.session.frames())
     }
 }
 
@@ -381,14 +381,16 @@ fn a_feed_without_readings_is_reported_once_and_with_its_cause() {
     assert_eq!(bench.report_after(10_000, Arrival::Joined("board".to_owned())), None);
     assert_eq!(bench.report_after(10_500, bytes("boot\nboot\nboot\nboot\nboot\nboot\n")), None);
     assert_eq!(bench.report_after(10_900, bytes("0,0,0,0,0,0,0,0\n")), None);
-    assert!(bench.feed.fault(&bench.session).is_none());
+    assert!(bench.feed.fault(bench.session.frames()).is_none());
     // A channel vanishes.
     assert_eq!(bench.report_after(11_000, bytes(&"0,0,0,0,0,0,0\n".repeat(50))), None);
     let report = bench.report_after(11_900, bytes("0,0,0,0,0,0,0\n")).unwrap();
     assert!(report.contains("51 frames in a row are no reading: another number of values"), "{report}");
     assert!(report.contains("`0,0,0,0,0,0,0`"), "{report}");
     assert_eq!(bench.report_after(12_900, bytes("0,0,0,0,0,0,0\n")), None, "it is reported once");
-    assert!(bench.feed.fault(&bench.session).unwrap().contains("the readings ended early: 52 frames"));
+    assert!(
+        bench.feed.fault(bench.session.frames()).unwrap().contains("the readings ended early: 52 frames")
+    );
     // It comes back, and the baud rate changes.
     assert_eq!(bench.report_after(13_000, bytes("0,0,0,0,0,0,0,0\n")), None);
     assert_eq!(bench.report_after(13_100, bytes(&"\u{7F}~".repeat(60))), None);
@@ -399,5 +401,5 @@ fn a_feed_without_readings_is_reported_once_and_with_its_cause() {
         "{report}"
     );
     assert_eq!(bench.report_after(25_000, Arrival::Lost("unplugged".to_owned())), None);
-    assert_eq!(bench.feed.fault(&bench.session).unwrap(), "the readings ended early: unplugged");
+    assert_eq!(bench.feed.fault(bench.session.frames()).unwrap(), "the readings ended early: unplugged");
 }

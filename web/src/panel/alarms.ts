@@ -32,6 +32,13 @@ export function ruleText(rule: AlarmRule): string {
   return `${lines.join("\n")}\n`;
 }
 
+/** What was set, and how long it holds. */
+export function alarmsSet(count: number, file: string | null): string {
+  if (count === 0) return "No alarms are set.";
+  const are = `${count} ${count === 1 ? "alarm is" : "alarms are"} set`;
+  return file === null ? `${are} until the server ends.` : `${are}, and kept in ${file}.`;
+}
+
 function band(key: string, [low, high]: [string, string], unit: string, far: number): string[] {
   if (low === "" && high === "") return [];
   const [from, to] = [low === "" ? -far : Number(low), high === "" ? far : Number(high)];
@@ -113,10 +120,10 @@ export class Alarms {
   private async set(): Promise<void> {
     setText(need("alarm-done"), "");
     try {
-      const { text } = await api.setAlarms(this.file.value);
+      const { text, file } = await api.setAlarms(this.file.value);
       this.complain(null);
       const count = text.split("\n").filter((line) => line.trim().startsWith("[[rule]]")).length;
-      setText(need("alarm-done"), count === 0 ? "No alarms are set." : `${count} ${count === 1 ? "alarm is" : "alarms are"} set until the server ends.`);
+      setText(need("alarm-done"), alarmsSet(count, file));
     } catch (error) {
       this.complain(error);
     }

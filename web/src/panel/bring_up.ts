@@ -4,6 +4,7 @@ import { api, ApiError } from "../api";
 import { element, need, setText } from "../dom";
 import type { BringUpRecord, RigForm } from "../protocol";
 import { badFrameWords, hertz } from "../words";
+import { FieldProblems } from "./field_problems";
 
 /** Milliseconds between two looks. */
 const LOOK_MS = 200;
@@ -12,6 +13,20 @@ const TRACED = 100;
 /** Newtons of a gram: standard gravity. */
 const NEWTONS = { g: 9.80665e-3, kg: 9.80665, N: 1 };
 
+/** Elements of the fields that the server names. */
+const FIELDS: Record<string, string> = {
+  file: "rig-file",
+  channels: "rig-channels",
+  length_mm: "rig-length",
+  width_mm: "rig-width",
+  places: "rig-places",
+  repeats: "rig-repeats",
+  force_n: "rig-force",
+  second_force_n: "rig-second-force",
+  placement_mm: "rig-placement",
+  sensor_places_mm: "rig-channels",
+};
+
 export class BringUpPanel {
   private looks = false;
   private looking: Promise<void> = Promise.resolve();
@@ -19,6 +34,7 @@ export class BringUpPanel {
   private ports = "";
   private traces: number[][] = [];
   private asked = 0;
+  private problems = new FieldProblems(need<HTMLFormElement>("rig-form"));
 
   constructor(private made: () => void) {
     need("bring-up-open").addEventListener("click", () => void this.choose());
@@ -28,7 +44,7 @@ export class BringUpPanel {
     const form = need<HTMLFormElement>("rig-form");
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      void this.make();
+      if (this.problems.check()) void this.make();
     });
     form.addEventListener("input", () => this.changed());
   }
@@ -152,13 +168,21 @@ export class BringUpPanel {
       use.checked = true;
       use.setAttribute("aria-label", `Use ${channel.name}`);
       const name = element("input", "channel-name");
+      name.id = `rig-channel-${i}`;
       name.value = channel.name;
       name.maxLength = 60;
       name.required = true;
       name.readOnly = seen.named;
       name.setAttribute("aria-label", `Name of channel ${i + 1}`);
-      use.addEventListener("change", () => (name.disabled = !use.checked));
-      return element("div", "channel-row", use, name);
+      const place = element("input", "sensor-place");
+      place.id = `rig-sensor-place-${i}`;
+      place.pattern = "\\s*[0-9.]+([,; ]+[0-9.]+)?\\s*";
+      place.title = "a number, on a plane two, as in 50, 20";
+      place.placeholder = "at, mm";
+      place.maxLength = 40;
+      place.setAttribute("aria-label", `Place of sensor ${i + 1} in mm, which may be left out`);
+      use.addEventListener("change", () => (name.disabled = place.disabled = !use.checked));
+      return element("div", "channel-row", use, name, place);
     });
     need("rig-channels").replaceChildren(...(rows.length === 0 ? [element("p", "quiet", "Waiting for readings.")] : rows));
   }
@@ -168,6 +192,12 @@ export class BringUpPanel {
     const plane = text("rig-directions") === "2";
     const rows = [...need("rig-channels").querySelectorAll(".channel-row")];
     const unit = text("rig-force-unit") as keyof typeof NEWTONS;
+    const number = (id: string) => (text(id).trim() === "" ? null : Number(text(id)));
+    const newtons = (id: string) => {
+      const weight = number(id);
+      return weight === null ? null : Number((weight * NEWTONS[unit]).toPrecision(7));
+    };
+    const forceIsUnknown = need<HTMLInputElement>("rig-force-unknown").checked;
     return {
       file: text("rig-file").trim(),
       channels: rows.map((row) => {
@@ -178,8 +208,11 @@ export class BringUpPanel {
       width_mm: plane ? Number(text("rig-width")) : null,
       places: plane ? [Number(text("rig-places")), Number(text("rig-across"))] : [Number(text("rig-places"))],
       repeats: Number(text("rig-repeats")),
-      force_n: Number((Number(text("rig-force")) * NEWTONS[unit]).toPrecision(7)),
-      force_is_known: need<HTMLInputElement>("rig-known").checked,
+      force_n: forceIsUnknown ? null : newtons("rig-force"),
+      second_force_n: forceIsUnknown ? null : newtons("rig-second-force"),
+      placement_mm: number("rig-placement"),
+      sensor_places_mm: sensorPlaces(rows.map((row) => row.querySelector<HTMLInputElement>(".sensor-place")!.value)),
+      force_is_known: need<HTMLInputElement>("rig-known").checked && !forceIsUnknown,
       overwrite: need<HTMLInputElement>("rig-overwrite").checked,
       write,
     };
@@ -190,6 +223,11 @@ export class BringUpPanel {
     const plane = need<HTMLSelectElement>("rig-directions").value === "2";
     for (const id of ["rig-width-label", "rig-across-label"]) need(id).hidden = !plane;
     need<HTMLInputElement>("rig-width").required = need<HTMLInputElement>("rig-across").required = plane;
+    const forceIsUnknown = need<HTMLInputElement>("rig-force-unknown").checked;
+    for (const id of ["rig-force", "rig-force-unit", "rig-second-force", "rig-known"]) {
+      need<HTMLInputElement>(id).disabled = forceIsUnknown;
+    }
+    this.problems.showInvalid();
     const ready = need<HTMLFormElement>("rig-form").checkValidity() && need("rig-channels").querySelector("input") !== null;
     if (!ready) return setText(need("rig-text"), "Fill in length and weight first.");
     const asked = ++this.asked;
@@ -198,10 +236,10 @@ export class BringUpPanel {
         if (asked !== this.asked) return;
         setText(need("rig-text"), made.text);
         this.askToReplace(made.exists);
-        this.complain("rig-problem", null);
+        this.complainOfRig(null);
       },
       (error: unknown) => {
-        if (asked === this.asked) this.complain("rig-problem", error);
+        if (asked === this.asked) this.complainOfRig(error);
       },
     );
   }
@@ -225,11 +263,22 @@ export class BringUpPanel {
       this.made();
     } catch (error) {
       this.follow();
-      this.complain("rig-problem", error);
+      this.complainOfRig(error);
       if (error instanceof ApiError && error.status === 409) this.changed();
     } finally {
       button.disabled = false;
     }
+  }
+
+  /** Shows a refusal beside its field, or else above the button. */
+  private complainOfRig(error: unknown): void {
+    const id = error instanceof ApiError && error.field !== null ? FIELDS[error.field] : undefined;
+    for (const other of new Set(Object.values(FIELDS))) {
+      if (other !== id) this.problems.set(need(other), null);
+    }
+    if (id === undefined) return this.complain("rig-problem", error);
+    this.complain("rig-problem", null);
+    this.problems.set(need(id), (error as ApiError).message);
   }
 
   private complain(id: string, error: unknown): void {
@@ -237,6 +286,18 @@ export class BringUpPanel {
     problem.hidden = error === null;
     setText(problem, error === null ? "" : error instanceof ApiError ? error.message : "The server does not answer.");
   }
+}
+
+/** Places of sensors from what was typed, as in `50` or `50, 20`; null where nothing was. */
+export function sensorPlaces(typed: readonly string[]): number[][] | null {
+  if (typed.every((text) => text.trim() === "")) return null;
+  return typed.map((text) =>
+    text
+      .trim()
+      .split(/[\s,;]+/)
+      .filter((part) => part !== "")
+      .map(Number),
+  );
 }
 
 function words(value: number | null): string {

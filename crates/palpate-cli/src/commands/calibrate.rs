@@ -366,7 +366,9 @@ impl Bench<'_> {
                 Ok(Input::Arrived(arrived)) => calibration
                     .receive(&arrived, &mut notes)
                     .map_err(|error| cannot_go_on(arguments, &calibration, error))?,
-                Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {}
+                Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {
+                    calibration.check_feed(clock.now().elapsed, &mut notes);
+                }
                 Err(RecvTimeoutError::Disconnected) => ended = true,
             }
             ended |= notes.contains(&Note::Ended);
@@ -389,10 +391,11 @@ impl Bench<'_> {
                 // No reading shows its finger any more.
                 machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error))?;
             }
-            return Err(Failure::DataLost(format!(
-                "the source ended before all was pressed; {}",
-                goes_on(arguments, &calibration)
-            )));
+            let cause = calibration.fault().unwrap_or("the source ended before all was pressed".to_owned());
+            return Err(Failure::DataLost(format!("{cause}; {}", goes_on(arguments, &calibration))));
+        }
+        if let Some(fault) = calibration.fault().filter(|_| calibration.readings() == 0) {
+            return Err(Failure::DataLost(format!("{fault}; {}", goes_on(arguments, &calibration))));
         }
         match machine {
             Some(machine) => machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error)),
@@ -584,7 +587,10 @@ fn press_key(
 }
 
 fn stopped(arguments: &Arguments, calibration: &Calibration) -> Failure {
-    Failure::Interrupted(format!("stopped; {}", goes_on(arguments, calibration)))
+    match calibration.fault() {
+        Some(fault) => Failure::DataLost(format!("stopped; {fault}; {}", goes_on(arguments, calibration))),
+        None => Failure::Interrupted(format!("stopped; {}", goes_on(arguments, calibration))),
+    }
 }
 
 /// Words on what is kept.

@@ -7,6 +7,7 @@ use palpate_estimators::recording::Row;
 use palpate_live::calibration::{
     Calibration, Check, Note, Press, Statements, Waiting, deviation_percent, last_deviation_percent,
 };
+use palpate_live::feed::REPEATED_READINGS;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_length_mm;
@@ -143,8 +144,9 @@ pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
     for note in notes {
         match note {
             Note::Opened(name) => remark!("readings from {name}"),
-            Note::Lost(why) => remark!("the source went away: {why}; it is waited for"),
-            Note::Unread(words) => remark!("{words}"),
+            Note::Lost(why) => remark!("the source is lost: {why}; it is opened again once it is there"),
+            Note::NoReadings(words) => remark!("{words}"),
+            Note::ReadingsAgain => remark!("readings arrive again"),
             Note::Taken => {
                 let rows = calibration.journal().rows();
                 let off = last_deviation_percent(rows)
@@ -153,6 +155,7 @@ pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
                 let force = force.map_or(String::new(), |force_n| format!(" of {force_n:.3} N"));
                 remark!("taken: press {}{force}{off}", calibration.journal().presses());
             }
+            Note::RepeatedReadings => remark!("{REPEATED_READINGS}"),
             Note::Replaced => {
                 remark!("the reading grew: press {} is taken anew", calibration.journal().presses());
             }

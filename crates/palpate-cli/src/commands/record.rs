@@ -128,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     let unprinted = unprinted.as_ref().and_then(|unprinted| unprinted.get());
-    finish(arguments, &status, session.counters(), fault, unprinted)
+    finish(arguments, &status, &session.counters(), fault, unprinted)
 }
 
 /// Says what was recorded; a `fault` of the feed is a failure.

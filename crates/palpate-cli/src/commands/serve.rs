@@ -13,8 +13,10 @@ use crate::target::{Inputs, Target};
 use palpate_estimators::estimator::{Estimator, Locator};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::calibration::{DepthKnowledge, Journal, plan};
-use palpate_live::rules::RulesByAction;
-use palpate_live::server::{Access, AccessError, CalibrationPlan, Live, LiveError, Server, ServerError};
+use palpate_live::rules::{Rules, RulesByAction};
+use palpate_live::server::{
+    Access, AccessError, AlarmFile, CalibrationPlan, Live, LiveError, Server, ServerError,
+};
 use palpate_live::simulated_board::BoardConfig;
 use palpate_live::source::SourceUrl;
 use palpate_live::stage::StageUrl;
@@ -110,14 +112,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     sinks.push(Box::new(|_, _, _| Ok(Box::new(Words))));
     let live = match calibration(arguments)? {
         Some(plan) => {
-            let rules = rules_of(arguments, plan.rig.setup.surface().extent())?;
-            with_rules(
-                configured(
-                    Live::calibrating(plan, PathBuf::new(), HostClock::with_speed(arguments.clock_speed)),
-                    arguments,
-                ),
-                rules,
-            )
+            let extent = plan.rig.setup.surface().extent();
+            let rules = rules_of(arguments, extent)?;
+            let alarms = kept_alarms(arguments, &rules, extent)?;
+            let clock = HostClock::with_speed(arguments.clock_speed);
+            let live = Live::calibrating(plan, PathBuf::new(), clock);
+            with_rules(configured(live, arguments), rules, alarms)
         }
         None => match (&arguments.locator, &arguments.from) {
             (None, Some(from)) => bringing_up(from, arguments)?,
@@ -142,8 +142,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         std::thread::sleep(LOOK_EVERY);
     }
     // First the session, so that browsers get what it has told; both end within milliseconds.
-    live.end();
+    let fault = live.end();
     drop(server);
+    if let Some(fault) = fault {
+        return Err(Failure::DataLost(fault));
+    }
     Err(Failure::Interrupted("the server was ended".to_owned()))
 }
 
@@ -180,7 +183,9 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
         Some(path) => RigOrLocator::read(path)?,
     };
     // Read before a fit, which may take its time.
-    let rules = rules_of(arguments, read.setup().surface().extent())?;
+    let extent = read.setup().surface().extent();
+    let rules = rules_of(arguments, extent)?;
+    let alarms = kept_alarms(arguments, &rules, extent)?;
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (locator, simulated) = match read {
         RigOrLocator::Locator(locator) => {
@@ -201,13 +206,17 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
         rules::refuse_untold_forces(&rules.commanding, path, &locator)?;
         rules::refuse_untold_forces(&rules.alarming, path, &locator)?;
     }
+    if let Some(KeptAlarms { file, rules, .. }) = &alarms {
+        let about = |problem| Complaint::about(file.path(), problem).help("mend the file, or remove it");
+        rules.check_alarms(&locator).map_err(about)?;
+    }
     if let Err(error) = locator.tare() {
         remark!("warning: no tare, so offsets that have moved stay in the readings: {error}");
     }
     // A locator that does not go with the options is refused before anything is served.
     arguments.session.session(&locator, path)?;
     // URLs name paths as the command line does: from the folder it was started in.
-    let live = with_rules(Live::new(locator, &name, simulated, PathBuf::new()), rules);
+    let live = with_rules(Live::new(locator, &name, simulated, PathBuf::new()), rules, alarms);
     Ok(configured(live, arguments))
 }
 
@@ -220,8 +229,41 @@ fn rules_of(arguments: &Arguments, extent: Extent) -> Result<RulesByAction, Fail
     Ok(rules)
 }
 
-fn with_rules(live: Live, rules: RulesByAction) -> Live {
-    live.with_commands(rules.commanding).with_alarms(rules.alarming)
+fn with_rules(live: Live, rules: RulesByAction, alarms: Option<KeptAlarms>) -> Live {
+    let live = live.with_commands(rules.commanding);
+    match alarms {
+        Some(KeptAlarms { file, text, rules }) => live.with_alarm_file(file, text, rules),
+        None => live.with_alarms(rules.alarming),
+    }
+}
+
+/// Alarms that an earlier run of the server kept, and their file.
+struct KeptAlarms {
+    file: AlarmFile,
+    text: String,
+    rules: Rules,
+}
+
+/// The kept alarms, beside the locator or else in the folder of recordings; `None` where alarms come from --rules, or no file keeps them.
+fn kept_alarms(
+    arguments: &Arguments,
+    rules: &RulesByAction,
+    extent: Extent,
+) -> Result<Option<KeptAlarms>, Failure> {
+    let beside = arguments.out.as_ref().or(arguments.locator.as_ref()).map(|path| AlarmFile::beside(path));
+    let in_folder = || arguments.record.as_ref().map(|folder| AlarmFile::in_folder(folder));
+    let Some(file) = beside.or_else(in_folder).filter(|_| rules.alarming.as_slice().is_empty()) else {
+        return Ok(None);
+    };
+    let text = file.read().map_err(|error| Complaint::about(file.path(), error))?;
+    let rules = match text.trim() {
+        "" => Rules::default(),
+        _ => rules::read(Some(file.path()), extent)?,
+    };
+    if !rules.as_slice().is_empty() {
+        remark!("alarms of {}", file.path().display());
+    }
+    Ok(Some(KeptAlarms { file, text, rules }))
 }
 
 /// The same with the recordings and sessions of the arguments.

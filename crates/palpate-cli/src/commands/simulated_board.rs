@@ -64,6 +64,9 @@ pub struct Arguments {
     /// Step of the channels' converters, in their SI unit or raw [default: continuous values]
     #[arg(long, value_name = "NUMBER", default_value_t = 0.0)]
     converter_step: f64,
+    /// Frames that repeat each reading after the first, as of a logger that is faster than its sensors
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    repeats: u32,
     /// A script of the finger: CSV of time in s, x and y in mm, force in N [default: a random finger]
     #[arg(long, value_name = "FILE.csv")]
     finger: Option<PathBuf>,
@@ -147,6 +150,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         residue: arguments.residue,
         residue_s: arguments.residue_time,
         converter_step: arguments.converter_step,
+        repeats: arguments.repeats,
     };
     let board = SimulatedBoard::new(&rig.setup, &config, finger)
         .map_err(|error| Complaint::about(&arguments.rig, error))?;

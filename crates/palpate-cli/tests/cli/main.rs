@@ -10,7 +10,9 @@ mod connections;
 mod design;
 mod digit;
 mod feeds;
+mod hand_at_terminal;
 mod init;
+mod kept_alarms;
 mod learnt;
 mod limit;
 mod live;
@@ -31,6 +33,7 @@ mod support;
 mod supported_beams;
 mod tare;
 mod track;
+mod unread_sources;
 mod verbs;
 #[cfg(all(feature = "foxglove", feature = "ros"))]
 mod wire;

@@ -4,10 +4,12 @@
 use crate::support::command::{folder, palpate, run, said};
 use crate::support::examples::{FSI_WATER, LOAD_PROFILE, MOVING_LOAD, NOISY_BEAM, PLATE};
 use crate::support::toml::Toml;
+use std::collections::HashMap;
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -22,16 +24,46 @@ fn begin(folder: &Path, arguments: &[&str]) -> Child {
     command.spawn().unwrap()
 }
 
-/// Sends a signal, and waits for the end.
-fn end(child: Child, signal: &str, within: Duration) -> Output {
-    let start = Instant::now();
-    Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+/// Times for which the threads of a process waited for a processor, in nanoseconds; empty where the system does not say.
+#[derive(Default)]
+struct RunDelays(HashMap<String, u64>);
+
+impl RunDelays {
+    /// Reads the times of the threads that there are now.
+    fn read(&mut self, process: u32) {
+        let Ok(threads) = fs::read_dir(format!("/proc/{process}/task")) else { return };
+        for thread in threads.flatten() {
+            let statistics = fs::read_to_string(thread.path().join("schedstat")).unwrap_or_default();
+            if let Some(delay_ns) = statistics.split(' ').nth(1).and_then(|text| text.parse().ok()) {
+                self.0.insert(thread.file_name().to_string_lossy().into_owned(), delay_ns);
+            }
+        }
+    }
+
+    fn sum(&self) -> Duration {
+        Duration::from_nanos(self.0.values().sum())
+    }
+}
+
+/// Sends a signal, and waits for the end. Time for which other processes have the processors does not count.
+fn end(mut child: Child, signal: &str, within: Duration) -> Output {
     // Its stdin stays open until it has ended.
-    let mut child = child;
     let stdin = child.stdin.take();
-    let output = child.wait_with_output().unwrap();
+    let [stdout, stderr] = [reader(child.stdout.take()), reader(child.stderr.take())];
+    let mut delays = RunDelays::default();
+    delays.read(child.id());
+    let (start, delayed) = (Instant::now(), delays.sum());
+    Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        delays.read(child.id());
+        std::thread::sleep(Duration::from_millis(2));
+    };
+    let elapsed = start.elapsed().saturating_sub(delays.sum() - delayed);
     drop(stdin);
-    let elapsed = start.elapsed();
+    let output = Output { status, stdout: stdout.join().unwrap(), stderr: stderr.join().unwrap() };
     let code = output.status.code();
     let stderr = String::from_utf8_lossy(&output.stderr);
     let wanted = if signal == "-INT" { 130 } else { 143 };
@@ -39,6 +71,15 @@ fn end(child: Child, signal: &str, within: Duration) -> Output {
     assert!(elapsed < within, "{elapsed:?}: {stderr}");
     assert!(stderr.contains("stopped"), "{stderr}");
     output
+}
+
+/// A thread that reads a pipe to its end; nothing without a pipe.
+fn reader(pipe: Option<impl Read + Send + 'static>) -> JoinHandle<Vec<u8>> {
+    std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        pipe.map(|mut pipe| pipe.read_to_end(&mut bytes));
+        bytes
+    })
 }
 
 /// A folder with a moving load's rig, a locator of it, and its readings in time.
@@ -112,8 +153,9 @@ fn what_came_before_a_signal_is_smoothed_and_reported() {
     let mut child = begin(folder, &["track", "locator.json", "--smooth", "--report", "report"]);
     let mut stdin = child.stdin.take().unwrap();
     writeln!(stdin, "{}", csv.lines().take(42).collect::<Vec<_>>().join("\n")).unwrap();
+    // A pipe holds 64 KiB: once twice as many bytes of comments are written, the lines before them are read.
+    stdin.write_all("# no reading\n".repeat((128 << 10) / 13).as_bytes()).unwrap();
     child.stdin = Some(stdin);
-    std::thread::sleep(Duration::from_millis(1500));
     let stopped = end(child, "-INT", COMPUTING);
     let told = String::from_utf8(stopped.stdout).unwrap();
     assert_eq!(told.lines().count(), 41, "{told}");

@@ -37,7 +37,7 @@ pub use marks::{Decimal, Separator};
 pub use placement::comment_with_placement;
 pub use repeat_watch::RepeatWatch;
 pub use repeated_readings::{RepeatedReadings, Repeats};
-pub use sample_hold::{FALSE_ALARM, RepeatCause, RepeatCounts};
+pub use sample_hold::{FALSE_ALARM, RepeatCause, RepeatCounts, is_same_reading};
 pub use table::{Content, Table, TableColumn};
 pub use text::TextDecoder;
 pub use untouched::{TimeSpan, TimeSpanError};

@@ -200,7 +200,7 @@ fn within_steps(steps: f64, sd: f64) -> f64 {
 }
 
 /// True for two readings of the same values in every channel.
-pub(super) fn is_same_reading(a: &[f64], b: &[f64]) -> bool {
+pub fn is_same_reading(a: &[f64], b: &[f64]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| is_equal(*a, *b))
 }
 

@@ -492,3 +492,48 @@ fn drift_of_untouched_rows_is_named_and_channels_share_a_line() {
     let recording = Recording::new(&layout, "drifting", rows.collect());
     insta::assert_snapshot!(recording.warning_lines().join("\n"));
 }
+
+/// Course of a drift over a recording, by the share of its rows.
+type Course = fn(f64) -> f64;
+
+#[test]
+fn drift_alone_is_one_warning() {
+    let layout = Layout::even(SensorKind::Raw, 2, 0.1);
+    let courses: [(&str, Course); 4] = [
+        ("linear", |at| 20.0 * at),
+        ("quadratic", |at| 20.0 * at * at),
+        ("settling", |at| 20.0 * (1.0 - (-at / 0.2).exp())),
+        ("there and back", |at| 20.0 * (std::f64::consts::TAU * at).sin()),
+    ];
+    // Rows that drift, and presses of each place among the untouched rows.
+    let benches = [("all rows", true, 2), ("untouched rows", false, 2), ("single presses", true, 1)];
+    for (course, drift) in courses {
+        for (bench, presses_drift, repeats) in benches {
+            for count in [60, 400] {
+                let row = |i: usize| {
+                    let touched = i % 3 == 1;
+                    let place = (i / 3) % (count / 3 / repeats);
+                    let noise = 0.02 * (((i * 7919) % 97) as f64 / 48.0 - 1.0);
+                    let course = if touched && !presses_drift { 0.0 } else { drift(i as f64 / count as f64) };
+                    let press = if touched { 50.0 + 3.0 * place as f64 } else { 0.0 };
+                    Row {
+                        position: Position::along(if touched { 0.0001 * place as f64 } else { 0.0 }),
+                        force_n: Some(if touched { 1.0 } else { 0.0 }),
+                        nuisances: Vec::new(),
+                        time_s: None,
+                        reading: vec![press + course + noise, 2.0 * press - course + noise],
+                    }
+                };
+                let recording = Recording::new(&layout, "drifting", (0..count).map(row).collect());
+                let lines = recording.warning_lines();
+                assert_eq!(lines.len(), 1, "{course}, {bench}, {count}: {lines:#?}");
+                assert!(lines[0].contains("drift"), "{course}, {bench}, {count}: {lines:#?}");
+                // A bad row among them is still found.
+                let mut bad = recording.clone();
+                bad.rows[count / 2 / 3 * 3].reading[0] += 30.0;
+                let lines = bad.warning_lines();
+                assert_eq!(lines.len(), 2, "{course}, {bench}, {count}: {lines:#?}");
+            }
+        }
+    }
+}

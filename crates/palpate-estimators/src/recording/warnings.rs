@@ -49,7 +49,8 @@ pub enum Warning {
     ///
     /// Repeats are rows with the same position and force. The standard deviation is 1.4826/√2 times the median magnitude of
     /// the difference between one repeat and the next, equal ones aside, so that a few bad rows do not hide themselves. The drift is a polyline through
-    /// the medians of up to 20 blocks of 5 rows or more, fitted in turns with the medians of the repeats.
+    /// the medians of up to 20 blocks of 5 rows or more, fitted in turns with the medians of the repeats. Where the drift has a warning of its own, the
+    /// blocks have 5 rows, contacts and untouched rows may have a polyline each, and a row may be off by the change between the knots beside it.
     RepeatsDisagree {
         /// The channel's name.
         channel: String,
@@ -217,7 +218,8 @@ impl<'a> Channel<'a> {
             return if self.values.len() > 1 { vec![dead] } else { Vec::new() };
         }
         let saturated = [self.lowest, self.highest].into_iter().filter_map(|extreme| self.saturated(extreme));
-        saturated.chain(self.repeats_disagree(repeats)).chain(self.drift(repeats)).collect()
+        let drift = self.drift(repeats);
+        saturated.chain(self.repeats_disagree(repeats, drift.as_ref())).chain(drift).collect()
     }
 
     fn saturated(&self, extreme: f64) -> Option<Warning> {
@@ -228,8 +230,29 @@ impl<'a> Channel<'a> {
         much.then(|| Warning::Saturated { channel: self.name(), at: self.quantity(extreme), rows, of })
     }
 
-    fn repeats_disagree(&self, repeats: &[Vec<usize>]) -> Option<Warning> {
-        let values = self.without_drift(repeats);
+    /// Rows far off their repeats, beside a drift that has a warning of its own.
+    ///
+    /// That drift need not be slow: its blocks have few rows. Contacts drift with the untouched rows or by themselves, whichever explains more rows.
+    fn repeats_disagree(&self, repeats: &[Vec<usize>], drift: Option<&Warning>) -> Option<Warning> {
+        if drift.is_none() {
+            let driftless = self.without_drift(repeats, MOST_BLOCKS);
+            return self.far_off(&Driftless { steps: vec![0.0; self.values.len()], ..driftless }, repeats);
+        }
+        let touches = |group: &Vec<usize>| self.recording.rows[group[0]].touches();
+        let (touched, untouched) = repeats.iter().cloned().partition::<Vec<_>, _>(touches);
+        let mut apart = self.without_drift(&touched, usize::MAX);
+        let of_untouched = self.without_drift(&untouched, usize::MAX);
+        for i in untouched.iter().flatten() {
+            (apart.values[*i], apart.steps[*i]) = (of_untouched.values[*i], of_untouched.steps[*i]);
+        }
+        let together = self.without_drift(repeats, usize::MAX);
+        let far_off = [apart, together].map(|driftless| self.far_off(&driftless, repeats));
+        far_off.into_iter().min_by_key(|warning| warning.as_ref().map_or(0, Warning::extent)).flatten()
+    }
+
+    /// Rows whose values are far off the median of their repeats.
+    fn far_off(&self, driftless: &Driftless, repeats: &[Vec<usize>]) -> Option<Warning> {
+        let Driftless { values, steps: drift_steps } = driftless;
         // Equal repeats of a slow or coarse channel do not tell the scatter.
         let pairs = repeats.iter().flat_map(|rows| rows.windows(2));
         let pairs = pairs.filter(|pair| self.values[pair[1]] != self.values[pair[0]]);
@@ -239,11 +262,12 @@ impl<'a> Channel<'a> {
         let mut rows = 0;
         let mut worst = (0, 0.0);
         for group in repeats {
-            let Some(middle) = median_of(&values, group) else { continue };
+            let Some(middle) = median_of(values, group) else { continue };
             for i in group {
                 let deviation = values[*i] - middle;
-                rows += usize::from(deviation.abs() > bound);
-                if deviation.abs() > f64::abs(worst.1) {
+                let is_far_off = deviation.abs() > bound + drift_steps[*i];
+                rows += usize::from(is_far_off);
+                if is_far_off && deviation.abs() > f64::abs(worst.1) {
                     worst = (*i, deviation);
                 }
             }
@@ -258,19 +282,20 @@ impl<'a> Channel<'a> {
         })
     }
 
-    /// The values less the course of a slow drift, which is fitted in turns with the medians of the repeats.
-    fn without_drift(&self, repeats: &[Vec<usize>]) -> Vec<f64> {
+    /// The values less the course of a drift over as many blocks of rows at most, which is fitted in turns with the medians of the repeats.
+    fn without_drift(&self, repeats: &[Vec<usize>], most_blocks: usize) -> Driftless {
         let mut rows: Vec<usize> = repeats.iter().flatten().copied().collect();
         rows.sort_unstable();
-        let blocks = (rows.len() / LEAST_BLOCK).min(MOST_BLOCKS);
-        let mut values = self.values.clone();
+        let blocks = (rows.len() / LEAST_BLOCK).min(most_blocks);
+        let mut driftless = Driftless { values: self.values.clone(), steps: vec![0.0; self.values.len()] };
         if blocks < 2 {
-            return values;
+            return driftless;
         }
+        let Driftless { values, steps } = &mut driftless;
         let mut off = vec![0.0; values.len()];
         for _ in 0..DRIFT_TURNS {
             for group in repeats {
-                let middle = median_of(&values, group).unwrap_or_default();
+                let middle = median_of(values, group).unwrap_or_default();
                 group.iter().for_each(|i| off[*i] = self.values[*i] - middle);
             }
             let knots = rows.chunks(rows.len().div_ceil(blocks)).filter_map(|block| {
@@ -279,10 +304,11 @@ impl<'a> Channel<'a> {
             });
             let knots: Vec<(f64, f64)> = knots.collect();
             for i in &rows {
-                values[*i] = self.values[*i] - on_polyline(&knots, *i as f64);
+                let (height, step) = on_polyline(&knots, *i as f64);
+                (values[*i], steps[*i]) = (self.values[*i] - height, step);
             }
         }
-        values
+        driftless
     }
 
     /// The drift of contacts, else of untouched rows, else of both together.
@@ -335,16 +361,23 @@ impl<'a> Channel<'a> {
     }
 }
 
+/// Values of a channel less the course of a drift.
+struct Driftless {
+    values: Vec<f64>,
+    /// Change of the course between the knots beside each row: a curved drift is off the polyline by less.
+    steps: Vec<f64>,
+}
+
 /// Median of the values of these rows; `None` without rows.
 fn median_of(values: &[f64], rows: &[usize]) -> Option<f64> {
     median(rows.iter().map(|i| values[*i]).collect())
 }
 
-/// Height at `at` of the polyline through two or more knots, whose outer pieces go on beyond its ends.
-fn on_polyline(knots: &[(f64, f64)], at: f64) -> f64 {
+/// Height at `at` of the polyline through two or more knots, whose outer pieces go on beyond its ends, and height of the step between the knots beside it.
+fn on_polyline(knots: &[(f64, f64)], at: f64) -> (f64, f64) {
     let piece = knots.partition_point(|(x, _)| *x < at).clamp(1, knots.len() - 1);
     let ((x0, y0), (x1, y1)) = (knots[piece - 1], knots[piece]);
-    y0 + (y1 - y0) * (at - x0) / (x1 - x0)
+    (y0 + (y1 - y0) * (at - x0) / (x1 - x0), (y1 - y0).abs())
 }
 
 impl Warning {

@@ -48,6 +48,11 @@ impl Baseline {
         (is_steady || still.is_at_rest(&all, 0.0)).then_some(baseline)
     }
 
+    /// Standard deviation of the noise of each channel.
+    pub fn noise_sd(&self) -> Vec<f64> {
+        self.noise.iter().map(|noise| noise.sd).collect()
+    }
+
     /// Largest deviation of a reading from the baseline, in standard deviations of the noise.
     pub fn size(&self, reading: &[f64]) -> f64 {
         self.size_of(&self.deviation(reading))

@@ -8,8 +8,8 @@
 
 use super::baseline::{Baseline, NOISE_LIMIT_SD};
 use super::press::Press;
-use super::repeat_check::{Doubt, RepeatCheck, TouchReading};
-use super::stretch::{Stretch, mean};
+use super::repeat_check::{Doubt, GROWTH, RepeatCheck, TouchReading};
+use super::stretch::{REST_SPAN, Stretch, mean};
 use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
 use serde::Serialize;
@@ -44,8 +44,6 @@ const LIFT_TAIL_SHARE: f64 = 1.0 / 3.0;
 const AGAINST: f64 = -0.8;
 /// Share of a press that comes within a second; what comes more slowly is drift.
 const ONSET_SHARE: f64 = 0.2;
-/// Growth of a reading, without a lift, that shows the recorded touch to have been a light one before the press.
-const GROWTH: f64 = 1.2;
 /// Time for which a finger may linger lightly before it presses: a doubtful touch that rests for longer is asked for again.
 const LINGER: Duration = Duration::from_millis(1200);
 /// Silence after which the untouched reading is learnt anew: a board may have restarted.
@@ -96,6 +94,8 @@ pub enum Progress {
     Untouched(RestingRow),
     /// The press is asked for again.
     AskedAgain(Doubt),
+    /// The recorded press is taken back, and asked for again.
+    TakenBack(Doubt),
 }
 
 /// A touch from its onset on.
@@ -113,6 +113,18 @@ struct Touch {
     doubtful_since: Option<Duration>,
 }
 
+/// Growth of a touch after its reading was taken.
+#[derive(Clone, Debug, Default)]
+struct Growth {
+    /// Instant from which on the readings are larger, and their number.
+    since: Duration,
+    readings: u32,
+    /// True once that lasted: a hand may jerk as it lifts.
+    has_lasted: bool,
+    /// Largest deviation.
+    deviation: Vec<f64>,
+}
+
 /// The guide of a calibration.
 #[derive(Clone, Debug)]
 pub struct Guide {
@@ -122,6 +134,10 @@ pub struct Guide {
     waiting: Waiting,
     /// Instant from which on it waits, or at which the untouched reading was followed last.
     since: Duration,
+    /// Instant of the last reading, also of one that repeats the reading before it.
+    last_at: Option<Duration>,
+    /// True where the source repeats readings because it is faster than its sensors: each counts once.
+    is_sample_and_hold: bool,
     stretch: Stretch,
     /// Untouched reading, which follows the drift while nothing touches.
     baseline: Option<Baseline>,
@@ -133,6 +149,7 @@ pub struct Guide {
     /// Deviation of the press that is let go: recorded, or asked for again.
     pressed: Vec<f64>,
     is_recorded: bool,
+    growth: Growth,
     /// Size of what a finger may still hold after the last lift, in standard deviations of the noise; 0 once it let go of that.
     lingering: f64,
     /// True from a lift until the untouched reading is at rest by noise alone: soft surfaces creep back.
@@ -149,6 +166,8 @@ impl Guide {
             next: 0,
             waiting,
             since: Duration::ZERO,
+            last_at: None,
+            is_sample_and_hold: false,
             stretch: Stretch::default(),
             baseline: None,
             untouched: None,
@@ -156,6 +175,7 @@ impl Guide {
             touch: Touch::default(),
             pressed: Vec::new(),
             is_recorded: false,
+            growth: Growth::default(),
             lingering: 0.0,
             is_recovering: false,
             checks: RepeatCheck::default(),
@@ -188,9 +208,19 @@ impl Guide {
         self.waiting
     }
 
+    /// True where the source repeats readings because it is faster than its sensors: each counts once.
+    pub fn is_sample_and_hold(&self) -> bool {
+        self.is_sample_and_hold
+    }
+
     /// Mean untouched reading by now; `None` before it is learnt.
     pub fn untouched_reading(&self) -> Option<&[f64]> {
         self.baseline.as_ref().map(|baseline| baseline.mean.as_slice())
+    }
+
+    /// Standard deviation of the noise of each channel; `None` before it is learnt.
+    pub fn noise_sd(&self) -> Option<Vec<f64>> {
+        self.baseline.as_ref().map(Baseline::noise_sd)
     }
 
     /// What is waited for and what is read, in a sentence; `None` where the step says enough.
@@ -226,8 +256,12 @@ impl Guide {
 
     /// Takes a reading at an instant.
     pub fn add(&mut self, at: Duration, reading: &[f64]) -> Progress {
-        if self.stretch.last_at().is_some_and(|last| at.saturating_sub(last) > SILENCE) {
+        if self.last_at.is_some_and(|last| at.saturating_sub(last) > SILENCE) {
             self.relearn();
+        }
+        self.last_at = Some(at);
+        if self.is_sample_and_hold && self.stretch.is_repeat(reading) {
+            return Progress::None;
         }
         self.stretch.add(at, reading);
         match (self.waiting, self.baseline.take()) {
@@ -335,6 +369,7 @@ impl Guide {
     }
 
     fn learn_baseline(&mut self, at: Duration) -> Progress {
+        self.count_repeats_once();
         let Some(baseline) = Baseline::learn(&self.stretch) else { return Progress::None };
         if self.reference.is_empty() {
             self.reference.clone_from(&baseline.mean);
@@ -342,6 +377,19 @@ impl Guide {
         self.untouched = Some(self.untouched_row(baseline.mean.clone()));
         self.baseline = Some(baseline);
         self.begin_press(at)
+    }
+
+    /// Forgets repeated readings where the source is faster than its sensors. A touch changes all channels together in any source, hence the readings
+    /// must be at rest.
+    fn count_repeats_once(&mut self) {
+        let Some(distinct) = self.stretch.without_repeats().filter(|_| !self.is_sample_and_hold) else {
+            return;
+        };
+        let is_at_rest = [&self.stretch, &distinct].iter().any(|stretch| Baseline::learn(stretch).is_some());
+        if is_at_rest && self.stretch.is_sample_and_hold() {
+            self.is_sample_and_hold = true;
+            self.stretch = distinct;
+        }
     }
 
     /// Waits for the next press, or ends with the untouched row after the last one.
@@ -418,6 +466,7 @@ impl Guide {
             return Progress::None;
         }
         self.pressed.clone_from(&touch.deviation);
+        self.growth = Growth::default();
         self.wait(at, Waiting::Release);
         if let Some(doubt) = doubt {
             self.checks.refuse(touch);
@@ -438,6 +487,9 @@ impl Guide {
 
     /// Waits until a press is lifted, or takes its place by a firmer one.
     fn await_release(&mut self, at: Duration, baseline: &mut Baseline) -> Progress {
+        if let Some(reading) = self.stretch.last() {
+            self.growth.follow(at, baseline.deviation(reading), &self.pressed, baseline);
+        }
         let Some(latest) = self.stretch.latest() else { return Progress::None };
         let mean = mean(&latest);
         let (size, pressed) = (baseline.size(&mean), baseline.size_of(&self.pressed));
@@ -467,9 +519,22 @@ impl Guide {
         if !is_lifted {
             return Progress::None;
         }
+        if self.is_recorded && self.growth.has_lasted {
+            return self.take_back(at, mean, baseline);
+        }
         self.lingering = limit.max(size);
         self.is_recovering = !baseline.is_at_rest(&latest, 0.0);
         self.return_to_untouched(at, mean, baseline)
+    }
+
+    /// Takes back a press that grew after its reading was taken, and never rested.
+    fn take_back(&mut self, at: Duration, mean: Vec<f64>, baseline: &mut Baseline) -> Progress {
+        self.next = self.next.saturating_sub(1);
+        self.checks.outgrow_last(std::mem::take(&mut self.growth.deviation));
+        self.is_recorded = false;
+        self.is_recovering = !self.stretch.latest().is_some_and(|latest| baseline.is_at_rest(&latest, 0.0));
+        self.return_to_untouched(at, mean, baseline);
+        Progress::TakenBack(Doubt::Grew)
     }
 
     /// A firmer touch without a lift in between: the light one before was not the press.
@@ -484,6 +549,7 @@ impl Guide {
         self.checks.forget_last();
         self.checks.record(&press, TouchReading { deviation: deviation.clone(), reading: mean.clone() });
         self.pressed = deviation;
+        self.growth = Growth::default();
         self.since = at;
         Progress::Replaced(self.press_row(&press, mean))
     }
@@ -524,6 +590,25 @@ impl Guide {
         let lengths = baseline.length_of(&deviation) * baseline.length_of(&self.pressed);
         baseline.size_of(&deviation) <= self.lingering
             && baseline.product_of(&deviation, &self.pressed) < AGAINST * lengths
+    }
+}
+
+impl Growth {
+    /// Follows the deviation of a reading from that of the press.
+    fn follow(&mut self, at: Duration, deviation: Vec<f64>, pressed: &[f64], baseline: &Baseline) {
+        let size = baseline.size_of(&deviation);
+        if size <= GROWTH * baseline.size_of(pressed) {
+            self.readings = 0;
+            return;
+        }
+        if self.readings == 0 {
+            self.since = at;
+        }
+        self.readings += 1;
+        self.has_lasted |= self.readings >= ONSET_READINGS && at.saturating_sub(self.since) >= REST_SPAN / 2;
+        if size > baseline.size_of(&self.deviation) {
+            self.deviation = deviation;
+        }
     }
 }
 

@@ -12,6 +12,8 @@ const LIGHT_SHARE: f64 = 0.15;
 const REPEAT_SHARE: f64 = 0.2;
 /// Largest share of a press that hysteresis is assumed to explain.
 const MOST_RESIDUE_SHARE: f64 = 0.3;
+/// Growth of a reading, without a lift, that shows the recorded touch to have been a light one before the press.
+pub const GROWTH: f64 = 1.2;
 /// Times that one press is asked for again before it is recorded as it is.
 const MOST_REQUESTS: u32 = 2;
 
@@ -20,9 +22,11 @@ const MOST_REQUESTS: u32 = 2;
 pub enum Doubt {
     /// The reading moved without a press: too slowly.
     Drift,
-    /// The touch is much lighter than every press so far.
+    /// The press grew after its reading was taken, and was lifted before it rested.
+    Grew,
+    /// The touch is much lighter than earlier presses.
     Light {
-        /// Its size in % of the smallest press so far.
+        /// Its size in % of an earlier press.
         percent: f64,
     },
     /// The touch differs from the presses of its place.
@@ -36,8 +40,9 @@ impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Drift => write!(f, "the reading drifted; no press was seen"),
+            Self::Grew => write!(f, "the press grew after its reading was taken"),
             Self::Light { percent } => {
-                write!(f, "the touch has only {percent:.1} % of the smallest press so far")
+                write!(f, "the touch has only {percent:.1} % of an earlier press")
             }
             Self::OffRepeats { percent } => {
                 write!(f, "the touch differs by {percent:.0} % from the other presses of this place")
@@ -77,6 +82,8 @@ pub struct RepeatCheck {
     /// The press that was asked for again last, and how often.
     refused: Option<TouchReading>,
     requests: u32,
+    /// Deviation up to which the last press grew after its reading was taken: a lighter touch is not the press.
+    outgrown: Option<Vec<f64>>,
     /// Largest change between untouched readings that were recorded one after the other.
     residue: Vec<f64>,
 }
@@ -113,13 +120,19 @@ impl RepeatCheck {
         if is_confirmed || self.requests >= MOST_REQUESTS {
             return None;
         }
+        let size = baseline.size_of(&touch.deviation);
+        if let Some(share) = self.outgrown.as_ref().map(|outgrown| size / baseline.size_of(outgrown))
+            && share * GROWTH < 1.0
+        {
+            return Some(Doubt::Light { percent: 100.0 * share });
+        }
         let repeats = self.past.iter().filter(|past| past.is_repeat(press));
         // Agreement with one of them is enough: another may be the wrong one.
         let share = repeats.map(|past| self.excess_share(press, touch, &past.touch, baseline));
         if let Some(share) = share.min_by(f64::total_cmp) {
             return (share > REPEAT_SHARE).then_some(Doubt::OffRepeats { percent: 100.0 * share });
         }
-        let share = baseline.size_of(&touch.deviation) / self.smallest_size(baseline)?;
+        let share = size / self.smallest_size(baseline)?;
         (share < LIGHT_SHARE).then_some(Doubt::Light { percent: 100.0 * share })
     }
 
@@ -172,10 +185,17 @@ impl RepeatCheck {
         self.forget_request();
     }
 
+    /// Forgets the last press, which grew up to this deviation after its reading was taken.
+    pub fn outgrow_last(&mut self, deviation: Vec<f64>) {
+        self.forget_last();
+        self.outgrown = Some(deviation);
+    }
+
     /// Forgets that a press was asked for again.
     pub fn forget_request(&mut self) {
         self.refused = None;
         self.requests = 0;
+        self.outgrown = None;
     }
 }
 

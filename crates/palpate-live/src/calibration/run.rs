@@ -8,7 +8,8 @@ use super::repeats::untouched_before;
 use super::touch_off::TouchDetector;
 use super::trace::RecentReadings;
 use crate::event::{ChannelState, Event};
-use crate::frame::{BadFrame, Channel, ColumnsError, Decoder, Frame};
+use crate::feed::FeedWatch;
+use crate::frame::{BadFrame, Channel, ColumnsError, FrameReader};
 use crate::input::{Arrival, Arrived};
 use crate::session::HealthWatch;
 use palpate_estimators::recording::Row;
@@ -34,8 +35,6 @@ pub enum CalibrationError {
     },
 }
 
-/// Frames without a reading among them after which it is said that there is none.
-const UNREAD: u64 = 100;
 /// Time between two explanations of a step that takes long.
 const EXPLAIN_EVERY: Duration = Duration::from_secs(5);
 
@@ -46,8 +45,10 @@ pub enum Note {
     Opened(String),
     /// The source went away, and is looked for again; why.
     Lost(String),
-    /// Many frames and not one reading: why, and what to do.
-    Unread(String),
+    /// No readings arrive: cause and remedy.
+    NoReadings(String),
+    /// Readings arrive again.
+    ReadingsAgain,
     /// The source has no more.
     Ended,
     /// Something else is waited for.
@@ -58,6 +59,8 @@ pub enum Note {
     Replaced,
     /// The untouched surface was recorded, and is on disk where presses have a force.
     Untouched,
+    /// The source repeats readings because it is faster than its sensors: each counts once.
+    RepeatedReadings,
     /// The press is asked for again.
     AskedAgain(Doubt),
     /// A step takes long: what is waited for and what is read.
@@ -81,20 +84,21 @@ struct LoadCell {
 pub struct Calibration {
     guide: Guide,
     journal: Journal,
-    decoder: Decoder,
-    /// Names by which a board may call the channels, the load cell's among them.
-    labels: Vec<String>,
+    /// Frames of the channels and the load cell.
+    frames: FrameReader,
+    feed: FeedWatch,
+    /// True from a report that no readings arrive until the next reading.
+    lacks_readings: bool,
     health: HealthWatch,
     load_cell: Option<LoadCell>,
-    /// Frames that were no reading, by cause.
-    bad: BTreeMap<BadFrame, u64>,
-    readings: u64,
     last: Vec<f64>,
     recent: RecentReadings,
     /// True while readings are shown to the guide and to the detector: not while a machine moves.
     is_guided: bool,
     /// Detector of a touch-off.
     touch_detector: Option<TouchDetector>,
+    /// True once it was noted that the source repeats readings.
+    notes_repeats: bool,
     /// Step that is waited for, and the instant of its last explanation.
     explained: (Waiting, Duration),
 }
@@ -123,23 +127,23 @@ impl Calibration {
                 unit: Unit::from_symbol("N").unwrap_or(Unit::NONE),
             });
         }
-        let mut decoder = Decoder::new(&channels);
-        decoder.set_columns(columns)?;
+        let mut frames = FrameReader::new(&channels);
+        frames.set_columns(columns)?;
         let guide = Guide::new(plan).with_rows(journal.rows());
         Ok(Self {
             explained: (guide.waiting(), Duration::ZERO),
             guide,
             journal,
-            decoder,
-            labels: channels.into_iter().map(|channel| channel.label).collect(),
+            frames,
+            feed: FeedWatch::default(),
+            lacks_readings: false,
             health: HealthWatch::new(setup.layout()),
             load_cell,
-            bad: BTreeMap::new(),
-            readings: 0,
             last: Vec::new(),
             recent: RecentReadings::default(),
             is_guided: true,
             touch_detector: None,
+            notes_repeats: false,
         })
     }
 
@@ -155,12 +159,17 @@ impl Calibration {
 
     /// Frames that were no reading, by cause.
     pub fn bad_frames(&self) -> &BTreeMap<BadFrame, u64> {
-        &self.bad
+        self.frames.bad_frames()
     }
 
     /// Readings that arrived.
     pub fn readings(&self) -> u64 {
-        self.readings
+        self.frames.readings()
+    }
+
+    /// Fault of the source: no reading arrived, or none towards the end.
+    pub fn fault(&self) -> Option<String> {
+        self.feed.fault(&self.frames)
     }
 
     /// The last reading, in SI units or raw, without the load cell; empty before there was one.
@@ -186,56 +195,39 @@ impl Calibration {
     /// # Errors
     /// [`CalibrationError`] where a press cannot be kept.
     pub fn receive(&mut self, arrived: &Arrived, notes: &mut Vec<Note>) -> Result<(), CalibrationError> {
-        let mut frames = Vec::new();
-        let hand_on = |frame| frames.push(frame);
         match &arrived.arrival {
-            Arrival::Bytes(bytes) => self.decoder.receive(bytes, hand_on),
-            Arrival::Message(bytes) => self.decoder.receive_message(bytes, hand_on),
-            Arrival::Backlog(bytes) => self.decoder.receive_waiting(bytes),
-            Arrival::Opened(name) | Arrival::Piped(name) => {
-                self.decoder.open();
+            Arrival::Opened(name) | Arrival::Piped(name) | Arrival::Joined(name) => {
                 // Offsets of a board that was away may have moved.
                 self.guide.relearn();
                 notes.push(Note::Opened(name.clone()));
             }
-            Arrival::Joined(name) => {
-                self.decoder.join();
-                self.guide.relearn();
-                notes.push(Note::Opened(name.clone()));
-            }
-            Arrival::Lost(why) => {
-                self.decoder.open();
-                notes.push(Note::Lost(why.clone()));
-            }
-            Arrival::Ended => self.decoder.end(hand_on),
+            Arrival::Lost(why) => notes.push(Note::Lost(why.clone())),
+            Arrival::Backlog(_) | Arrival::Bytes(_) | Arrival::Message(_) | Arrival::Ended => {}
+        }
+        let frames = self.frames.receive(&arrived.arrival);
+        self.feed.receive(&arrived.arrival, arrived.at.elapsed, &self.frames);
+        if !frames.is_empty() && std::mem::take(&mut self.lacks_readings) {
+            notes.push(Note::ReadingsAgain);
         }
         for frame in frames {
-            match frame {
-                Ok(Frame { reading, .. }) => self.add(arrived.at.elapsed, &reading, notes)?,
-                Err(cause) => {
-                    *self.bad.entry(cause).or_default() += 1;
-                    notes.extend(self.unread(cause));
-                }
-            }
+            self.add(arrived.at.elapsed, &frame.reading, notes)?;
         }
+        self.check_feed(arrived.at.elapsed, notes);
         if arrived.arrival == Arrival::Ended {
             notes.push(Note::Ended);
         }
         Ok(())
     }
 
-    /// A note where the last of many frames was no reading either, for this cause.
-    fn unread(&self, cause: BadFrame) -> Option<Note> {
-        let is_time = self.readings == 0 && self.bad.values().sum::<u64>() == UNREAD;
-        is_time.then(|| {
-            let words = cause.explain_no_reading(UNREAD, self.labels.iter().map(String::as_str));
-            let last = self.decoder.last_bad().unwrap_or_default();
-            Note::Unread(format!("{words}; the last is `{last}`"))
-        })
+    /// Notes once that no readings arrive; to be called often while nothing arrives.
+    pub fn check_feed(&mut self, now: Duration, notes: &mut Vec<Note>) {
+        if let Some(words) = self.feed.report(now, &self.frames) {
+            self.lacks_readings = true;
+            notes.push(Note::NoReadings(words));
+        }
     }
 
     fn add(&mut self, at: Duration, reading: &[f64], notes: &mut Vec<Note>) -> Result<(), CalibrationError> {
-        self.readings += 1;
         let channels = reading.len() - usize::from(self.load_cell.is_some());
         self.last = reading[..channels].to_vec();
         self.recent.add(at, &reading[..channels]);
@@ -262,11 +254,18 @@ impl Calibration {
         }
         let last_press = |guide: &Guide| Some(guide.plan()[guide.taken().checked_sub(1)?]);
         let progress = self.guide.add(at, reading);
+        if self.guide.is_sample_and_hold() && !std::mem::replace(&mut self.notes_repeats, true) {
+            notes.push(Note::RepeatedReadings);
+        }
         let depth_m = last_press(&self.guide).and_then(|press| press.depth_m);
         match progress {
             Progress::None => self.explain(at, notes),
             Progress::Waits(waiting) => notes.push(Note::Waits(waiting)),
             Progress::AskedAgain(doubt) => notes.push(Note::AskedAgain(doubt)),
+            Progress::TakenBack(doubt) => {
+                self.journal.take_back()?;
+                notes.push(Note::AskedAgain(doubt));
+            }
             Progress::Pressed { untouched, press } => {
                 if let Some(untouched) = untouched {
                     self.journal.add(self.without_cell(untouched.row), None)?;

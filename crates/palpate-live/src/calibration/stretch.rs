@@ -1,9 +1,10 @@
 //! The readings of the last seconds.
 
+use palpate_estimators::recording::{RepeatCause, RepeatCounts, is_same_reading};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Span over which readings are judged to be at rest, and the fewest readings in it.
+/// Span over which readings are judged to be at rest, and the fewest readings: those of a slow board span more.
 pub const REST_SPAN: Duration = Duration::from_millis(400);
 const REST_READINGS: usize = 8;
 /// Span from which the noise is learnt, and the fewest readings in it.
@@ -49,18 +50,18 @@ impl Stretch {
         self.readings.back().map(|(_, reading)| reading.as_slice())
     }
 
-    /// The reading in the middle of the last [`REST_SPAN`], with its instant.
+    /// The reading in the middle of [`Self::latest`], with its instant; before that is covered, in the middle of the last [`REST_SPAN`].
     pub fn middle(&self) -> Option<(Duration, &[f64])> {
-        let middle = self.last_at()?.saturating_sub(REST_SPAN / 2);
+        let last = self.last_at()?;
+        let begin = self.rest_begin().unwrap_or(last.saturating_sub(REST_SPAN));
+        let middle = last - (last - begin) / 2;
         let index = self.readings.partition_point(|(at, _)| *at < middle);
         self.readings.get(index).map(|(at, reading)| (*at, reading.as_slice()))
     }
 
-    /// The readings of the last [`REST_SPAN`], where they span it and are enough to judge by.
+    /// The readings of the last [`REST_SPAN`], or the last 8 of a slow board; `None` while there are fewer.
     pub fn latest(&self) -> Option<Vec<&[f64]>> {
-        let begin = self.last_at()?.checked_sub(REST_SPAN)?;
-        // One reading before the span shows that it is covered.
-        let is_covered = self.readings.front()?.0 <= begin;
+        let begin = self.rest_begin()?;
         let mut readings: Vec<&[f64]> = self
             .readings
             .iter()
@@ -69,7 +70,44 @@ impl Stretch {
             .map(|(_, reading)| reading.as_slice())
             .collect();
         readings.reverse();
-        (is_covered && readings.len() >= REST_READINGS).then_some(readings)
+        Some(readings)
+    }
+
+    /// Begin of the span over which readings are judged to be at rest, where it is covered.
+    fn rest_begin(&self) -> Option<Duration> {
+        let few = self.readings.len().checked_sub(REST_READINGS)?;
+        let begin = self.last_at()?.checked_sub(REST_SPAN)?.min(self.readings[few].0);
+        // One reading at the begin or before it shows that the span is covered.
+        (self.readings.front()?.0 <= begin).then_some(begin)
+    }
+
+    /// True where the source repeats readings because it is faster than its sensors; the readings must be at rest.
+    pub fn is_sample_and_hold(&self) -> bool {
+        let Some(reading) = self.last() else { return false };
+        let mut counts = RepeatCounts::new(reading.len());
+        let readings = self.readings.iter().map(|(_, reading)| reading);
+        readings.clone().zip(readings.skip(1)).for_each(|(before, reading)| counts.add(before, reading));
+        counts.cause() == Some(RepeatCause::SampleAndHold)
+    }
+
+    /// True for a reading that repeats the last one.
+    pub fn is_repeat(&self, reading: &[f64]) -> bool {
+        self.last().is_some_and(|last| is_same_reading(last, reading))
+    }
+
+    /// The stretch without readings that repeat the one before them; `None` where there are no such readings.
+    pub fn without_repeats(&self) -> Option<Self> {
+        let pairs = self.readings.iter().zip(self.readings.iter().skip(1));
+        if !pairs.into_iter().any(|((_, before), (_, reading))| is_same_reading(before, reading)) {
+            return None;
+        }
+        let mut distinct = Self::default();
+        for (at, reading) in &self.readings {
+            if !distinct.is_repeat(reading) {
+                distinct.readings.push_back((*at, reading.clone()));
+            }
+        }
+        Some(distinct)
     }
 
     /// The readings of at least a second, with seconds before the last one, where they are enough to learn the noise from.

@@ -6,7 +6,7 @@ use crate::stamp::Stamp;
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::recording::{Recording, comment_with_placement};
 use palpate_estimators::simulate::SimulatedBench;
-use palpate_mechanics::contact::Contact;
+use palpate_mechanics::contact::{Contact, Position};
 use palpate_rig::Rig;
 use std::path::Path;
 use std::time::Duration;
@@ -53,6 +53,40 @@ fn begun(rig: &Rig, path: &Path, plan: Vec<Press>) -> Calibration {
 
 fn read(rig: &Rig, path: &Path) -> Recording {
     rig.setup.read_recording("presses.csv", std::fs::read(path).unwrap().as_slice()).unwrap()
+}
+
+#[test]
+fn repeated_readings_count_once_for_the_noise() {
+    let channels = [1.0, 2.5, 0.4];
+    let mut state = 7_u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let measured: Vec<[f64; 3]> =
+        (0..100).map(|_| channels.map(|sd| sd * 12_f64.sqrt() * (uniform() - 0.5))).collect();
+    // Means of as many distinct readings at 20 readings a second, and each of them up to 10 times in the same time.
+    let sizes = [1, 2, 5, 10].map(|times| {
+        let mut guide =
+            Guide::new(vec![Press { position: Position::along(0.1), force_n: None, depth_m: None }]);
+        let frames = measured.iter().flat_map(|reading| std::iter::repeat_n(reading, times));
+        let mut learnt = None;
+        for (i, reading) in frames.enumerate() {
+            guide.add(Duration::from_millis((50 / times * i) as u64), reading);
+            learnt = learnt.or_else(|| guide.untouched_reading().map(<[f64]>::to_vec));
+            if guide.waiting() != Waiting::Untouched {
+                break;
+            }
+        }
+        assert_eq!(guide.is_sample_and_hold(), times > 1, "{times} times");
+        (learnt.unwrap(), guide.noise_sd().unwrap())
+    });
+    for (baseline, noise_sd) in &sizes[1..] {
+        assert_eq!((baseline, noise_sd), (&sizes[0].0, &sizes[0].1));
+    }
+    for (noise_sd, sd) in sizes[0].1.iter().zip(channels) {
+        assert!((0.6..1.5).contains(&(noise_sd / sd)), "{noise_sd} of {sd}");
+    }
 }
 
 #[test]

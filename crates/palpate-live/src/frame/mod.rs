@@ -7,6 +7,7 @@ mod json;
 mod names;
 mod printed;
 mod quote;
+mod reader;
 mod text;
 
 pub use binary::encode_into;
@@ -14,6 +15,7 @@ pub use channel::Channel;
 pub use decoder::{ColumnsError, Decoder, LONGEST_MESSAGE};
 pub(crate) use names::is_reserved;
 pub use quote::quote;
+pub use reader::FrameReader;
 
 use std::time::Duration;
 
@@ -98,16 +100,6 @@ impl BadFrame {
                 "check the wiring, and the frame against docs/live-sources.md".to_owned()
             }
         }
-    }
-
-    /// Words about a source of whose frames none is a reading: their number, the labels of the channels, this cause, and what to do.
-    pub fn explain_no_reading<'a>(self, frames: u64, labels: impl IntoIterator<Item = &'a str>) -> String {
-        let labels: Vec<&str> = labels.into_iter().collect();
-        format!(
-            "none of {frames} frames is a reading of the channels `{}`: {}; name them in the rig as the board does, or in columns= of the source",
-            labels.join("`, `"),
-            self.describe()
-        )
     }
 }
 

@@ -15,18 +15,27 @@ pub struct Refusal {
     status: StatusCode,
     error: String,
     help: &'static str,
+    field: Option<&'static str>,
 }
 
 impl Refusal {
     /// A refusal with its status.
     pub fn new(status: StatusCode, error: impl Into<String>, help: &'static str) -> Self {
-        Self { status, error: error.into(), help }
+        Self { status, error: error.into(), help, field: None }
+    }
+
+    /// Adds the name of the field of a form that is to be corrected.
+    pub fn with_field(self, field: Option<&'static str>) -> Self {
+        Self { field, ..self }
     }
 }
 
 impl IntoResponse for Refusal {
     fn into_response(self) -> Response {
-        let body = serde_json::json!({ "error": self.error, "help": self.help });
+        let mut body = serde_json::json!({ "error": self.error, "help": self.help });
+        if let Some(field) = self.field {
+            body["field"] = field.into();
+        }
         (self.status, JsonAnswer(body)).into_response()
     }
 }

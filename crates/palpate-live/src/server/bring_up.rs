@@ -160,11 +160,9 @@ impl BringUp {
         (monitor.channel_names(), monitor.is_named())
     }
 
-    /// Ends it, so that the source is free.
-    pub fn end(&self) {
-        if let Some(watched) = locked(&self.state).watched.take() {
-            watched.end();
-        }
+    /// Ends it, so that the source is free; returns the fault of a source that brought no reading.
+    pub fn end(&self) -> Option<String> {
+        locked(&self.state).watched.take()?.end()
     }
 }
 
@@ -180,12 +178,13 @@ impl Watched {
         Ok(Self { monitor, inputs, thread, source })
     }
 
-    fn end(self) {
-        let Self { inputs, thread, source, .. } = self;
+    fn end(self) -> Option<String> {
+        let Self { inputs, thread, source, monitor } = self;
         drop(source);
         // Refused only by a thread that has ended.
         let _ = inputs.send(Input::Stop);
         let _ = thread.join();
+        locked(&monitor).fault()
     }
 }
 

@@ -514,6 +514,7 @@ impl Calibrator {
         let by_machine = machine.is_some();
         let shared = Shared {
             calibration,
+            clock: self.clock,
             source: None,
             last_percent: None,
             problem: None,
@@ -741,10 +742,14 @@ impl Calibrator {
         Ok((outcome, assessment.errors_m))
     }
 
-    /// Ends it, where it runs; its presses are on disk. A machine is stopped at once.
-    pub fn end(&self) {
+    /// Ends it, where it runs; its presses are on disk. A machine is stopped at once. Returns the fault of a source that brought no reading.
+    pub fn end(&self) -> Option<String> {
         locked(&self.stop).store(true, Ordering::Relaxed);
-        self.lock().end_running();
+        let mut state = self.lock();
+        let running = state.running.as_ref().map(|running| Arc::clone(&running.shared))?;
+        state.end_running();
+        let calibration = &locked(&running).calibration;
+        calibration.fault().filter(|_| calibration.readings() == 0)
     }
 
     /// Its state.

@@ -1,5 +1,6 @@
 //! A locator in live use: the session that runs, and the beginning of another.
 
+use super::alarm_file::AlarmFile;
 use super::bring_up::{BringUp, BringUpError, BringUpRecord};
 use super::calibration::{CalibrationPlan, CalibrationRecord, Calibrator, CalibratorError};
 use super::lock::locked;
@@ -43,8 +44,8 @@ pub struct Live {
     commands: Rules,
     /// Rules that raise alarms, which browsers set.
     alarms: Alarms,
-    /// Their text, as it was set.
-    alarm_text: Mutex<String>,
+    /// Text of these rules, as it was set, and the file that keeps it.
+    alarm_text: Mutex<(String, Option<AlarmFile>)>,
     /// Sinks of each session beside browsers and recordings.
     sinks: Vec<OpenSink>,
     clock: HostClock,
@@ -64,7 +65,8 @@ struct Subject {
 struct Running {
     url: String,
     inputs: SyncSender<Input>,
-    thread: JoinHandle<()>,
+    /// Returns the fault of a source that brought no reading.
+    thread: JoinHandle<Option<String>>,
     switch: RecordingSwitch,
     /// Its thread ends with it.
     _source: Source,
@@ -124,6 +126,14 @@ pub enum LiveError {
     /// Alarms cannot be set.
     #[error("{0}")]
     Rule(String),
+    /// Alarms cannot be kept.
+    #[error("cannot keep the alarms in {path}: {error}")]
+    AlarmFile {
+        /// The file.
+        path: String,
+        /// Why.
+        error: std::io::Error,
+    },
     /// Sessions are not recorded.
     #[error("there is no folder for recordings")]
     NoFolder,
@@ -204,20 +214,28 @@ impl Live {
     /// Adds rules that raise alarms.
     #[must_use]
     pub fn with_alarms(self, rules: Rules) -> Self {
-        *locked(&self.alarm_text) = rules.to_toml();
+        locked(&self.alarm_text).0 = rules.to_toml();
         self.alarms.set(rules);
         self
     }
 
-    /// Text of the rules that raise alarms.
-    pub(super) fn alarm_text(&self) -> String {
+    /// Keeps alarms in a file, whose text and rules these are.
+    #[must_use]
+    pub fn with_alarm_file(self, file: AlarmFile, text: String, rules: Rules) -> Self {
+        *locked(&self.alarm_text) = (text, Some(file));
+        self.alarms.set(rules);
+        self
+    }
+
+    /// Text of the rules that raise alarms, and the file that keeps it.
+    pub(super) fn alarm_text(&self) -> (String, Option<AlarmFile>) {
         locked(&self.alarm_text).clone()
     }
 
-    /// Replaces the rules that raise alarms by those of a file's text; none for a text without rules.
+    /// Replaces the rules that raise alarms by those of a file's text; none for a text without rules. They are on disk afterwards, where a file keeps them.
     ///
     /// # Errors
-    /// [`LiveError::NoLocator`], or [`LiveError::Rule`] for a text that is no rule file, a rule that does something else, and a rule that would never act.
+    /// [`LiveError::NoLocator`], [`LiveError::AlarmFile`], or [`LiveError::Rule`] for a text that is no rule file, a rule that does something else, and a rule that would never act.
     pub(super) fn set_alarms(&self, text: &str) -> Result<(), LiveError> {
         let subject = self.subject();
         let locator = subject.locator.as_ref().ok_or(LiveError::NoLocator)?;
@@ -228,8 +246,12 @@ impl Live {
         };
         rules.check_alarms(locator).map_err(LiveError::Rule)?;
         let mut kept = locked(&self.alarm_text);
+        if let Some(file) = &kept.1 {
+            let path = || file.path().display().to_string();
+            file.write(text).map_err(|error| LiveError::AlarmFile { path: path(), error })?;
+        }
         self.alarms.set(rules);
-        text.clone_into(&mut kept);
+        text.clone_into(&mut kept.0);
         Ok(())
     }
 
@@ -302,9 +324,10 @@ impl Live {
         self.hub.forget_past();
         let run = move || {
             // What is refused was refused above.
-            let Ok(mut session) = Session::new(&locator, &config) else { return };
+            let mut session = Session::new(&locator, &config).ok()?;
             let _ = session.set_columns(&columns);
-            pipeline::run(&mut session, clock, &received, &mut sinks);
+            let fault = pipeline::run(&mut session, clock, &received, &mut sinks);
+            fault.filter(|_| session.frames().readings() == 0)
         };
         let thread = std::thread::Builder::new().name("session".to_owned()).spawn(run)?;
         *running = Some(Running { url, inputs, thread, switch, _source: source });
@@ -429,6 +452,7 @@ impl Live {
             channels: Channel::all_of(&made.rig.setup),
             info: SessionInfo::of_setup(&made.rig.setup),
         });
+        *locked(&self.alarm_text) = (String::new(), Some(AlarmFile::beside(&made.out)));
         let plan = CalibrationPlan {
             comment: format!("presses for {}", made.record.file),
             rig: made.rig,
@@ -436,7 +460,7 @@ impl Live {
             presses: made.presses,
             out: made.out,
             force_n: None,
-            statements: Statements::default(),
+            statements: made.statements,
             machine: None,
             before: Vec::new(),
             seed: 0,
@@ -480,7 +504,7 @@ impl Live {
     /// # Errors
     /// [`LiveError`] where the source cannot be opened, or the presses cannot be kept.
     pub(super) fn begin_calibration(&self, stated: Statements) -> Result<(), LiveError> {
-        Ok(self.calibrator()?.begin(stated, || self.end_session())?)
+        Ok(self.calibrator()?.begin(stated, || drop(self.end_session()))?)
     }
 
     /// Asks for presses at fresh places, which check the locator.
@@ -488,7 +512,7 @@ impl Live {
     /// # Errors
     /// [`LiveError`] where there is nothing to check, or the source cannot be opened.
     pub(super) fn begin_check(&self) -> Result<(), LiveError> {
-        Ok(self.calibrator()?.begin_check(|| self.end_session())?)
+        Ok(self.calibrator()?.begin_check(|| drop(self.end_session()))?)
     }
 
     /// Connects to the machine of the calibration, to set it up.
@@ -496,7 +520,7 @@ impl Live {
     /// # Errors
     /// [`LiveError`] where there is none, something goes on, or the source cannot be opened.
     pub(super) fn begin_set_up(&self, is_dry_run: bool) -> Result<(), LiveError> {
-        Ok(self.calibrator()?.begin_set_up(is_dry_run, || self.end_session())?)
+        Ok(self.calibrator()?.begin_set_up(is_dry_run, || drop(self.end_session()))?)
     }
 
     /// Fits the presses in a thread of its own; a session with the locator begins as soon as there is one.
@@ -520,21 +544,16 @@ impl Live {
         Ok(())
     }
 
-    /// Ends the session and the calibration, where they run.
-    pub fn end(&self) {
-        if let Some(calibrator) = self.calibrator.get() {
-            calibrator.end();
-        }
-        if let Some(board) = &self.bring_up {
-            board.end();
-        }
-        self.end_session();
+    /// Ends the session and the calibration, where they run; returns the fault of a source that brought no reading.
+    pub fn end(&self) -> Option<String> {
+        let of_calibration = self.calibrator.get().and_then(Calibrator::end);
+        let of_board = self.bring_up.as_ref().and_then(BringUp::end);
+        let of_session = self.end_session();
+        of_calibration.or(of_board).or(of_session)
     }
 
-    fn end_session(&self) {
-        if let Some(running) = self.lock().take() {
-            running.end();
-        }
+    fn end_session(&self) -> Option<String> {
+        self.lock().take()?.end()
     }
 
     /// URL of the source, while its session runs.
@@ -594,12 +613,13 @@ impl Subject {
 }
 
 impl Running {
-    fn end(self) {
+    fn end(self) -> Option<String> {
         let Self { inputs, thread, switch, _source: source, .. } = self;
         drop(source);
         // Refused only by a session that has ended.
         let _ = inputs.send(Input::Stop);
-        let _ = thread.join();
+        let fault = thread.join().ok().flatten();
         switch.end();
+        fault
     }
 }

@@ -3,6 +3,7 @@
 //! One thread runs all of it. A browser costs a task and its place in bounded queues: one that is too slow loses the oldest messages,
 //! which are counted, and the session never waits for it.
 
+mod alarm_file;
 mod body;
 mod bring_up;
 mod calibration;
@@ -22,6 +23,7 @@ mod shared;
 mod stream;
 mod web_sink;
 
+pub use alarm_file::AlarmFile;
 pub use bring_up::BringUpError;
 pub use calibration::{CalibrationPlan, CalibratorError};
 pub use guard::{Access, AccessError};

@@ -24,7 +24,10 @@ pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
         let arrived = match inputs.recv_timeout(LOOK) {
             Ok(Input::Arrived(arrived)) => arrived,
             Ok(Input::Stop) | Err(RecvTimeoutError::Disconnected) => return,
-            Ok(Input::Command(_)) | Err(RecvTimeoutError::Timeout) => continue,
+            Ok(Input::Command(_)) | Err(RecvTimeoutError::Timeout) => {
+                locked(shared).look();
+                continue;
+            }
         };
         locked(shared).receive(&arrived);
     }
@@ -101,7 +104,10 @@ impl MachineRun {
                 return Err(MachineError::Unwatched { seconds: UNWATCHED.as_secs() });
             }
             let mut shared = locked(shared);
-            let notes = arrived.map(|arrived| shared.receive(&arrived)).unwrap_or_default();
+            let notes = match arrived {
+                Some(arrived) => shared.receive(&arrived),
+                None => shared.look(),
+            };
             machine.heed(&notes)?;
             while let Some(task) = shared.tasks.pop_front() {
                 machine.ask(task);

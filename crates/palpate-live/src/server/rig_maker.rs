@@ -1,6 +1,6 @@
 //! A first rig for a board whose surface has no model, made from what a person fills in.
 
-use crate::calibration::{PlanError, Weights, plan};
+use crate::calibration::{PlanError, Statements, Weights, plan};
 use crate::source::{SourceUrl, SourceUrlError};
 use crate::whole_file;
 use palpate_rig::{Rig, RigError};
@@ -10,6 +10,9 @@ use std::path::{Path, PathBuf};
 
 /// Most characters of a file's name.
 const LONGEST_NAME: usize = 100;
+
+/// Most places of a calibration, and presses of a place, as in the rig's file.
+const MOST_COUNT: usize = 100_000;
 
 /// What a person fills in.
 #[derive(Clone, Debug, Deserialize)]
@@ -28,8 +31,18 @@ pub struct RigForm {
     pub places: Vec<usize>,
     /// Presses of each place.
     pub repeats: usize,
-    /// Force of every press.
-    pub force_n: f64,
+    /// Force of every press; unknown where it is not said.
+    #[serde(default)]
+    pub force_n: Option<f64>,
+    /// Second force, with which every other place is pressed too.
+    #[serde(default)]
+    pub second_force_n: Option<f64>,
+    /// How far off the asked place a person presses, as a standard deviation.
+    #[serde(default)]
+    pub placement_mm: Option<f64>,
+    /// Place of each sensor, in the order of the channels: along the length and, of two directions, across it.
+    #[serde(default)]
+    pub sensor_places_mm: Option<Vec<Vec<f64>>>,
     /// True where contacts in use press with this force too.
     pub force_is_known: bool,
     /// Replaces files that are there.
@@ -43,6 +56,14 @@ pub struct RigForm {
 /// A form that gives no rig.
 #[derive(Debug, thiserror::Error)]
 pub enum RigFormError {
+    /// A field that cannot be.
+    #[error("{problem}")]
+    Field {
+        /// Name of the field in the form.
+        field: &'static str,
+        /// Problem and bound.
+        problem: String,
+    },
     /// A name that is not a plain file name.
     #[error("`{name}` cannot name a rig: use letters, digits, `-`, `_`, and `.toml` at the end")]
     Name {
@@ -110,6 +131,21 @@ pub enum RigFormError {
     },
 }
 
+impl RigFormError {
+    /// Name of the field of the form that is to be corrected, where it is one.
+    pub fn field(&self) -> Option<&'static str> {
+        match self {
+            Self::Field { field, .. } => Some(field),
+            Self::Name { .. } | Self::Exists { .. } | Self::Presses { .. } => Some("file"),
+            Self::Channels { .. } | Self::Renamed { .. } | Self::LeftOut { .. } | Self::Columns(_) => {
+                Some("channels")
+            }
+            Self::Places { .. } | Self::Plan(_) => Some("places"),
+            Self::Rig(_) | Self::Write { .. } => None,
+        }
+    }
+}
+
 /// A rig with the files of its calibration.
 #[derive(Debug)]
 pub struct MadeRig {
@@ -125,6 +161,8 @@ pub struct MadeRig {
     pub presses: PathBuf,
     /// File of the locator.
     pub out: PathBuf,
+    /// Statements of the form.
+    pub statements: Statements,
 }
 
 /// A rig that was made, as a record of JSON.
@@ -154,6 +192,7 @@ impl MadeRig {
         folder: &Path,
     ) -> Result<Self, RigFormError> {
         let stem = checked_stem(&form.file)?;
+        check_numbers(form)?;
         let used = used_channels(form, sent, *named)?;
         let from = if *named { from.clone() } else { with_columns(from, form)? };
         let text = text_of(form, &used)?;
@@ -166,14 +205,17 @@ impl MadeRig {
         let exists = exists.into_iter().filter(|(_, path)| is_there(path)).map(|(name, _)| name.clone());
         let record = MadeRigRecord {
             exists: exists.collect(),
-            command: format!(
-                "palpate serve {file} --calibrate --from '{from}' --presses {presses_name} --out {out_name}"
-            ),
+            command: command(form, &from, [&file, &presses_name, &out_name]),
             file,
             text,
             written: false,
         };
-        Ok(Self { rig, from, record, path, presses, out })
+        let statements = Statements {
+            placement_sd_m: form.placement_mm.map(|sd_mm| sd_mm * 1e-3),
+            second_force_n: form.second_force_n,
+            force_is_known: form.force_is_known,
+        };
+        Ok(Self { rig, from, record, path, presses, out, statements })
     }
 
     /// Writes the rig's file.
@@ -197,6 +239,77 @@ impl MadeRig {
 
 fn is_there(path: &Path) -> bool {
     path.symlink_metadata().is_ok()
+}
+
+/// The command that calibrates a rig later, from a source into these files.
+fn command(form: &RigForm, from: &SourceUrl, [rig, presses, out]: [&str; 3]) -> String {
+    let second = form.second_force_n.map_or(String::new(), |n| format!(" --second-force '{n} N'"));
+    format!("palpate serve {rig} --calibrate --from '{from}' --presses {presses} --out {out}{second}")
+}
+
+/// Refuses numbers that no surface and no press has.
+fn check_numbers(form: &RigForm) -> Result<(), RigFormError> {
+    let refuse = |field, problem| Err(RigFormError::Field { field, problem });
+    let positive = [
+        ("length_mm", "the length", "mm", Some(form.length_mm)),
+        ("width_mm", "the width", "mm", form.width_mm),
+        ("force_n", "the force", "N", form.force_n),
+        ("second_force_n", "the second force", "N", form.second_force_n),
+        ("placement_mm", "the placement", "mm", form.placement_mm),
+    ];
+    for (field, name, unit, value) in positive {
+        if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
+            return refuse(field, format!("{name} is {value} {unit}; it must be greater than 0 {unit}"));
+        }
+    }
+    let sides_mm: Vec<f64> = [form.length_mm].into_iter().chain(form.width_mm).collect();
+    let longest_mm = sides_mm.iter().copied().fold(0.0, f64::max);
+    if let Some(placement_mm) = form.placement_mm.filter(|placement_mm| *placement_mm >= longest_mm) {
+        let most = format!("it must be less than {longest_mm} mm, the longest side");
+        return refuse("placement_mm", format!("the placement is {placement_mm} mm; {most}"));
+    }
+    let counts = form.places.iter().map(|count| ("places", "the number of places", *count));
+    let counts = counts.chain([("repeats", "the number of presses of each place", form.repeats)]);
+    for (field, name, count) in counts {
+        if !(1..=MOST_COUNT).contains(&count) {
+            return refuse(field, format!("{name} is {count}; it must be from 1 to {MOST_COUNT}"));
+        }
+    }
+    if form.second_force_n.is_some() && form.force_n.is_none() {
+        return refuse("second_force_n", "a second force needs a first one".to_owned());
+    }
+    if form.second_force_n.is_some() && form.force_is_known {
+        return refuse(
+            "second_force_n",
+            "leave it out where contacts in use have the first force".to_owned(),
+        );
+    }
+    if form.force_is_known && form.force_n.is_none() {
+        return refuse(
+            "force_n",
+            "contacts in use have the force of the presses, which is not said".to_owned(),
+        );
+    }
+    check_sensor_places(form, &sides_mm)
+}
+
+fn check_sensor_places(form: &RigForm, sides_mm: &[f64]) -> Result<(), RigFormError> {
+    let Some(places) = &form.sensor_places_mm else { return Ok(()) };
+    let refuse = |problem| Err(RigFormError::Field { field: "sensor_places_mm", problem });
+    if places.len() != form.channels.len() {
+        return refuse(format!("{} places of {} sensors", places.len(), form.channels.len()));
+    }
+    let used = places.iter().zip(&form.channels).filter(|(_, channel)| !channel.is_empty());
+    for (place_mm, channel) in used {
+        if place_mm.len() != sides_mm.len() {
+            return refuse(format!("`{channel}` has {} coordinates, not {}", place_mm.len(), sides_mm.len()));
+        }
+        let mut pairs = place_mm.iter().zip(sides_mm);
+        if let Some((at_mm, side_mm)) = pairs.find(|(at_mm, side_mm)| !(0.0..=**side_mm).contains(*at_mm)) {
+            return refuse(format!("`{channel}` is at {at_mm} mm; it must be from 0 mm to {side_mm} mm"));
+        }
+    }
+    Ok(())
 }
 
 /// Stem of a plain file name that ends in `.toml`.
@@ -252,11 +365,21 @@ fn with_columns(from: &SourceUrl, form: &RigForm) -> Result<SourceUrl, RigFormEr
     Err(SourceUrlError::Parameter { text, problem }.into())
 }
 
+/// A place as the rig's file has it: a length, on a plane a list of two.
+fn point(place_mm: &[f64]) -> String {
+    let lengths: Vec<String> =
+        place_mm.iter().map(|at_mm| toml::Value::from(format!("{at_mm} mm")).to_string()).collect();
+    match lengths.as_slice() {
+        [along] => along.clone(),
+        _ => format!("[{}]", lengths.join(", ")),
+    }
+}
+
 /// Text of the rig's file.
 fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> {
     let quoted = |text: &str| toml::Value::from(text).to_string();
     let mm = |value: f64| quoted(&format!("{value} mm"));
-    let force = quoted(&format!("{} N", form.force_n));
+    let force = form.force_n.map(|force_n| quoted(&format!("{force_n} N")));
     let names: Vec<String> = channels.iter().map(|name| quoted(name)).collect();
     let mut text = String::from("# Made on the dashboard's page for a board without a rig.\n\n[surface]\n");
     let mut line = |line: String| {
@@ -269,8 +392,13 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
         line(format!("width = {}", mm(width_mm)));
     }
     line("\n[sensors]\nmeasure = \"raw\"  # whatever the channels read: counts, volts".to_owned());
+    if let Some(places) = &form.sensor_places_mm {
+        let used = places.iter().zip(&form.channels).filter(|(_, channel)| !channel.is_empty());
+        let places: Vec<String> = used.map(|(place_mm, _)| point(place_mm)).collect();
+        line(format!("positions = [{}]", places.join(", ")));
+    }
     line(format!("\n[recording]\nchannels = [{}]", names.join(", ")));
-    if form.force_is_known {
+    if let Some(force) = force.as_ref().filter(|_| form.force_is_known) {
         line(format!("\n[contact]\nforce = {force}  # of every contact"));
     }
     line("\n[training]".to_owned());
@@ -282,7 +410,13 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
             return Err(RigFormError::Places { given: places.len(), directions });
         }
     }
-    line(format!("repeats = {}\nforce = {force}  # of every press", form.repeats));
+    line(format!("repeats = {}", form.repeats));
+    if let Some(force) = &force {
+        line(format!("force = {force}  # of every press"));
+    }
+    if let Some(placement_mm) = form.placement_mm {
+        line(format!("placement = {}  # how far off the asked place a person presses", mm(placement_mm)));
+    }
     line("\n[estimator]\nkind = \"influence\"".to_owned());
     Ok(text)
 }
@@ -290,6 +424,7 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_mechanics::contact::Position;
 
     fn form() -> RigForm {
         RigForm {
@@ -299,7 +434,10 @@ mod tests {
             width_mm: None,
             places: vec![10],
             repeats: 2,
-            force_n: 2.0,
+            force_n: Some(2.0),
+            second_force_n: None,
+            placement_mm: None,
+            sensor_places_mm: None,
             force_is_known: false,
             overwrite: false,
             write: true,
@@ -343,6 +481,67 @@ mod tests {
     }
 
     #[test]
+    fn rig_has_second_weight_placement_and_places_of_the_sensors() {
+        let whole = RigForm {
+            second_force_n: Some(4.0),
+            placement_mm: Some(2.0),
+            sensor_places_mm: Some(vec![vec![50.0], vec![], vec![250.0]]),
+            ..form()
+        };
+        let made = MadeRig::new(&whole, &serial(), &sent(), Path::new("")).unwrap();
+        let sensors = made.rig.setup.layout().sensors();
+        let places_m: Vec<f64> = sensors.iter().map(|sensor| sensor.position.x_m).collect();
+        assert_eq!(places_m, [0.05, 0.25]);
+        let placement_sd_m = made.rig.training.as_ref().unwrap().placement_sd_m;
+        assert_eq!((placement_sd_m, made.statements.placement_sd_m), (Some(2e-3), Some(2e-3)));
+        assert!(made.record.command.ends_with("--second-force '4 N'"), "{}", made.record.command);
+        // Every other of the 10 places is pressed with the second weight too.
+        assert_eq!(plan(&made.rig, made.statements.weights(None), &[], &[]).unwrap().len(), 20 + 10);
+        let plane = RigForm {
+            width_mm: Some(120.0),
+            places: vec![5, 3],
+            sensor_places_mm: Some(vec![vec![50.0, 20.0], vec![], vec![250.0, 100.0]]),
+            ..form()
+        };
+        let made = MadeRig::new(&plane, &serial(), &sent(), Path::new("")).unwrap();
+        assert_eq!(made.rig.setup.layout().sensors()[1].position, Position { x_m: 0.25, y_m: 0.1 });
+    }
+
+    #[test]
+    fn rig_without_a_force_asks_for_presses_of_unknown_force() {
+        let made =
+            MadeRig::new(&RigForm { force_n: None, ..form() }, &serial(), &sent(), Path::new("")).unwrap();
+        let presses = plan(&made.rig, made.statements.weights(None), &[], &[]).unwrap();
+        assert!(presses.len() == 20 && presses.iter().all(|press| press.force_n.is_none()), "{presses:?}");
+        assert!(!made.record.text.contains("force"), "{}", made.record.text);
+    }
+
+    #[test]
+    fn refusals_name_the_field() {
+        let field = |change: fn(&mut RigForm)| {
+            let mut form = form();
+            change(&mut form);
+            let refused = MadeRig::new(&form, &serial(), &sent(), Path::new("")).unwrap_err();
+            refused.field().unwrap_or_else(|| panic!("{refused}"))
+        };
+        assert_eq!(field(|form| form.file = "../a".to_owned()), "file");
+        assert_eq!(field(|form| form.channels.truncate(1)), "channels");
+        assert_eq!(field(|form| form.length_mm = f64::INFINITY), "length_mm");
+        assert_eq!(field(|form| form.width_mm = Some(-1.0)), "width_mm");
+        assert_eq!(field(|form| form.places = vec![2, 2]), "places");
+        assert_eq!(field(|form| form.places = vec![usize::MAX]), "places");
+        assert_eq!(field(|form| form.repeats = 0), "repeats");
+        assert_eq!(field(|form| form.force_n = Some(f64::NAN)), "force_n");
+        assert_eq!(field(|form| (form.force_n, form.force_is_known) = (None, true)), "force_n");
+        assert_eq!(field(|form| form.second_force_n = Some(-1.0)), "second_force_n");
+        assert_eq!(field(|form| (form.force_n, form.second_force_n) = (None, Some(1.0))), "second_force_n");
+        assert_eq!(field(|form| form.placement_mm = Some(300.0)), "placement_mm");
+        assert_eq!(field(|form| form.sensor_places_mm = Some(vec![])), "sensor_places_mm");
+        let beyond = |form: &mut RigForm| form.sensor_places_mm = Some(vec![vec![301.0], vec![], vec![0.0]]);
+        assert_eq!(field(beyond), "sensor_places_mm");
+    }
+
+    #[test]
     fn refuses_to_replace_files_without_a_word_and_presses_altogether() {
         let folder = tempfile::tempdir().unwrap();
         let made = || MadeRig::new(&form(), &serial(), &sent(), folder.path()).unwrap();
@@ -372,8 +571,8 @@ mod tests {
         }
         assert!(refused(|form| form.length_mm = -1.0).contains("length"));
         assert!(refused(|form| form.length_mm = f64::NAN).contains("length"));
-        assert!(refused(|form| form.force_n = 0.0).contains("force"));
-        assert!(refused(|form| form.places = vec![0]).contains("count"));
+        assert!(refused(|form| form.force_n = Some(0.0)).contains("force"));
+        assert!(refused(|form| form.places = vec![0]).contains("places is 0"));
         assert!(refused(|form| form.places = vec![2, 2]).contains("directions"));
         assert!(refused(|form| form.channels.truncate(1)).contains("board sends 3"));
         assert!(refused(|form| form.channels = vec![String::new(); 3]).len() > 5);

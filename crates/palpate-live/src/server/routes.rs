@@ -93,7 +93,8 @@ async fn mark(State(live): State<Arc<Live>>, JsonBody(Mark { text }): JsonBody<M
 }
 
 async fn alarms(State(live): State<Arc<Live>>) -> JsonAnswer<Value> {
-    JsonAnswer(json!({ "text": live.alarm_text() }))
+    let (text, file) = live.alarm_text();
+    JsonAnswer(json!({ "text": text, "file": file.map(|file| file.path().display().to_string()) }))
 }
 
 /// A rule file of alarms.
@@ -106,7 +107,8 @@ async fn set_alarms(
     State(live): State<Arc<Live>>,
     JsonBody(AlarmFile { text }): JsonBody<AlarmFile>,
 ) -> Result<JsonAnswer<Value>, Refusal> {
-    live.set_alarms(&text).map_err(|error| refusal(&error))?;
+    let setting = Arc::clone(&live);
+    blocking(move || setting.set_alarms(&text)).await?;
     Ok(alarms(State(live)).await)
 }
 
@@ -327,6 +329,9 @@ fn refusal(error: &LiveError) -> Refusal {
             (StatusCode::INTERNAL_SERVER_ERROR, "see that the folder takes files")
         }
         LiveError::RigForm(_) => (StatusCode::BAD_REQUEST, "correct it and try again"),
+        LiveError::AlarmFile { .. } => {
+            (StatusCode::INTERNAL_SERVER_ERROR, "see that the folder takes files; the alarms are as before")
+        }
         LiveError::Rule(_) => (StatusCode::BAD_REQUEST, "docs/live-recording.md says what a rule has"),
         LiveError::Session(_) => (StatusCode::CONFLICT, "start `palpate serve` without --track"),
         LiveError::Thread(_) => (StatusCode::INTERNAL_SERVER_ERROR, "start palpate again"),
@@ -341,7 +346,11 @@ fn refusal(error: &LiveError) -> Refusal {
         }
         LiveError::Recording(_) => (StatusCode::BAD_REQUEST, "GET /api/recordings lists recordings"),
     };
-    Refusal::new(status, error.to_string(), help)
+    let field = match error {
+        LiveError::RigForm(error) => error.field(),
+        _ => None,
+    };
+    Refusal::new(status, error.to_string(), help).with_field(field)
 }
 
 #[derive(Deserialize)]

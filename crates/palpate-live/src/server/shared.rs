@@ -2,12 +2,16 @@
 
 use super::machine::MachineState;
 use crate::calibration::{Calibration, CalibrationError, Note, SetUpNote, SetUpTask, last_deviation_percent};
+use crate::feed::REPEATED_READINGS;
 use crate::input::Arrived;
+use crate::stamp::HostClock;
 use std::collections::VecDeque;
 
 /// A calibration that runs, as its thread leaves it for others to see.
 pub struct Shared {
     pub calibration: Calibration,
+    /// Clock of the arrivals.
+    pub clock: HostClock,
     pub source: Option<String>,
     pub last_percent: Option<f64>,
     pub problem: Option<String>,
@@ -30,13 +34,22 @@ impl Shared {
         notes
     }
 
+    /// Looks at the source while nothing arrives; returns what follows from it.
+    pub fn look(&mut self) -> Vec<Note> {
+        let mut notes = Vec::new();
+        self.calibration.check_feed(self.clock.now().elapsed, &mut notes);
+        notes.iter().cloned().for_each(|note| self.take(note));
+        notes
+    }
+
     fn take(&mut self, note: Note) {
         match note {
             Note::Opened(name) => (self.source, self.problem) = (Some(name), None),
             Note::Lost(why) => {
-                (self.source, self.problem) = (None, Some(format!("the source went away: {why}")));
+                (self.source, self.problem) = (None, Some(format!("the source is lost: {why}")));
             }
-            Note::Unread(words) => self.problem = Some(words),
+            Note::NoReadings(words) => self.problem = Some(words),
+            Note::ReadingsAgain => self.problem = None,
             Note::Ended => {
                 (self.source, self.problem) = (None, Some("the source has ended".to_owned()));
             }
@@ -53,6 +66,7 @@ impl Shared {
             Note::Saturated(name) => {
                 self.problem = Some(format!("channel {name} reads the end of its range: press less, redo"));
             }
+            Note::RepeatedReadings => self.hint = Some(format!("Note: {REPEATED_READINGS}.")),
             Note::Waits(_) | Note::Untouched | Note::Overload(_) => {}
         }
     }

@@ -14,7 +14,8 @@ pub use health::ChannelHealth;
 pub(crate) use health::HealthWatch;
 
 use crate::event::{Event, EventRecord};
-use crate::frame::{BadFrame, Channel, ColumnsError, Decoder, Frame};
+use crate::feed::REPEATED_READINGS;
+use crate::frame::{BadFrame, Channel, ColumnsError, Frame, FrameReader};
 use crate::input::{Arrival, Arrived, Command};
 use crate::sample::Sample;
 use crate::stamp::Stamp;
@@ -74,17 +75,17 @@ pub struct Session<'a> {
     locator: &'a Locator,
     channels: Vec<Channel>,
     extent: Extent,
-    decoder: Decoder,
+    frames: FrameReader,
     timeline: Timeline,
     taring: Taring,
     estimation: EstimationState,
     contact: ContactWatch,
     health: HealthWatch,
     repeats: RepeatWatch,
-    counters: Counters,
-    /// Cause of the last frame that was no reading, and number of such frames since the last reading or the opening.
-    last_cause: Option<BadFrame>,
-    bad_in_a_row: u64,
+    lost_frames: u64,
+    gaps: u64,
+    /// Number of the next reading.
+    number: u64,
     /// True after a reading of status `no_contact`.
     was_untouched: bool,
 }
@@ -100,16 +101,16 @@ impl<'a> Session<'a> {
         Ok(Self {
             locator,
             extent,
-            decoder: Decoder::new(&channels),
+            frames: FrameReader::new(&channels),
             timeline: Timeline::default(),
             taring: Taring::new(locator, config.tare, &config.estimation),
             estimation: EstimationState::new(&config.estimation, locator)?,
             contact: ContactWatch::new(extent),
             health: HealthWatch::new(locator.setup.layout()),
             repeats: RepeatWatch::new(channels.len()),
-            counters: Counters::default(),
-            last_cause: None,
-            bad_in_a_row: 0,
+            lost_frames: 0,
+            gaps: 0,
+            number: 0,
             was_untouched: false,
             channels,
         })
@@ -121,7 +122,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// [`ColumnsError`] unless every channel is named once.
     pub fn set_columns(&mut self, columns: &[String]) -> Result<(), ColumnsError> {
-        self.decoder.set_columns(columns)
+        self.frames.set_columns(columns)
     }
 
     /// Channels of its frames.
@@ -130,23 +131,18 @@ impl<'a> Session<'a> {
     }
 
     /// Numbers of what arrived.
-    pub fn counters(&self) -> &Counters {
-        &self.counters
+    pub fn counters(&self) -> Counters {
+        Counters {
+            readings: self.frames.readings(),
+            bad_frames: self.frames.bad_frames().clone(),
+            lost_frames: self.lost_frames,
+            gaps: self.gaps,
+        }
     }
 
-    /// Cause and quotation of the last frame that was no reading; `None` before there was one.
-    pub fn last_bad_frame(&self) -> Option<(BadFrame, String)> {
-        self.last_cause.zip(self.decoder.last_bad())
-    }
-
-    /// Number of frames since the last reading, or the opening of the source, that were none.
-    pub fn bad_in_a_row(&self) -> u64 {
-        self.bad_in_a_row
-    }
-
-    /// Bytes since the end of the last frame.
-    pub fn unfinished(&self) -> &[u8] {
-        self.decoder.unfinished()
+    /// Reader of its frames.
+    pub fn frames(&self) -> &FrameReader {
+        &self.frames
     }
 
     /// Health of each channel.
@@ -166,38 +162,21 @@ impl<'a> Session<'a> {
             self.tell(at, Event::ClockSet { by_s }, out);
         }
         match &arrived.arrival {
-            Arrival::Opened(name) => {
-                self.decoder.open();
-                self.bad_in_a_row = 0;
+            Arrival::Opened(name) | Arrival::Joined(name) | Arrival::Piped(name) => {
                 self.estimation.interrupt();
+                if matches!(arrived.arrival, Arrival::Piped(_)) {
+                    self.timeline.follow_board();
+                }
                 self.tell(at, Event::SourceOpened { name: name.clone() }, out);
             }
-            Arrival::Joined(name) => {
-                self.decoder.join();
-                self.bad_in_a_row = 0;
-                self.estimation.interrupt();
-                self.tell(at, Event::SourceOpened { name: name.clone() }, out);
-            }
-            Arrival::Piped(name) => {
-                self.decoder.open();
-                self.bad_in_a_row = 0;
-                self.estimation.interrupt();
-                self.timeline.follow_board();
-                self.tell(at, Event::SourceOpened { name: name.clone() }, out);
-            }
-            Arrival::Backlog(bytes) => self.decoder.receive_waiting(bytes),
-            Arrival::Lost(why) => {
-                self.decoder.open();
-                self.tell(at, Event::SourceLost { why: why.clone() }, out);
-            }
-            Arrival::Ended => {
-                self.decode(at, |decoder, hand_on| decoder.end(hand_on), out);
-                self.tell(at, Event::SourceEnded, out);
-            }
-            Arrival::Bytes(bytes) => self.decode(at, |decoder, hand_on| decoder.receive(bytes, hand_on), out),
-            Arrival::Message(bytes) => {
-                self.decode(at, |decoder, hand_on| decoder.receive_message(bytes, hand_on), out);
-            }
+            Arrival::Lost(why) => self.tell(at, Event::SourceLost { why: why.clone() }, out),
+            Arrival::Backlog(_) | Arrival::Bytes(_) | Arrival::Message(_) | Arrival::Ended => {}
+        }
+        let frames = self.frames.receive(&arrived.arrival);
+        let behind = (0..frames.len()).rev();
+        frames.into_iter().zip(behind).for_each(|(frame, behind)| self.take(at, frame, behind, out));
+        if arrived.arrival == Arrival::Ended {
+            self.tell(at, Event::SourceEnded, out);
         }
     }
 
@@ -211,31 +190,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn decode(
-        &mut self,
-        at: Stamp,
-        decode: impl FnOnce(&mut Decoder, &mut dyn FnMut(Result<Frame, BadFrame>)),
-        out: &mut Vec<Output>,
-    ) {
-        let mut frames = Vec::new();
-        decode(&mut self.decoder, &mut |frame| frames.push(frame));
-        let mut behind = frames.iter().filter(|frame| frame.is_ok()).count();
-        for frame in frames {
-            match frame {
-                Ok(frame) => {
-                    behind -= 1;
-                    self.bad_in_a_row = 0;
-                    self.take(at, frame, behind, out);
-                }
-                Err(cause) => {
-                    *self.counters.bad_frames.entry(cause).or_default() += 1;
-                    self.last_cause = Some(cause);
-                    self.bad_in_a_row += 1;
-                }
-            }
-        }
-    }
-
     /// A reading's way: time, health, tare, filter or none, estimate, events. `behind` more readings have arrived with it.
     fn take(&mut self, at: Stamp, frame: Frame, behind: usize, out: &mut Vec<Output>) {
         let at = self.timeline.board_stamp(at, frame.device_time);
@@ -244,8 +198,8 @@ impl<'a> Session<'a> {
             if gap.kind == GapKind::Silence {
                 self.estimation.interrupt();
             }
-            self.counters.gaps += 1;
-            self.counters.lost_frames += u64::from(gap.lost_frames.unwrap_or(0));
+            self.gaps += 1;
+            self.lost_frames += u64::from(gap.lost_frames.unwrap_or(0));
             self.tell(at, Event::Gap { seconds: gap.seconds, lost_frames: gap.lost_frames }, out);
         }
         let time_s = unix_ns as f64 * 1e-9;
@@ -266,7 +220,7 @@ impl<'a> Session<'a> {
         });
         let Some((estimate, tares, is_untouched)) = located else {
             // Immense values whose difference is no number.
-            *self.counters.bad_frames.entry(BadFrame::NotANumber).or_default() += 1;
+            self.frames.refuse(BadFrame::NotANumber);
             return;
         };
         if tares {
@@ -278,8 +232,8 @@ impl<'a> Session<'a> {
             self.health.learn_noise();
         }
         self.was_untouched = is_untouched;
-        let number = self.counters.readings;
-        self.counters.readings += 1;
+        let number = self.number;
+        self.number += 1;
         let reading = frame.reading;
         out.push(Output::Sample(Box::new(Sample {
             number,
@@ -296,9 +250,8 @@ impl<'a> Session<'a> {
         let before = self.repeats.is_sample_and_hold();
         let is_repeat = self.repeats.add(reading, self.was_untouched);
         if self.repeats.is_sample_and_hold() && !before {
-            let text = "the board repeats readings: it sends faster than its sensors measure; repeats do not \
-                        count for noise and tare";
-            out.push(Output::Event(EventRecord { time_s, event: Event::Trouble { text: text.to_owned() } }));
+            let text = REPEATED_READINGS.to_owned();
+            out.push(Output::Event(EventRecord { time_s, event: Event::Trouble { text } }));
         }
         is_repeat
     }

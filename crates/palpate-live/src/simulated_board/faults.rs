@@ -27,6 +27,8 @@ pub struct FaultConfig {
     pub residue_s: f64,
     /// Step of the channels' converters, in their SI unit or raw; 0 for continuous values.
     pub converter_step: f64,
+    /// Frames that repeat each reading after the first, as of a logger that is faster than its sensors.
+    pub repeats: u32,
 }
 
 /// Fate of a frame.

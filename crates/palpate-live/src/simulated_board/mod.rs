@@ -74,6 +74,8 @@ pub struct SimulatedBoard<'a> {
     rate_hz: f64,
     load_cell: Option<(LoadCell, Xoshiro256PlusPlus)>,
     frames: FrameForm,
+    /// Reading and force at the load cell that frames repeat.
+    measured: (Vec<f64>, f64),
     /// Frames that were taken.
     count: u64,
     sent: Sent,
@@ -114,6 +116,7 @@ impl<'a> SimulatedBoard<'a> {
                 .load_cell
                 .clone()
                 .map(|cell| (cell, Xoshiro256PlusPlus::seed_from_u64(config.seed ^ 0x10AD))),
+            measured: (Vec::new(), 0.0),
             count: 0,
             sent: Sent::default(),
         })
@@ -155,10 +158,10 @@ impl<'a> SimulatedBoard<'a> {
         let contact = self.finger.contact_at(time_s);
         let mut clean = self.bench.clean(contact.as_slice());
         self.distortion.act(&mut clean, &self.faults.config, 1.0 / self.rate_hz);
-        let mut reading = self.bench.measure(&clean);
-        convert(&mut reading, &self.faults.config);
-        let force_n = contact.map_or(0.0, |contact| contact.force_n);
-        let mut frame = self.frame(&reading, force_n, time_s);
+        if self.count.is_multiple_of(1 + u64::from(self.faults.config.repeats)) {
+            self.measured = self.measure(&clean, contact);
+        }
+        let mut frame = self.frame(time_s);
         self.count += 1;
         match self.faults.next(frame.len()) {
             Fate::Whole => self.sent.whole += 1,
@@ -174,18 +177,27 @@ impl<'a> SimulatedBoard<'a> {
         Some(frame)
     }
 
-    /// The bytes of a reading in the units of the channels, to seven digits; the load cell is the last value, where there is one. Text has names
+    /// A reading with the noise of the sensors and the load cell.
+    fn measure(&mut self, clean: &[f64], contact: Option<Contact>) -> (Vec<f64>, f64) {
+        let mut reading = self.bench.measure(clean);
+        convert(&mut reading, &self.faults.config);
+        let noise_n = self.load_cell.as_mut().map_or(0.0, |(cell, rng)| {
+            let noise: f64 = StandardNormal.sample(rng);
+            cell.noise_n * noise
+        });
+        (reading, contact.map_or(0.0, |contact| contact.force_n) + noise_n)
+    }
+
+    /// The bytes of the reading in the units of the channels, to seven digits; the load cell is the last value, where there is one. Text has names
     /// then, so that those who want the channels only find them.
-    fn frame(&mut self, reading: &[f64], force_n: f64, time_s: f64) -> Vec<u8> {
+    fn frame(&mut self, time_s: f64) -> Vec<u8> {
+        let (reading, force_n) = &self.measured;
         let mut values: Vec<f32> = reading
             .iter()
             .zip(&self.channels)
             .map(|(value, channel)| (value / channel.unit.factor()) as f32)
             .collect();
-        if let Some((cell, rng)) = &mut self.load_cell {
-            let noise: f64 = StandardNormal.sample(rng);
-            values.push((force_n + cell.noise_n * noise) as f32);
-        }
+        values.extend(self.load_cell.as_ref().map(|_| *force_n as f32));
         if let FrameForm::Binary { clock_ppm } = self.frames {
             let mut bytes = Vec::new();
             // Both wrap around, as those of a microcontroller do.

@@ -78,13 +78,25 @@ fn a_board_without_a_rig_is_seen_and_gets_one() {
     assert_eq!(post(&server, "/api/alarms", r#"{"text":""}"#).0, 409);
     assert_eq!(get(&server, "/api/calibration").0, 404);
 
-    for (change, words) in [
-        (json!({ "file": "../strip.toml" }), "cannot name a rig"),
-        (json!({ "length_mm": 0 }), "length"),
-        (json!({ "channels": ["left"] }), "the board sends 3 values"),
+    for (change, words, field) in [
+        (json!({ "file": "../strip.toml" }), "cannot name a rig", "file"),
+        (json!({ "length_mm": 0 }), "the length is 0 mm", "length_mm"),
+        (json!({ "channels": ["left"] }), "the board sends 3 values", "channels"),
+        (
+            json!({ "placement_mm": 400 }),
+            "the placement is 400 mm; it must be less than 300 mm",
+            "placement_mm",
+        ),
+        (json!({ "sensor_places_mm": [[1], [], [400]] }), "`right` is at 400 mm", "sensor_places_mm"),
+        (
+            json!({ "force_n": null, "second_force_n": 1 }),
+            "a second force needs a first one",
+            "second_force_n",
+        ),
     ] {
         let (status, refusal) = post(&server, "/api/rig", &form(&change));
         assert!(status == 400 && refusal["error"].as_str().unwrap().contains(words), "{refusal}");
+        assert_eq!(refusal["field"], json!(field), "{refusal}");
     }
     let (status, made) = post(&server, "/api/rig", &form(&json!({ "write": false })));
     assert_eq!((status, &made["written"], &made["exists"]), (200, &json!(false), &json!([])));
@@ -94,8 +106,12 @@ fn a_board_without_a_rig_is_seen_and_gets_one() {
     let (status, refusal) = post(&server, "/api/rig", &form(&json!({})));
     assert!(status == 409 && refusal["error"].as_str().unwrap().contains("is there already"), "{refusal}");
     assert_eq!(std::fs::read_to_string(folder.path().join("strip.toml")).unwrap(), "mine");
-    let (status, made) = post(&server, "/api/rig", &form(&json!({ "overwrite": true })));
+    let whole = json!({
+        "overwrite": true, "second_force_n": 4, "placement_mm": 2, "sensor_places_mm": [[50], [], [250]],
+    });
+    let (status, made) = post(&server, "/api/rig", &form(&whole));
     assert_eq!((status, &made["written"]), (200, &json!(true)), "{made}");
+    assert!(made["text"].as_str().unwrap().contains("positions = [\"50 mm\", \"250 mm\"]"), "{made}");
     assert_eq!(
         std::fs::read_to_string(folder.path().join("strip.toml")).unwrap(),
         made["text"].as_str().unwrap()
@@ -108,7 +124,9 @@ fn a_board_without_a_rig_is_seen_and_gets_one() {
     assert_eq!(post(&server, "/api/rig", &form(&json!({ "overwrite": true }))).0, 409);
     // The calibration reads the two channels, though the board sends three values.
     let (status, begun) = post(&server, "/api/calibration", r#"{"step":"begin"}"#);
-    assert_eq!((status, &begun["left"]), (200, &json!(12)), "{begun}");
+    // Two presses of 6 places with the first weight, and of 3 with the second.
+    assert_eq!((status, &begun["left"]), (200, &json!(12 + 6)), "{begun}");
+    assert_eq!((&begun["placement_mm"], &begun["single_weight_n"]), (&json!(2.0), &Value::Null));
     let end = Instant::now() + Duration::from_secs(20);
     loop {
         let (_, state) = get(&server, "/api/calibration");

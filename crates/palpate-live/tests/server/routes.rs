@@ -335,8 +335,8 @@ fn alarms_are_checked_set_and_raised() {
         assert!(status == 400 && refusal["error"].as_str().unwrap().contains(words), "{refusal}");
     }
     let file = "# mine\n[[rule]]\nname = \"marked\"\nevent = \"mark\"\nalarm = \"look\"\n";
-    assert_eq!(set(file), (200, json!({ "text": file })));
-    assert_eq!(get(&server, "/api/alarms").1, json!({ "text": file }));
+    assert_eq!(set(file), (200, json!({ "text": file, "file": null })));
+    assert_eq!(get(&server, "/api/alarms").1, json!({ "text": file, "file": null }));
     assert_eq!(post(&server, "/api/source", r#"{"url":"simulated"}"#).0, 200);
     let mut socket = follow(&server, "", None).unwrap();
     assert_eq!(post(&server, "/api/mark", r#"{"text":"here"}"#).0, 200);
@@ -347,5 +347,5 @@ fn alarms_are_checked_set_and_raised() {
         }
     };
     assert_eq!((&alarm["name"], &alarm["text"]), (&json!("marked"), &json!("look")));
-    assert_eq!(set(""), (200, json!({ "text": "" })));
+    assert_eq!(set(""), (200, json!({ "text": "", "file": null })));
 }

@@ -1,5 +1,7 @@
 //! Commands, files and measurements that several modules of tests share.
 
+#[cfg(unix)]
+pub mod attempt;
 pub mod board;
 pub mod browser;
 pub mod command;

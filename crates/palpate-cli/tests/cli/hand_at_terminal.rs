@@ -1,0 +1,144 @@
+//! Hands of several kinds follow what `palpate calibrate` says, and press a board at a pseudo-terminal.
+#![cfg(unix)]
+
+use crate::support::attempt::Attempt;
+use crate::support::command::folder;
+use palpate_estimators::estimator::Locator;
+use palpate_estimators::simulate::SimulatedBench;
+use palpate_live::simulated_board::{
+    BoardConfig, FaultConfig, Finger, Hand, HandStyle, Instruction, Link, SimulatedBoard,
+};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_rig::Rig;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// A clamped strip of 300 mm with six strain gauges, whose noise is a 3,000th of the largest press or less.
+const STRIP: &str = r#"
+[surface]
+kind = "beam"
+length = "300 mm"
+width = "30 mm"
+thickness = "1.5 mm"
+youngs_modulus = "70 GPa"
+supports = [{ at = "0 mm", kind = "clamped" }, { at = "300 mm", kind = "clamped" }]
+
+[sensors]
+measure = "strain"
+count = 6
+noise = "0.03 um/m"
+
+[contact]
+force = "2 N"
+
+[training]
+arrangement = "even"
+count = 3
+repeats = 2
+
+[estimator]
+kind = "influence"
+"#;
+const FORCE_N: f64 = 2.0;
+const PRESSES: usize = 6;
+/// Longest time of a calibration, under load too.
+const PATIENCE: Duration = Duration::from_secs(180);
+
+/// Presses that were recorded, and those among them whose reading is nearer the untouched one than that of the press.
+#[derive(Debug, PartialEq)]
+struct Outcome {
+    presses: usize,
+    without_touch: usize,
+    asked_again: usize,
+}
+
+/// The instruction of a line, after which the hand does something else.
+fn instruction(line: &str) -> Option<Instruction> {
+    if let Some((place, _)) = line.strip_prefix("press at ").and_then(|rest| rest.split_once(" mm")) {
+        let position = Position::along(1e-3 * place.parse::<f64>().ok()?);
+        return Some(Instruction::Press(Contact { position, force_n: FORCE_N }));
+    }
+    match line {
+        "hold" => Some(Instruction::Hold),
+        "let go" | "leave the surface alone" => Some(Instruction::Lift),
+        _ => None,
+    }
+}
+
+fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
+    let rig = Rig::from_toml(STRIP).unwrap();
+    let bench = folder(STRIP);
+    let mut link = Link::open(&"pty".parse().unwrap()).unwrap();
+    let config = BoardConfig { seed, ..BoardConfig::default() };
+    let board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, seed)).unwrap();
+    let mut board = board.with_faults(faults, seed);
+    let mut hand = Hand::new(style, rig.setup.surface().extent(), seed);
+    let from = format!("serial://{}", link.name());
+    let arguments =
+        ["calibrate", "rig.toml", "--from", &from, "--presses", "presses.csv", "--out", "strip.json"];
+    let mut attempt = Attempt::begin(bench.path(), &arguments);
+    let start = Instant::now();
+    let mut now = Instruction::Lift;
+    let code = loop {
+        while let Some(line) = attempt.line() {
+            now = instruction(&line).unwrap_or(now);
+        }
+        if let Some(code) = attempt.ended() {
+            break code;
+        }
+        assert!(start.elapsed() < PATIENCE, "{style:?}: {}", attempt.said());
+        while board.next_at() <= start.elapsed() {
+            let contact = hand.contact_at(board.next_at().as_secs_f64(), now);
+            board.finger_mut().hold(contact);
+            link.send(&board.next_frame().unwrap_or_default()).unwrap();
+        }
+        thread::sleep(Duration::from_millis(2));
+    };
+    let said = attempt.said();
+    assert_eq!(code, Some(0), "{style:?}: {said}");
+    Locator::from_json(&std::fs::read_to_string(bench.path().join("strip.json")).unwrap()).unwrap();
+    let presses = std::fs::read(bench.path().join("presses.csv")).unwrap();
+    let recording = rig.setup.read_recording("presses.csv", presses.as_slice()).unwrap();
+    let simulated = SimulatedBench::new(&rig.setup, 0).unwrap();
+    let distance = |reading: &[f64], contacts: &[Contact]| {
+        let clean = simulated.clean(contacts);
+        reading.iter().zip(clean).map(|(value, clean)| (value - clean).powi(2)).sum::<f64>()
+    };
+    let is_untouched = |reading: &[f64], position| {
+        distance(reading, &[]) < distance(reading, &[Contact { position, force_n: FORCE_N }])
+    };
+    let rows = &recording.touched().rows;
+    Outcome {
+        presses: rows.len(),
+        without_touch: rows.iter().filter(|row| is_untouched(&row.reading, row.position)).count(),
+        asked_again: said.matches("not taken:").count(),
+    }
+}
+
+#[test]
+fn hands_of_all_kinds_calibrate_a_board_at_a_serial_port() {
+    // Of the sensors' noise.
+    let noise = 0.03e-6;
+    let exact = HandStyle { placement_m: 5e-4, ..HandStyle::default() };
+    let hysteresis = |hysteresis| FaultConfig { hysteresis, ..FaultConfig::default() };
+    let drift = FaultConfig { drift_per_s: 2.0 * noise, creep: 0.03, creep_s: 5.0, ..hysteresis(0.01) };
+    let hands = [
+        ("quick", exact, FaultConfig::default()),
+        ("slow", HandStyle { press_s: 1.0, lift_s: 1.0, ..exact }, hysteresis(0.01)),
+        ("early lift", HandStyle { early_lift: 0.3, lift_s: 0.5, ..exact }, drift.clone()),
+        ("hovering", HandStyle { hover_share: 0.08, hover_s: 0.8, lift_s: 0.3, ..exact }, hysteresis(0.03)),
+        ("tapping", HandStyle { taps: 2, ..exact }, drift),
+    ];
+    let outcomes: Vec<(&str, Outcome)> = thread::scope(|scope| {
+        let run = |(seed, (name, style, faults)): (usize, (&'static str, HandStyle, FaultConfig))| {
+            (name, scope.spawn(move || calibrate(style, faults, seed as u64)))
+        };
+        let running: Vec<_> = hands.into_iter().enumerate().map(run).collect();
+        running.into_iter().map(|(name, outcome)| (name, outcome.join().unwrap())).collect()
+    });
+    for (name, outcome) in outcomes {
+        println!("{name}: {outcome:?}");
+        assert_eq!((outcome.presses, outcome.without_touch), (PRESSES, 0), "{name}: {outcome:?}");
+        assert!(outcome.asked_again <= 2, "{name}: {outcome:?}");
+    }
+}
