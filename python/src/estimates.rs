@@ -359,9 +359,8 @@ impl Estimates {
     fn force_95(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f64>>> {
         let (own, force) = (self.trade_off_95.bind(py).readonly(), self.force.bind(py).readonly());
         let covariance = self.covariance.bind(py).readonly();
-        let variances = covariance.as_array();
-        let forces = force.as_array();
-        let rows = own.as_array().outer_iter().zip(forces.iter()).zip(variances.outer_iter());
+        let (own, forces, variances) = (own.as_array(), force.as_array(), covariance.as_array());
+        let rows = own.outer_iter().zip(forces.iter()).zip(variances.outer_iter());
         let ends: Vec<[f64; 2]> = rows
             .map(|((own, force_n), variances)| {
                 // The variance of the force is the last entry, on a line as on a plane.

@@ -37,6 +37,9 @@ pub trait Likelihood: Send + Sync {
     /// Estimate from one reading alone, without those before it: the best contacts, and the other modes.
     fn single_estimate(&self, reading: &[f64]) -> Estimate;
 
+    /// True for a reading within the residue that touches leave on an untouched surface.
+    fn is_residue(&self, reading: &[f64]) -> bool;
+
     /// Extent of the surface.
     fn extent(&self) -> Extent;
 

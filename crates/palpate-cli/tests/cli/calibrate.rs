@@ -226,7 +226,8 @@ fn ends_with_its_words(firmware: &str, (config, _, finger, taken): &FaultCase, w
 }
 
 /// Signals in the middle of a press, to a process whose threads wait at serial ports: the machine is stopped each time, and the exit code is the signal's.
-/// `PALPATE_STOPS` is the number of stops that are measured.
+/// `PALPATE_STOPS` is the number of stops that are measured. The time is printed, as it depends on what else the computer does; that of the machine's own clock
+/// is bounded by `stop_takes_effect` of palpate-live.
 #[cfg(unix)]
 #[test]
 fn signals_stop_the_machine_before_the_process_ends() {
@@ -248,8 +249,6 @@ fn signals_stop_the_machine_before_the_process_ends() {
     println!(
         "{stops} stops by signals, from the signal to the machine: median {median:?}, 99 % within {most:?}, the longest {longest:?}"
     );
-    // 50 ms on a machine that does nothing else.
-    assert!(longest < Duration::from_millis(500), "{took:?}");
 }
 
 /// The time from a signal to the stop at the machine.

@@ -133,7 +133,7 @@ fn the_force_has_an_interval_and_a_word_where_it_trades_off_against_the_place() 
     let folder = folder(unknown_force);
     said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
     said(&run(folder.path(), &["simulate", "rig.toml", "--every", "4 mm", "-o", "presses.csv"]));
-    let csv = said(&run(folder.path(), &["locate", "locator.json", "presses.csv"]));
+    let csv = said(&run(folder.path(), &["locate", "locator.json", "presses.csv", "--all"]));
     let json = said(&run(folder.path(), &["locate", "locator.json", "presses.csv", "--json"]));
     let mut trading = 0;
     for (row, record) in csv.lines().skip(1).zip(json.lines()) {

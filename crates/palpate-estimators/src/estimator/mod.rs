@@ -739,12 +739,15 @@ impl Locator {
         if config.swing.is_some() && !matches!(self.setup.surface(), SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);
         }
+        let scatter = self.untouched_scatter.clone();
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
-                Ok(Tracking { likelihood: Arc::new(BeamLikelihood::new(beam)) })
+                let likelihood = BeamLikelihood::new(beam).with_untouched_scatter(scatter);
+                Ok(Tracking { likelihood: Arc::new(likelihood) })
             }
             Method::Influence(InfluenceLocator::Plane(plane)) => {
-                Ok(Tracking { likelihood: Arc::new(PlateLikelihood::new(plane)) })
+                let likelihood = PlateLikelihood::new(plane).with_untouched_scatter(scatter);
+                Ok(Tracking { likelihood: Arc::new(likelihood) })
             }
             method => Err(NotTrackable::Kind {
                 kind: self.kind(),

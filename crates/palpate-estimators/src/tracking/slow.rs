@@ -578,6 +578,10 @@ mod tests {
             Linearisation { reading: zeros.clone(), derivatives: Vec::new(), variance: zeros }
         }
 
+        fn is_residue(&self, _: &[f64]) -> bool {
+            false
+        }
+
         fn single_estimate(&self, _: &[f64]) -> palpate_core::Estimate {
             unreachable!("no tracker asks")
         }

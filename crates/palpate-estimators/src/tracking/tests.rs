@@ -1,16 +1,19 @@
 //! The paper's beam, in balance under a contact that moves, lets go and comes down again.
 
 use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::sync::Arc;
 
 mod on_plane;
 
 use super::*;
-use crate::fit::FitTask;
+use crate::estimator::Locator;
+use crate::fit::{Fit, FitTask};
 use crate::fixtures::{Example, along_the_beam, moving_beam, swinging_beam, two_moving_loads};
 use crate::influence::{BeamLikelihood, Influence};
 use crate::likelihood::{ContactFit, Likelihood, LineLikelihood};
+use crate::recording::Row;
 use crate::simulate::{CleanSensors, clean_reading};
 use crate::track_errors::TrackErrors;
 use palpate_mechanics::contact::{Contact, Position};
@@ -365,4 +368,61 @@ fn the_force_of_a_held_contact_is_within_what_calibration_leaves() {
         }
         assert!(place >= 17 && force >= 17, "{x_m} m: place {place} of 20, force {force} of 20");
     }
+}
+
+/// Residue of a touch, in metres.
+fn residue(rig: &Example, sd_m: f64, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+    let normal = |_| -> f64 { StandardNormal.sample(rng) };
+    (0..rig.setup.layout().len()).map(normal).map(|z| sd_m * z).collect()
+}
+
+#[test]
+fn contacts_end_within_the_residue_of_untouched_rows() {
+    const RESIDUE_SD_M: f64 = 40e-6;
+    const RESTS: usize = 20;
+    const EACH: usize = 30;
+    let rig = rig();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+    // An untouched row after each press, whose residue is many times the noise.
+    let mut recording = rig.simulate(1);
+    let presses = std::mem::take(&mut recording.rows);
+    for (i, press) in presses.into_iter().enumerate() {
+        let untouched =
+            Row { force_n: Some(0.0), reading: residue(&rig, RESIDUE_SD_M, &mut rng), ..press.clone() };
+        recording.rows.push(press);
+        if i < 40 {
+            recording.rows.push(untouched);
+        }
+    }
+    let setup = rig.setup.clone().with_force(None).unwrap();
+    let locator = Influence::default().fit(&setup, &recording).unwrap().into_locator();
+    assert!(locator.untouched_scatter.is_some());
+    let layout = rig.setup.layout();
+    let touching = |locator: &Locator| {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
+        let config = TrackerConfig::default();
+        let mut tracker = Tracker::new(locator.tracking(&config).unwrap().likelihood(), config);
+        let sensors = CleanSensors::new(rig.setup.surface().model().unwrap(), layout);
+        let errors = ChannelErrors::none(layout);
+        let (mut count, mut touched, mut at_rest) = (0, 0, 0);
+        for _ in 0..RESTS {
+            let contact = Contact { position: Position::along(0.15), force_n: 3.0 };
+            let pressed = sensors.reading(contact);
+            let rest = residue(&rig, RESIDUE_SD_M, &mut rng);
+            for (clean, counter) in [(&pressed, &mut touched), (&rest, &mut at_rest)] {
+                for _ in 0..EACH {
+                    let reading = measure(layout, clean, &errors, &mut rng);
+                    let track = tracker.follow(f64::from(count) / RATE_HZ, &reading).unwrap();
+                    count += 1;
+                    *counter += usize::from(!track.contacts.is_empty());
+                }
+            }
+        }
+        [touched, at_rest]
+    };
+    let all = RESTS * EACH;
+    let [touched, at_rest] = touching(&locator);
+    assert!(touched > all * 95 / 100 && at_rest < all / 100, "{touched} {at_rest} of {all}");
+    let [_, by_noise] = touching(&Locator { untouched_scatter: None, ..locator });
+    assert!(by_noise > all / 2, "{by_noise} of {all}");
 }

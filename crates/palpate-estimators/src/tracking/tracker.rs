@@ -6,7 +6,7 @@ use super::birth::BirthModel;
 use super::slow::SlowState;
 use super::{Track, TrackError, Tracked, TrackerConfig};
 use crate::likelihood::{Geometry, Likelihood};
-use palpate_core::Estimate;
+use palpate_core::{Estimate, Status};
 use palpate_numerics::watch::{Cancelled, Watch};
 use std::sync::Arc;
 
@@ -101,15 +101,18 @@ impl Tracker {
         let likelihood = Arc::clone(&self.likelihood);
         let mut whitened = std::mem::take(&mut self.whitened);
         likelihood.whiten(reading, &mut whitened);
-        let single = match self.slow(reading.len()) {
-            None => likelihood.single_estimate(reading),
-            Some(slow) => {
-                let mut reading = reading.to_vec();
-                slow.take_off(time_s, duration_s, &mut whitened, &mut reading);
-                likelihood.single_estimate(&reading)
-            }
-        };
+        let mut reading = reading.to_vec();
+        if let Some(slow) = self.slow(reading.len()) {
+            slow.take_off(time_s, duration_s, &mut whitened, &mut reading);
+        }
+        let is_residue = likelihood.is_residue(&reading);
+        let mut single = likelihood.single_estimate(&reading);
         let log_births = self.predict(duration_s);
+        if is_residue {
+            // The likelihood knows noise alone: it would explain the residue by a light contact, which never ends.
+            single = Estimate::of_contact(single.contact, Status::NoContact);
+            self.end_contacts();
+        }
         let observation = Observation {
             likelihood: &*likelihood,
             whitened: &whitened,
@@ -191,6 +194,14 @@ impl Tracker {
             one: (with[0] * changes + with[1] * jumps + with[2] * changes * jumps).ln(),
             two: (with[0] * changes * changes + with[1] * changes * jumps + with[2] * jumps).ln(),
             beside: changes.ln(),
+        }
+    }
+
+    /// Keeps the hypothesis alone that nothing touches.
+    fn end_contacts(&mut self) {
+        self.hypotheses.retain(|hypothesis| hypothesis.belief.contacts() == 0);
+        if self.hypotheses.is_empty() {
+            self.add(0.0, Belief::nothing());
         }
     }
 

@@ -300,7 +300,7 @@ impl Calibrator {
             clock,
             state: Mutex::new(state),
             stop: Mutex::default(),
-            attendance: Arc::new(Attendance::new(clock)),
+            attendance: Arc::new(Attendance::new()),
         }
     }
 

@@ -23,9 +23,9 @@ pub struct Attendance {
 }
 
 impl Attendance {
-    /// Attendance by a clock, without a sign so far.
-    pub fn new(clock: HostClock) -> Self {
-        Self { clock, seen_ms: AtomicU64::new(0), is_needed: AtomicBool::new(false) }
+    /// Attendance without a sign so far. It runs in real time, as persons do, however fast a simulated machine is.
+    pub fn new() -> Self {
+        Self { clock: HostClock::new(), seen_ms: AtomicU64::new(0), is_needed: AtomicBool::new(false) }
     }
 
     /// Notes a sign of somebody.

@@ -14,6 +14,7 @@ use crate::fit::Locate;
 use crate::likelihood::{
     CalibrationVariance, ContactFit, Geometry, Likelihood, LineLikelihood, Linearisation,
 };
+use crate::untouched_scatter::UntouchedScatter;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -26,6 +27,7 @@ pub struct BeamLikelihood {
     locator: BeamLocator,
     /// g of the channels in use.
     first_mode: Vec<f64>,
+    untouched_scatter: Option<UntouchedScatter>,
 }
 
 impl BeamLikelihood {
@@ -33,7 +35,13 @@ impl BeamLikelihood {
     pub fn new(locator: &BeamLocator) -> Self {
         let table = &locator.search().table;
         let first_mode = (0..table.sensors).map(|s| share_of_first_mode(table, s)).collect();
-        Self { locator: locator.clone(), first_mode }
+        Self { locator: locator.clone(), first_mode, untouched_scatter: None }
+    }
+
+    /// The same, by which readings within a scatter are residue of a touch.
+    #[must_use]
+    pub fn with_untouched_scatter(self, untouched_scatter: Option<UntouchedScatter>) -> Self {
+        Self { untouched_scatter, ..self }
     }
 
     /// f, f′ and v of the channels in use.
@@ -162,6 +170,10 @@ impl Likelihood for BeamLikelihood {
 
     fn single_estimate(&self, reading: &[f64]) -> Estimate {
         self.locator.locate(reading)
+    }
+
+    fn is_residue(&self, reading: &[f64]) -> bool {
+        self.untouched_scatter.as_ref().is_some_and(|scatter| scatter.contains(reading))
     }
 
     fn extent(&self) -> Extent {

@@ -9,6 +9,7 @@ use crate::influence::config::ForceBelief;
 use crate::likelihood::{
     CalibrationVariance, ContactFit, Geometry, Likelihood, Linearisation, PlaneLikelihood,
 };
+use crate::untouched_scatter::UntouchedScatter;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -20,13 +21,20 @@ pub struct PlateLikelihood {
     locator: PlaneLocator,
     /// The locator's, without what is believed of an unknown force: that is told once, and not with every reading.
     search: Search,
+    untouched_scatter: Option<UntouchedScatter>,
 }
 
 impl PlateLikelihood {
     /// The likelihood of the channels that a locator does not leave out.
     pub fn new(locator: &PlaneLocator) -> Self {
         let force = locator.force().known_n().map_or(ForceBelief::Unknown, ForceBelief::Known);
-        Self { locator: locator.clone(), search: locator.search_with(force) }
+        Self { locator: locator.clone(), search: locator.search_with(force), untouched_scatter: None }
+    }
+
+    /// The same, by which readings within a scatter are residue of a touch.
+    #[must_use]
+    pub fn with_untouched_scatter(self, untouched_scatter: Option<UntouchedScatter>) -> Self {
+        Self { untouched_scatter, ..self }
     }
 }
 
@@ -94,6 +102,10 @@ impl Likelihood for PlateLikelihood {
 
     fn single_estimate(&self, reading: &[f64]) -> Estimate {
         self.locator.locate(reading)
+    }
+
+    fn is_residue(&self, reading: &[f64]) -> bool {
+        self.untouched_scatter.as_ref().is_some_and(|scatter| scatter.contains(reading))
     }
 
     fn extent(&self) -> Extent {
