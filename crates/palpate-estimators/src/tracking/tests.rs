@@ -424,5 +424,5 @@ fn contacts_end_within_the_residue_of_untouched_rows() {
     let [touched, at_rest] = touching(&locator);
     assert!(touched > all * 95 / 100 && at_rest < all / 100, "{touched} {at_rest} of {all}");
     let [_, by_noise] = touching(&Locator { untouched_scatter: None, ..locator });
-    assert!(by_noise > all / 2, "{by_noise} of {all}");
+    assert!(by_noise > all / 4, "{by_noise} of {all}");
 }
