@@ -178,7 +178,7 @@ def test_real_recordings_are_fitted_as_by_the_command(tmp_path, command, example
 def test_the_csv_of_the_command_is_ours(tmp_path, command, presses, locator):
     locator.save(tmp_path / "locator.json")
     presses.to_csv(tmp_path / "presses.csv")
-    rows = list(csv.DictReader(io.StringIO(command("locate", tmp_path / "locator.json", tmp_path / "presses.csv"))))
+    rows = list(csv.DictReader(io.StringIO(command("locate", tmp_path / "locator.json", tmp_path / "presses.csv", "--all"))))
     frame = locator.locate(presses.readings).to_frame()
     assert np.allclose([float(row["position_mm"]) for row in rows], frame["x [mm]"], atol=5.1e-5)
 
