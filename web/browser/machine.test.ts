@@ -83,7 +83,7 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
   });
 
   test("is stopped by Escape and gone on with by keys on a phone in the dark, and ends when the page is closed", async () => {
-    const bench = await MachineBench.start("fsi-like.toml", [["repeats = 3", "repeats = 1"]]);
+    const bench = await MachineBench.start("fsi-like.toml", [["repeats = 3", "repeats = 2"]]);
     const server = await started(bench);
     const phone = { viewport: { width: 390, height: 844 }, colorScheme: "dark", reducedMotion: "reduce" } as const;
     const first = await open(browser, server.url, phone);
@@ -103,18 +103,18 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await taken(first.page, 5);
     await first.page.context().close();
     // Without a page the finger is lifted after 5 s of the bench's clock, and nothing more is pressed.
-    await new Promise((resolve) => setTimeout(resolve, 2_500));
+    await new Promise((resolve) => setTimeout(resolve, 6_000));
     const pressed = presses(bench);
     await new Promise((resolve) => setTimeout(resolve, 1_000));
     expect(presses(bench)).toBe(pressed);
-    expect(pressed).toBeLessThan(18);
+    expect(pressed).toBeLessThan(36);
     const { page, faults } = await open(browser, server.url, phone);
     await says(page, "calibration-problem", /nobody has watched the machine for 5 s: its finger was lifted/);
     await page.keyboard.press("b");
     await says(page, "calibration-step", /^All presses are taken$/, 90_000);
-    expect(presses(bench)).toBe(18);
+    expect(presses(bench)).toBe(36);
     await page.keyboard.press("f");
-    await says(page, "calibration-step", /^Fitted to 18 presses/);
+    await says(page, "calibration-step", /^Fitted to 36 presses/);
     expect(faults).toEqual([]);
   });
 
