@@ -12,6 +12,7 @@
 mod chunks;
 mod commands;
 mod cost;
+mod estimate_columns;
 mod failure;
 mod input;
 mod json;

@@ -114,7 +114,23 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// [`TareError::NotFinite`] for a value that is no number.
     pub fn new(learnt: B) -> Result<Self, TareError> {
         check(learnt.as_ref(), learnt.as_ref().len())?;
-        Ok(Self {
+        Ok(Self::of_learnt(learnt))
+    }
+
+    /// The same, whose followed baseline forgets over so many readings; at least [`Tare::SETTLED`].
+    #[must_use]
+    pub fn with_time_constant(self, readings: u32) -> Self {
+        Self { time_constant: readings.max(Self::SETTLED), ..self }
+    }
+
+    /// A tare that leaves the residue of a touch in the tared readings, for a caller that takes creep off by itself.
+    #[must_use]
+    pub fn without_rests(self) -> Self {
+        Self { takes_rests: false, ..self }
+    }
+
+    fn of_learnt(learnt: B) -> Self {
+        Self {
             current: Baseline::new(learnt.clone(), 0),
             rest: RestWatch::new(&learnt),
             takes_rests: true,
@@ -125,19 +141,14 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             strange: 0,
             let_go: 0,
             as_learnt: 0,
-        })
+        }
     }
 
-    /// The same, whose followed baseline forgets over so many readings; at least [`Tare::SETTLED`].
+    /// A tare of the same calibration and settings that begins anew.
     #[must_use]
-    pub fn with_time_constant(self, readings: u32) -> Self {
-        Self { time_constant: readings.max(Self::SETTLED), ..self }
-    }
-
-    /// The same, which leaves the residue of a touch in the tared readings: for a caller that takes creep off by itself.
-    #[must_use]
-    pub fn without_rests(self) -> Self {
-        Self { takes_rests: false, ..self }
+    pub fn restarted(&self) -> Self {
+        let Self { time_constant, takes_rests, .. } = *self;
+        Self { time_constant, takes_rests, ..Self::of_learnt(self.learnt.clone()) }
     }
 
     /// Untouched reading of each channel today, as far as is known.
@@ -251,8 +262,10 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             self.current.weight = Self::SETTLED;
             self.is_confirmed = true;
         }
-        let averages = course == Course::Steady;
-        self.current.add(reading, status, averages, self.time_constant);
+        if status == Status::NoContact && course == Course::Steady {
+            self.current.follow(reading, self.time_constant);
+        }
+        self.current.count(status);
         if !self.is_confirmed && self.current.saw_a_whole_touch() {
             self.is_confirmed = true;
             self.other = None;
@@ -295,7 +308,10 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     fn weigh_other(&mut self, reading: &[f64], status: Status) {
         if let Some(other) = &mut self.other {
             self.strange = next_in_row(self.strange, status == Status::OutsideModel);
-            other.add(reading, status, true, self.time_constant);
+            if status == Status::NoContact {
+                other.follow(reading, self.time_constant);
+            }
+            other.count(status);
             if other.saw_a_whole_touch() {
                 core::mem::swap(&mut self.current, other);
                 other.forget_touch();
@@ -373,11 +389,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         }
     }
 
-    /// Adds a reading that has a status by this baseline, which it moves if it is untouched and `averages`.
-    fn add(&mut self, reading: &[f64], status: Status, averages: bool, time_constant: u32) {
-        if status == Status::NoContact && averages {
-            self.follow(reading, time_constant);
-        }
+    /// Counts a reading that has a status by this baseline.
+    fn count(&mut self, status: Status) {
         self.untouched = next_in_row(self.untouched, status == Status::NoContact);
         if self.touched < LET_GO {
             self.touched = next_in_row(self.touched, is_contact(status));

@@ -402,10 +402,9 @@ impl<M: Locate> Fitted<M> {
         if binomial_tail(located.len(), contacts, rate.share()) > SIGNIFICANCE {
             return self;
         }
-        let scatter = rests.scatter(centre, rate);
+        let scatter = rests.scatter(centre, self.setup.layout(), rate);
         let presses = || recording.rows.iter().filter(|row| row.touches());
         let hidden = presses().filter(|row| scatter.contains(&row.reading)).count();
-
         if hidden as f64 <= MOST_HIDDEN * presses().count() as f64 {
             self.untouched_scatter = Some(scatter);
         }

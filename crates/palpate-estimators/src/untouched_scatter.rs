@@ -15,6 +15,7 @@
 use crate::locator_fault::LocatorFault;
 use crate::recording::Recording;
 use crate::status::FalseAlarmRate;
+use palpate_mechanics::sensing::Layout;
 use palpate_numerics::{chi_squared_critical_value, mean};
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +25,7 @@ use serde::{Deserialize, Serialize};
 pub struct UntouchedScatter {
     /// Untouched reading of each channel that the scatter is about.
     pub centre: Vec<f64>,
-    /// Standard deviation of each channel about it, from one rest to the next; 0 of a channel that never changes untouched.
+    /// Standard deviation of each channel about it, from one rest to the next; 0 of a channel that never changes untouched, and of a disabled one.
     pub sd: Vec<f64>,
     /// Critical value of Σ d²/sd² of an untouched surface at the false-alarm rate.
     pub bound: f64,
@@ -79,14 +80,15 @@ impl Rests {
             .map(move |(row, _)| row.iter().zip(centre).map(|(d, centre)| centre + d).collect())
     }
 
-    /// Their scatter about `centre`.
-    pub fn scatter(&self, centre: Vec<f64>, rate: FalseAlarmRate) -> UntouchedScatter {
-        let channels = centre.len();
+    /// Their scatter about `centre`, of the channels that are not disabled.
+    pub fn scatter(&self, centre: Vec<f64>, layout: &Layout, rate: FalseAlarmRate) -> UntouchedScatter {
+        let is_live = |c: usize| !layout.sensors()[c].channel.dead;
         let product = |a: usize, b: usize| {
             self.deviations.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.freedom
         };
-        let variances: Vec<f64> = (0..channels).map(|c| product(c, c)).collect();
-        let changing: Vec<usize> = (0..channels).filter(|c| variances[*c] > 0.0).collect();
+        let variances: Vec<f64> =
+            (0..layout.len()).map(|c| if is_live(c) { product(c, c) } else { 0.0 }).collect();
+        let changing: Vec<usize> = (0..layout.len()).filter(|c| variances[*c] > 0.0).collect();
         let correlation = |a: usize, b: usize| product(a, b) / (variances[a] * variances[b]).sqrt();
         let correlations: Vec<Vec<f64>> =
             changing.iter().map(|a| changing.iter().map(|b| correlation(*a, *b)).collect()).collect();
@@ -128,7 +130,14 @@ fn line(times_s: &[f64], values: &[f64]) -> [f64; 2] {
 }
 
 impl UntouchedScatter {
-    /// True for a reading that an untouched surface has at the false-alarm rate. Channels that never change untouched say nothing.
+    /// Disables a channel. The bound stays that of all channels, by which fewer readings are contacts.
+    pub fn disable(&mut self, channel: usize) {
+        if let Some(sd) = self.sd.get_mut(channel) {
+            *sd = 0.0;
+        }
+    }
+
+    /// True for a reading that an untouched surface has at the false-alarm rate. Channels of standard deviation 0 say nothing.
     pub fn contains(&self, reading: &[f64]) -> bool {
         let channels = reading.iter().zip(&self.centre).zip(&self.sd).filter(|(_, sd)| **sd > 0.0);
         channels.map(|((value, centre), sd)| ((value - centre) / sd).powi(2)).sum::<f64>() <= self.bound

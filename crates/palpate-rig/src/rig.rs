@@ -85,24 +85,6 @@ impl Rig {
         }
     }
 
-    /// True where presses as the rig plans them do not tell how readings grow with the force, and the force of contacts is not known: all have one
-    /// weight, on a surface without a model. A second weight tells it.
-    ///
-    /// ```
-    /// use palpate_rig::Rig;
-    ///
-    /// let text = "[surface]\nkind = \"measured\"\nlength = \"300 mm\"\n\n[sensors]\nmeasure = \"raw\"\ncount = 2\n\n\
-    ///             [training]\ncount = 9\nforce = \"2 N\"\n\n[estimator]\nkind = \"influence\"\n";
-    /// assert!(Rig::from_toml(text)?.leaves_force_unidentified());
-    /// let known = format!("{text}\n[contact]\nforce = \"2 N\"\n");
-    /// assert!(!Rig::from_toml(&known)?.leaves_force_unidentified());
-    /// # Ok::<(), palpate_rig::RigError>(())
-    /// ```
-    pub fn leaves_force_unidentified(&self) -> bool {
-        let has_one_weight = self.training.as_ref().is_some_and(|training| training.force_n.is_some());
-        has_one_weight && self.setup.force_n().is_none() && self.setup.surface().model().is_none()
-    }
-
     /// Presses the simulated surface at the training positions, with the force of the training presses; see [`Setup::simulate`].
     ///
     /// # Errors

@@ -1,7 +1,8 @@
-//! Tools of the tests of any crate: real recordings, and a word when they are not there; work that is stopped.
+//! Tools of the tests of any crate: real recordings, and a word when they are not there; work that is stopped; a strip that hands press.
 #![forbid(unsafe_code)]
 
 pub mod data;
 pub mod json_numbers;
 pub mod skip;
 pub mod stopping;
+pub mod strip;

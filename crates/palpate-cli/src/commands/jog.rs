@@ -84,7 +84,9 @@ impl Jog {
             match inputs.recv_timeout(LOOK_EVERY) {
                 // No press is asked for, so that no row is written.
                 Ok(Input::Arrived(arrived)) => drop(self.calibration.receive(&arrived, &mut notes)),
-                Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {}
+                Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {
+                    self.calibration.check_feed(self.clock.elapsed(), &mut notes);
+                }
                 Err(RecvTimeoutError::Disconnected) => std::thread::sleep(LOOK_EVERY),
             }
             say(&notes, &self.calibration, None);

@@ -1,14 +1,14 @@
 //! `palpate locate`: readings in, estimates out, line by line.
 
+use crate::estimate_columns::{EstimateColumns, Guesses};
 use crate::failure::{Complaint, Failure};
 use crate::json::object;
 use crate::lines::{Lines, Readings, Records};
 use crate::tare::{Taken, TareOption, Taring};
 use crate::{input, output};
 use palpate_estimators::digit::{DigitShape, ShapePoint};
-use palpate_estimators::estimate_record::{ContactRecord, EstimateRecord};
-use palpate_estimators::estimator::{Estimate, Locator, Status};
-use palpate_estimators::recording::csv_row;
+use palpate_estimators::estimate_record::EstimateRecord;
+use palpate_estimators::estimator::{Estimate, Locator};
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 use std::error::Error;
@@ -56,10 +56,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let records = if arguments.json { Records::Json } else { Records::None };
     let mut readings = Readings::new(Lines::open(path, records)?, &locator.setup, arguments.no_header);
     let extent = locator.setup.surface().extent();
-    let columns = Columns { extent, contacts: locator.most_contacts(), has_all: arguments.all };
+    let columns = EstimateColumns::new(&locator, Guesses::by_option(arguments.all));
     let mut out = std::io::stdout().lock();
     if !arguments.json {
-        output::print(&mut out, columns.heading().as_bytes())?;
+        output::print(&mut out, columns.heading("line").as_bytes())?;
     }
     while let Some(mut reading) = readings.next()? {
         let estimate = match locate(&locator, taring.as_mut(), &mut reading) {
@@ -72,13 +72,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let line = readings.lines.count;
         let text = match &estimate {
             None if arguments.json => untouched_json(line)?,
-            None => columns.untouched_csv(line),
+            None => columns.empty_row(vec![line.to_string()], TARE),
             Some(estimate) if arguments.json => {
                 let shape =
                     arguments.shape.and_then(|points| locator.shape(estimate, usize::from(points) - 1));
                 json(estimate, line, extent, shape.as_ref())?
             }
-            Some(estimate) => columns.csv(estimate, line),
+            Some(estimate) => columns.row(vec![line.to_string()], &EstimateRecord::new(estimate, extent)),
         };
         output::print(&mut out, text.as_bytes())?;
         // A reader at the other end of a pipe wants each estimate now.
@@ -113,77 +113,6 @@ const TARE: &str = "tare";
 
 fn untouched_json(line: u64) -> Result<String, Failure> {
     json_line(&object! { "line": line, "status": TARE })
-}
-
-/// Columns of the CSV. Cells of what a locator does not estimate are empty.
-#[derive(Clone, Copy)]
-struct Columns {
-    extent: Extent,
-    /// Largest number of contacts of an estimate.
-    contacts: usize,
-    /// Whether readings without a located contact have their best guess.
-    has_all: bool,
-}
-
-impl Columns {
-    fn heading(self) -> String {
-        let first = match self.extent {
-            Extent::Line { .. } => "position_mm,force_n,low_mm,high_mm,force_low_n,force_high_n",
-            Extent::Plane { .. } => {
-                "x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,force_low_n,force_high_n"
-            }
-        };
-        let further: String = (2..=self.contacts)
-            .map(|n| {
-                format!(
-                    ",position_{n}_mm,force_{n}_n,low_{n}_mm,high_{n}_mm,force_low_{n}_n,force_high_{n}_n"
-                )
-            })
-            .collect();
-        format!("line,{first},trade_off,status{further}\n")
-    }
-
-    /// Line of an estimate. One of `no_contact` or `outside_model` has its line and status alone, so that its best guess enters no average unasked.
-    fn csv(self, estimate: &Estimate, line: u64) -> String {
-        let has_contact = matches!(estimate.status, Status::Located | Status::Ambiguous);
-        let contacts = std::iter::once(&estimate.contact).chain(estimate.further.as_slice());
-        let shown = contacts.filter(|_| has_contact || self.has_all);
-        let records: Vec<ContactRecord> =
-            shown.map(|contact| ContactRecord::new(contact, self.extent)).collect();
-        self.row(line, &records, estimate.status.name())
-    }
-
-    /// Line of a reading that is taken for an untouched one.
-    fn untouched_csv(self, line: u64) -> String {
-        self.row(line, &[], TARE)
-    }
-
-    fn row(self, line: u64, contacts: &[ContactRecord], status: &str) -> String {
-        let mut cells = vec![line.to_string()];
-        cells.extend(self.cells(contacts.first()));
-        cells.push(contacts.first().and_then(|first| first.trade_off).unwrap_or_default().to_owned());
-        cells.push(status.to_owned());
-        for number in 1..self.contacts {
-            cells.extend(self.cells(contacts.get(number)));
-        }
-        csv_row(cells)
-    }
-
-    /// Cells of a contact: position, force, the ends of the 95 % intervals of position and force.
-    fn cells(self, contact: Option<&ContactRecord>) -> Vec<String> {
-        let is_plane = matches!(self.extent, Extent::Plane { .. });
-        let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.4}"));
-        let ends = |ends: Option<[f64; 2]>| [0, 1].map(|end| number(ends.map(|ends| ends[end])));
-        let mut cells = vec![number(contact.map(|contact| contact.x_mm))];
-        cells.extend(is_plane.then(|| number(contact.and_then(|contact| contact.y_mm))));
-        cells.push(number(contact.and_then(|contact| contact.force_n)));
-        cells.extend(ends(contact.and_then(|contact| contact.x_95_mm)));
-        if is_plane {
-            cells.extend(ends(contact.and_then(|contact| contact.y_95_mm)));
-        }
-        cells.extend(ends(contact.and_then(ContactRecord::force_interval_95_n)));
-        cells
-    }
 }
 
 /// A line of JSON: all that the locator says of the reading in line `line` of its source, and the shape where it is asked for.

@@ -1,5 +1,6 @@
 //! `palpate replay`: the readings of a recording, located again.
 
+use crate::estimate_columns::{EstimateColumns, Guesses};
 use crate::failure::{Complaint, Failure};
 use crate::progress::interrupted;
 use crate::remark::remark;
@@ -7,13 +8,11 @@ use crate::session::SessionOptions;
 use crate::{input, output};
 use palpate_estimators::estimate_record::EstimateRecord;
 use palpate_estimators::estimator::Locator;
-use palpate_estimators::recording::csv_row;
 use palpate_live::frame::Channel;
 use palpate_live::input::{Arrival, Arrived};
 use palpate_live::recording::{Head, Playback, Recorded};
 use palpate_live::session::{Estimation, Output, Session};
 use palpate_live::stamp::Stamp;
-use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_count;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -33,7 +32,10 @@ pub struct Arguments {
     locator: Option<PathBuf>,
     #[command(flatten)]
     session: SessionOptions,
-    /// Print one JSON object a line instead of CSV
+    /// Print the best guess of readings that are `no_contact` or `outside_model`, too; their cells are empty otherwise
+    #[arg(long, conflicts_with = "json")]
+    all: bool,
+    /// Print one JSON object a line instead of CSV; it has the best guess of every reading
     #[arg(long)]
     json: bool,
 }
@@ -52,7 +54,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !playback.is_whole() {
         remark!("{} was cut off, or is being written; it is read up to there", arguments.recording.display());
     }
-    let mut out = std::io::stdout().lock();
     let (path, locator) = match &arguments.locator {
         None => {
             let path = &arguments.recording;
@@ -67,11 +68,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             (path, locator)
         }
     };
+    let columns = EstimateColumns::new(&locator, Guesses::by_option(arguments.all));
+    let printer =
+        Printer { out: &mut std::io::stdout().lock(), columns: (!arguments.json).then_some(columns) };
     if arguments.locator.is_none() && arguments.session.config().estimation == Estimation::Single {
-        return by_the_same(arguments, &locator, playback, &mut out);
+        return by_the_same(arguments, &locator, playback, printer);
     }
     let session = arguments.session.session(&locator, path)?;
-    by_another(arguments, session, playback, &mut out)
+    by_another(arguments, session, playback, printer)
 }
 
 /// Locates what was located, and says whether every estimate is the same.
@@ -79,12 +83,12 @@ fn by_the_same(
     arguments: &Arguments,
     locator: &Locator,
     mut playback: Playback,
-    out: &mut impl std::io::Write,
+    mut printer: Printer<impl std::io::Write>,
 ) -> Result<(), Failure> {
     let extent = locator.setup.surface().extent();
     let follower = playback.head().estimation.follower(locator);
     let mut follower = follower.map_err(|error| Complaint::about(&arguments.recording, error))?;
-    begin(arguments, extent, out)?;
+    printer.begin()?;
     let (mut count, mut others) = (0_u64, 0_u64);
     let units = Channel::all_of(&locator.setup);
     let mut reading = Vec::new();
@@ -105,12 +109,12 @@ fn by_the_same(
             Line { number, time_s: unix_ns as f64 * 1e-9, estimate: EstimateRecord::new(&estimate, extent) };
         count += 1;
         others += u64::from(!is_the_same(&line.estimate, &before));
-        print(arguments, &line, extent, out)?;
+        printer.print(&line)?;
         if interrupted() {
             return Err(Failure::Interrupted("stopped".to_owned()));
         }
     }
-    output::flush(out)?;
+    output::flush(printer.out)?;
     check_losses(arguments, &playback, count, "estimate")?;
     let all = format_count(count);
     match others {
@@ -129,10 +133,10 @@ fn by_another(
     arguments: &Arguments,
     mut session: Session,
     mut playback: Playback,
-    out: &mut impl std::io::Write,
+    mut printer: Printer<impl std::io::Write>,
 ) -> Result<(), Failure> {
     let extent = session.extent();
-    begin(arguments, extent, out)?;
+    printer.begin()?;
     let mut first_ns = None;
     let mut count = 0;
     let mut outputs = Vec::new();
@@ -150,13 +154,13 @@ fn by_another(
                 time_s: sample.unix_ns as f64 * 1e-9,
                 estimate: EstimateRecord::new(&sample.estimate, extent),
             };
-            print(arguments, &line, extent, out)?;
+            printer.print(&line)?;
         }
         if interrupted() {
             return Err(Failure::Interrupted("stopped".to_owned()));
         }
     }
-    output::flush(out)?;
+    output::flush(printer.out)?;
     check_losses(arguments, &playback, count, "reading")
 }
 
@@ -196,46 +200,26 @@ fn is_the_same(estimate: &EstimateRecord, before: &Map<String, Value>) -> bool {
     serde_json::to_value(estimate).is_ok_and(|now| now.as_object() == Some(before))
 }
 
-fn begin(arguments: &Arguments, extent: Extent, out: &mut impl std::io::Write) -> Result<(), Failure> {
-    let heading = match (arguments.json, extent) {
-        (true, _) => "",
-        (_, Extent::Line { .. }) => {
-            "number,time_s,x_mm,force_n,x_low_mm,x_high_mm,force_low_n,force_high_n,status\n"
-        }
-        (_, Extent::Plane { .. }) => {
-            "number,time_s,x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,force_low_n,force_high_n,status\n"
-        }
-    };
-    output::print(out, heading.as_bytes())
+/// Where and how estimates are printed.
+struct Printer<'a, W> {
+    out: &'a mut W,
+    /// Columns of the CSV; `None` for JSON.
+    columns: Option<EstimateColumns>,
 }
 
-fn print(
-    arguments: &Arguments,
-    line: &Line,
-    extent: Extent,
-    out: &mut impl std::io::Write,
-) -> Result<(), Failure> {
-    let text = if arguments.json {
-        serde_json::to_string(line).map_err(Complaint::new)? + "\n"
-    } else {
-        csv(line, extent)
-    };
-    output::print(out, text.as_bytes())
-}
-
-fn csv(line: &Line, extent: Extent) -> String {
-    let contact = &line.estimate.contact;
-    let mm = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.4}"));
-    let low_high = |ends: Option<[f64; 2]>| [mm(ends.map(|ends| ends[0])), mm(ends.map(|ends| ends[1]))];
-    let is_plane = matches!(extent, Extent::Plane { .. });
-    let mut cells = vec![line.number.to_string(), format!("{:.6}", line.time_s), mm(Some(contact.x_mm))];
-    cells.extend(is_plane.then(|| mm(contact.y_mm)));
-    cells.push(mm(contact.force_n));
-    cells.extend(low_high(contact.x_95_mm));
-    if is_plane {
-        cells.extend(low_high(contact.y_95_mm));
+impl<W: std::io::Write> Printer<'_, W> {
+    fn begin(&mut self) -> Result<(), Failure> {
+        let heading = self.columns.map_or(String::new(), |columns| columns.heading("number,time_s"));
+        output::print(self.out, heading.as_bytes())
     }
-    cells.extend(low_high(contact.force_interval_95_n()));
-    cells.push(line.estimate.status.to_owned());
-    csv_row(cells)
+
+    fn print(&mut self, line: &Line) -> Result<(), Failure> {
+        let text = match self.columns {
+            None => serde_json::to_string(line).map_err(Complaint::new)? + "\n",
+            Some(columns) => {
+                columns.row(vec![line.number.to_string(), format!("{:.6}", line.time_s)], &line.estimate)
+            }
+        };
+        output::print(self.out, text.as_bytes())
+    }
 }

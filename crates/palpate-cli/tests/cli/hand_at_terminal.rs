@@ -10,36 +10,12 @@ use palpate_live::simulated_board::{
 };
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_rig::Rig;
+use palpate_testing::strip::{STRIP_FORCE_N as FORCE_N, clamped_strip};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A clamped strip of 300 mm with six strain gauges, whose noise is a 3,000th of the largest press or less.
-const STRIP: &str = r#"
-[surface]
-kind = "beam"
-length = "300 mm"
-width = "30 mm"
-thickness = "1.5 mm"
-youngs_modulus = "70 GPa"
-supports = [{ at = "0 mm", kind = "clamped" }, { at = "300 mm", kind = "clamped" }]
-
-[sensors]
-measure = "strain"
-count = 6
-noise = "0.03 um/m"
-
-[contact]
-force = "2 N"
-
-[training]
-arrangement = "even"
-count = 3
-repeats = 2
-
-[estimator]
-kind = "influence"
-"#;
-const FORCE_N: f64 = 2.0;
+/// Noise of the gauges, a 3,000th of the largest press or less.
+const NOISE: f64 = 0.03e-6;
 const PRESSES: usize = 6;
 /// Longest time of a calibration, under load too.
 const PATIENCE: Duration = Duration::from_secs(180);
@@ -66,8 +42,9 @@ fn instruction(line: &str) -> Option<Instruction> {
 }
 
 fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
-    let rig = Rig::from_toml(STRIP).unwrap();
-    let bench = folder(STRIP);
+    let strip = clamped_strip(1e6 * NOISE).replace("count = 10", "count = 3");
+    let rig = Rig::from_toml(&strip).unwrap();
+    let bench = folder(strip);
     let mut link = Link::open(&"pty".parse().unwrap()).unwrap();
     let config = BoardConfig { seed, ..BoardConfig::default() };
     let board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, seed)).unwrap();
@@ -117,11 +94,9 @@ fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
 
 #[test]
 fn hands_of_all_kinds_calibrate_a_board_at_a_serial_port() {
-    // Of the sensors' noise.
-    let noise = 0.03e-6;
     let exact = HandStyle { placement_m: 5e-4, ..HandStyle::default() };
     let hysteresis = |hysteresis| FaultConfig { hysteresis, ..FaultConfig::default() };
-    let drift = FaultConfig { drift_per_s: 2.0 * noise, creep: 0.03, creep_s: 5.0, ..hysteresis(0.01) };
+    let drift = FaultConfig { drift_per_s: 2.0 * NOISE, creep: 0.03, creep_s: 5.0, ..hysteresis(0.01) };
     let hands = [
         ("quick", exact, FaultConfig::default()),
         ("slow", HandStyle { press_s: 1.0, lift_s: 1.0, ..exact }, hysteresis(0.01)),

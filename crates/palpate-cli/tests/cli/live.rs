@@ -43,6 +43,9 @@ fn a_recording_is_located_again_to_the_last_bit() {
     }
     let rows = said(&run(folder.path(), &["replay", "press.mcap"]));
     assert_eq!(rows.lines().count(), samples.len() + 1);
+    let heading =
+        "number,time_s,position_mm,force_n,low_mm,high_mm,force_low_n,force_high_n,trade_off,status";
+    assert_eq!(rows.lines().next(), Some(heading));
 
     // The file is a source, as fast as the session takes it; and nothing is written over.
     let again = ["record", "locator.json", "--from", "file:press.mcap?speed=0", "--out", "again.mcap"];

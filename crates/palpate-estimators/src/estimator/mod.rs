@@ -378,6 +378,9 @@ impl Locator {
             _ => return Err(LeaveOutError::Needed { kind }),
         }
         self.setup.set_dead(channel, true);
+        if let Some(scatter) = &mut self.untouched_scatter {
+            scatter.disable(channel);
+        }
         Ok(())
     }
 

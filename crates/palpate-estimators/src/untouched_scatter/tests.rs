@@ -27,8 +27,11 @@ fn recording(rng: &mut Xoshiro256PlusPlus, rests: usize, [own, shared]: [f64; 2]
             });
         }
     }
-    let setup = Setup::measured(0.3, &["a", "b", "c", "d", "e", "f"]).unwrap();
-    Recording::new(setup.layout(), "rests", rows)
+    Recording::new(setup().layout(), "rests", rows)
+}
+
+fn setup() -> Setup {
+    Setup::measured(0.3, &["a", "b", "c", "d", "e", "f"]).unwrap()
 }
 
 /// Share of changes from one rest to the next that are beyond the scatter, over many recordings.
@@ -40,7 +43,8 @@ fn false_alarms(rests: usize, parts: [f64; 2], drift: f64, rate: f64) -> f64 {
     for _ in 0..RECORDINGS {
         let recording = recording(&mut rng, rests, parts, drift);
         let found = Rests::of_recording(&recording).unwrap();
-        let scatter = found.scatter(vec![0.0; CHANNELS], FalseAlarmRate::new(rate).unwrap());
+        let scatter =
+            found.scatter(vec![0.0; CHANNELS], setup().layout(), FalseAlarmRate::new(rate).unwrap());
         let [own, shared] = parts;
         for _ in 0..ASKED {
             let mut change = |sd: f64| -> f64 {
@@ -70,7 +74,7 @@ fn a_steady_drift_is_no_scatter() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let scatter = |drift: f64, rng: &mut Xoshiro256PlusPlus| {
         let rests = Rests::of_recording(&recording(rng, 200, [3.0, 0.0], drift)).unwrap();
-        rests.scatter(vec![0.0; CHANNELS], FalseAlarmRate::DEFAULT).sd
+        rests.scatter(vec![0.0; CHANNELS], setup().layout(), FalseAlarmRate::DEFAULT).sd
     };
     for drift in [0.0, 50.0] {
         for sd in scatter(drift, &mut rng) {
@@ -88,4 +92,23 @@ fn few_rests_or_one_long_one_tell_no_scatter() {
     few.rows = few.rows.iter().cycle().take(4 * few.rows.len()).cloned().collect();
     few.rows.sort_by(|a, b| a.force_n.unwrap().total_cmp(&b.force_n.unwrap()));
     assert!(Rests::of_recording(&few).is_none());
+}
+
+#[test]
+fn disabled_channels_say_nothing() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let rests = Rests::of_recording(&recording(&mut rng, 40, [3.0, 0.0], 0.0)).unwrap();
+    let mut setup = setup();
+    let scatter = |setup: &Setup| rests.scatter(vec![0.0; CHANNELS], setup.layout(), FalseAlarmRate::DEFAULT);
+    let mut reading = [0.0; CHANNELS];
+    reading[2] = 1e6;
+    let mut all = scatter(&setup);
+    assert!(!all.contains(&reading));
+    all.disable(2);
+    assert!(all.contains(&reading));
+    setup.set_dead(2, true);
+    let without = scatter(&setup);
+    assert!(without.contains(&reading) && without.bound < all.bound);
+    reading[3] = 100.0;
+    assert!(!all.contains(&reading) && !without.contains(&reading));
 }

@@ -16,7 +16,7 @@ use serde::Serialize;
 use std::time::Duration;
 
 /// Readings in a row that deviate where something touches: one or two may be glitches.
-const ONSET_READINGS: u32 = 3;
+pub(super) const ONSET_READINGS: u32 = 3;
 /// Step of the untouched reading that is followed at once, in standard deviations of the noise; a larger one may be a light finger, and has to last
 /// for [`PATIENCE`].
 const FOLLOWED_STEP_SD: f64 = 2.0;

@@ -2,7 +2,7 @@
 
 use super::press::Press;
 use palpate_estimators::arrangement::{Arrangement, ArrangementError};
-use palpate_estimators::recording::Row;
+use palpate_estimators::recording::{Row, is_same_force};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_rig::{Rig, RigSimulationError};
@@ -34,16 +34,11 @@ impl Weights {
         self.force_n.or(of_training).or(rig.setup.force_n())
     }
 
-    /// The second force where it differs from the first by more than the rounding of a file.
+    /// The second force where it differs from the first.
     fn second_n(self, rig: &Rig) -> Option<f64> {
         let first_n = self.first_n(rig)?;
         self.second_n.filter(|second_n| !is_same_force(first_n, *second_n))
     }
-}
-
-/// True for forces that differ by no more than the rounding of a file.
-pub(super) fn is_same_force(a_n: f64, b_n: f64) -> bool {
-    (a_n - b_n).abs() <= 1e-6 * a_n.abs().max(b_n.abs())
 }
 
 /// Presses that are still to be taken: each training position of a rig as often as the rig repeats it, with each of `depths_m` where a

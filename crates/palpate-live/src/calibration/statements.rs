@@ -1,7 +1,7 @@
 //! Statements of the operator before the first press: placement, weights, and whether the force in use is known.
 
-use super::plan::{Weights, is_same_force};
-use palpate_estimators::recording::Row;
+use super::plan::Weights;
+use palpate_estimators::recording::{Row, is_same_force};
 use palpate_numerics::OutOfRange;
 use palpate_rig::Rig;
 

@@ -4,14 +4,13 @@
 //! touch; after a lift, which must bring the untouched reading back, a fine pass finds the height within that step.
 
 use super::baseline::{Baseline, NOISE_LIMIT_SD};
+use super::guide::ONSET_READINGS;
 use super::stretch::{Stretch, mean};
 use palpate_rig::Stage;
 use std::time::Duration;
 
-/// Readings in a row that deviate where something touches, as in a calibration by hand.
-const ONSET_READINGS: usize = 3;
-/// Readings without such a row that show no touch.
-const CLEAR_READINGS: usize = 2 * ONSET_READINGS;
+/// Readings without a touch that show that nothing touches.
+const CLEAR_READINGS: usize = 2 * ONSET_READINGS as usize;
 /// Share of the shallowest press that a coarse step is: a touch-off presses no harder than that.
 const COARSE_SHARE: f64 = 0.1;
 /// Share of a coarse step that a fine one is.
@@ -66,7 +65,7 @@ pub(super) struct TouchDetector {
     baseline: Option<Baseline>,
     /// Readings since the last move, and those in a row that deviate by more than noise.
     count: usize,
-    deviating: usize,
+    deviating: u32,
     is_touched: bool,
 }
 
@@ -160,7 +159,7 @@ impl TouchOff {
         let step_m = (COARSE_SHARE * shallowest_m).max(LEAST_STEP_M);
         Self {
             step: Step::Learn,
-            top_m: stage.touch_z_m + stage.clearance_m - step_m,
+            top_m: stage.travel_z_m() - step_m,
             lowest_m: stage.lowest_z_m(),
             step_m,
             coarse_m: None,

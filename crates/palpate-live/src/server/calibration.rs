@@ -25,6 +25,7 @@ use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 use palpate_rig::{Rig, Stage};
 use serde::Serialize;
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -807,19 +808,16 @@ impl Calibrator {
         let guide = calibration.guide();
         record.waiting = guide.waiting();
         let next = guide.next_press();
-        let planned = match running.purpose {
-            // What a calibration would press, as nothing is pressed now.
-            Purpose::SetUp => self.plan.to_come(&state.statements, &state.rows).unwrap_or_default(),
-            _ => guide.plan()[next.map_or(guide.plan().len(), |(number, _)| number)..].to_vec(),
+        let left = next.map_or(guide.plan().len(), |(number, _)| number);
+        let (rows, to_come) = match running.purpose {
+            // Nothing is pressed now: the presses of the calibration that follows.
+            Purpose::SetUp => {
+                let to_come = self.plan.to_come(&state.statements, &state.rows).unwrap_or_default();
+                (state.rows.as_slice(), Cow::Owned(to_come))
+            }
+            _ => (calibration.journal().rows(), Cow::Borrowed(&guide.plan()[left..])),
         };
-        let (to_come, rows) = (
-            planned.as_slice(),
-            match running.purpose {
-                Purpose::SetUp => &state.rows,
-                _ => calibration.journal().rows(),
-            },
-        );
-        write_places(rows, to_come, extent, record);
+        write_places(rows, &to_come, extent, record);
         record.next = next.map(|(_, press)| PlaceRecord {
             force_n: press.force_n,
             ..PlaceRecord::of_position(press.position, extent)
@@ -828,7 +826,7 @@ impl Calibrator {
         record.presses = calibration.journal().path().display().to_string();
         self.write_readings(shared, record);
         record.machine = self
-            .machine_record(state, rows, to_come)
+            .machine_record(state, rows, &to_come)
             .map(|machine| machine.running(&shared.machine, calibration, extent, record.left));
     }
 

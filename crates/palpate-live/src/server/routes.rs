@@ -97,15 +97,15 @@ async fn alarms(State(live): State<Arc<Live>>) -> JsonAnswer<Value> {
     JsonAnswer(json!({ "text": text, "file": file.map(|file| file.path().display().to_string()) }))
 }
 
-/// A rule file of alarms.
+/// Rules of alarms, as the text of a rule file.
 #[derive(Deserialize)]
-struct AlarmFile {
+struct AlarmRules {
     text: String,
 }
 
 async fn set_alarms(
     State(live): State<Arc<Live>>,
-    JsonBody(AlarmFile { text }): JsonBody<AlarmFile>,
+    JsonBody(AlarmRules { text }): JsonBody<AlarmRules>,
 ) -> Result<JsonAnswer<Value>, Refusal> {
     let setting = Arc::clone(&live);
     blocking(move || setting.set_alarms(&text)).await?;

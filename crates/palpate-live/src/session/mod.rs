@@ -276,6 +276,3 @@ impl<'a> Session<'a> {
 fn touches(status: Status) -> bool {
     matches!(status, Status::Located | Status::Ambiguous)
 }
-
-#[cfg(test)]
-mod tests;

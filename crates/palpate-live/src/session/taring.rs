@@ -14,8 +14,6 @@ pub struct Taring {
     /// The tare; `None` where the locator has not learnt what its channels read untouched.
     tare: Option<Tare<Vec<f64>>>,
     follows: bool,
-    /// Whether the rest after a touch becomes the baseline; not where a tracker takes creep off.
-    takes_rests: bool,
     /// A baseline that is being taken, and the readings it still lacks.
     taken: Option<(Tare<Vec<f64>>, u32)>,
 }
@@ -24,19 +22,17 @@ impl Taring {
     /// The tare of a session that begins.
     pub fn new(locator: &Locator, mode: TareMode, estimation: &Estimation) -> Self {
         let follows = mode == TareMode::Auto && locator.false_alarm_rate().is_some();
-        let takes_rests = !matches!(estimation, Estimation::Track { creep: Some(_), .. });
-        let tare = locator.tare().ok().map(|tare| if takes_rests { tare } else { tare.without_rests() });
-        Self { tare, follows, takes_rests, taken: None }
+        let tare = locator.tare().ok().map(|tare| match estimation {
+            // The tracker takes creep off.
+            Estimation::Track { creep: Some(_), .. } => tare.without_rests(),
+            _ => tare,
+        });
+        Self { tare, follows, taken: None }
     }
 
     /// Begins to take a baseline.
     pub fn begin(&mut self) {
-        if let Some(tare) = &self.tare {
-            let takes_rests = self.takes_rests;
-            let fresh = Tare::new(tare.learnt().to_vec()).ok();
-            let fresh = fresh.map(|tare| if takes_rests { tare } else { tare.without_rests() });
-            self.taken = fresh.map(|tare| (tare, READINGS));
-        }
+        self.taken = self.tare.as_ref().map(|tare| (tare.restarted(), READINGS));
     }
 
     /// The estimate of a reading, and whether a baseline is complete with it; `tared` holds the tared reading afterwards. `None` for a reading
