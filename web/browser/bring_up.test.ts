@@ -54,6 +54,11 @@ describe.skipIf(!hasChromium())("a board without a rig", () => {
       expect(await page.locator("#bring-up-lines li").last().textContent()).toContain(`{"${LONG}":-8388`);
       expect(await page.locator(".numbers").isVisible()).toBe(false);
       expect(await page.locator("#surface").isVisible()).toBe(false);
+      // The name of a channel can be read beside the place of its sensor.
+      const field = (await page.locator("#rig-channel-1").boundingBox())!;
+      const place = (await page.locator("#rig-sensor-place-1").boundingBox())!;
+      expect(field.width).toBeGreaterThan(100);
+      expect(field.x + field.width).toBeLessThanOrEqual(place.x);
       await picture(page, `bring-up-${name}`);
       expect(faults).toEqual([]);
       if (name === "phone") await page.context().close();
