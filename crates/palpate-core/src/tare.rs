@@ -45,6 +45,17 @@ pub struct Tare<B> {
     rest: RestWatch<B>,
     /// Whether the rest after a touch becomes the baseline.
     takes_rests: bool,
+    /// Drift of the untouched reading in the course of the calibration.
+    drift: Option<CalibrationDrift<B>>,
+}
+
+/// Drift of the untouched reading in the course of a calibration.
+#[derive(Clone, Debug, PartialEq)]
+struct CalibrationDrift<B> {
+    /// Last untouched reading of each channel.
+    last: B,
+    /// Largest change of each channel since then that is taken for more drift.
+    reach: B,
 }
 
 /// A baseline, and what is known for it.
@@ -129,11 +140,27 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         Self { takes_rests: false, ..self }
     }
 
+    /// The same, of a calibration in whose course the untouched reading drifted. `last` is its last untouched reading, and `reach` the change of each
+    /// channel that is taken for more drift. The first readings after it are untouched where they are within this reach.
+    ///
+    /// # Errors
+    /// [`TareError`] for another number of channels, or a value of `last` that is not finite.
+    pub fn with_drift(mut self, last: B, reach: B) -> Result<Self, TareError> {
+        let needed = self.learnt.as_ref().len();
+        check(last.as_ref(), needed)?;
+        if reach.as_ref().len() != needed {
+            return Err(TareError::Channels { needed, found: reach.as_ref().len() });
+        }
+        self.drift = Some(CalibrationDrift { last, reach });
+        Ok(self)
+    }
+
     fn of_learnt(learnt: B) -> Self {
         Self {
             current: Baseline::new(learnt.clone(), 0),
             rest: RestWatch::new(&learnt),
             takes_rests: true,
+            drift: None,
             learnt,
             time_constant: Self::TIME_CONSTANT,
             is_confirmed: false,
@@ -148,7 +175,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     #[must_use]
     pub fn restarted(&self) -> Self {
         let Self { time_constant, takes_rests, .. } = *self;
-        Self { time_constant, takes_rests, ..Self::of_learnt(self.learnt.clone()) }
+        let drift = self.drift.clone();
+        Self { time_constant, takes_rests, drift, ..Self::of_learnt(self.learnt.clone()) }
     }
 
     /// Untouched reading of each channel today, as far as is known.
@@ -198,7 +226,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// The status that `locate` gives says what a reading is to the baseline:
     /// - `no_contact`: the baseline moves towards it, by a straight line through the last [`Tare::TIME_CONSTANT`] such readings, whose slope is the drift;
     /// - a contact, whether held for a second or an hour: the baseline is not moved by it. It drifts on as before for as many readings as the drift was
-    ///   learnt from;
+    ///   learnt from. The first reading is the new baseline where more of the calibration's drift explains it ([`Tare::with_drift`]);
     /// - after a touch, readings that stay and are `no_contact`, or small beside the touch: hysteresis, creep or drift have left them, and their mean is the new
     ///   baseline;
     /// - `outside_model`, which no contact explains: while the baseline is not yet the mean of [`Tare::SETTLED`] readings the surface has
@@ -228,6 +256,11 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         self.apply(reading, tared)?;
         let estimate = locate(tared);
         let status = estimate.status;
+        if self.current.weight == 0 && is_contact(status) && self.has_drifted_to(reading) {
+            self.begin_at(reading);
+            self.apply(reading, tared)?;
+            return Ok(locate(tared));
+        }
         let course =
             match self.takes_rests && self.current.weight >= Self::SETTLED && self.is_possible(reading) {
                 true => self.rest.add(reading, self.current.values.as_ref(), status, self.time_constant),
@@ -343,6 +376,14 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         let mut baseline = Baseline::new(self.learnt.clone(), 0);
         baseline.average(reading, self.time_constant);
         baseline
+    }
+
+    /// True for a reading that more of the calibration's drift explains.
+    fn has_drifted_to(&self, reading: &[f64]) -> bool {
+        self.drift.as_ref().is_some_and(|CalibrationDrift { last, reach }| {
+            let mut channels = reading.iter().zip(last.as_ref()).zip(reach.as_ref());
+            channels.all(|((value, last), reach)| (value - last).abs() <= *reach)
+        })
     }
 
     fn is_possible(&self, reading: &[f64]) -> bool {
@@ -532,6 +573,31 @@ mod tests {
         }
         assert!(is_right(&tare, MOVED), "{:?}", tare.baseline());
         assert_eq!(follow(&mut tare, reading(1, MOVED, 0.0, 0.0)).status, Status::NoContact);
+    }
+
+    #[test]
+    fn the_drift_of_a_calibration_goes_on_until_the_first_reading() {
+        // The channels have drifted like a contact of 1.5 at 0.3, and by a fifth of it again since the calibration.
+        let drifted = influence(0.3).map(|influence| 1.5 * influence);
+        let last: [f64; 4] = core::array::from_fn(|c| LEARNT[c] + drifted[c] / 1.2);
+        let moved = |i: u32, force: f64| reading(i, drifted, force, 0.7);
+        let mut unaware = Tare::new(LEARNT).unwrap();
+        let mut aware = unaware.clone().with_drift(last, drifted.map(|d| d.abs().max(5.0))).unwrap();
+        assert_eq!(follow(&mut unaware, moved(0, 0.0)).status, Status::Located);
+        for i in 0..1000 {
+            let force = if (300..500).contains(&i) { 1.0 } else { 0.0 };
+            let estimate = follow(&mut aware, moved(i, force));
+            assert_eq!(estimate.status == Status::NoContact, force == 0.0, "{i}");
+        }
+        assert!(is_right(&aware, drifted), "{:?}", aware.baseline());
+        // A contact of another place is none of the drift, and one within the reach is right from its lift on.
+        let mut touched = aware.restarted();
+        assert_eq!(follow(&mut touched, reading(0, [0.0; 4], 4.0, 0.7)).status, Status::Located);
+        let mut touched = aware.restarted();
+        for i in 0..400 {
+            follow(&mut touched, reading(i, drifted, if i < 200 { 0.5 } else { 0.0 }, 0.3));
+        }
+        assert!(is_right(&touched, drifted), "{:?}", touched.baseline());
     }
 
     #[test]

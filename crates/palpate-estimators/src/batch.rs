@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use palpate_core::Estimate;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-use crate::fit::{CheckEstimate, Fitted, Locate, ReadingError, told};
+use crate::fit::{CheckEstimate, Fitted, Locate, ReadingError};
 use crate::status::NO_CONTACT;
 
 /// Readings of a block: their estimates, 0.9 kB each, stay in a core's second cache.
@@ -167,7 +167,7 @@ impl<M: Locate> Fitted<M> {
             check.check_batch(readings, channels, estimates, extent);
         }
         for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
-            *estimate = self.by_scatter(told(*estimate, reading, &self.setup), reading);
+            *estimate = self.finished(*estimate, reading);
         }
         Ok(())
     }

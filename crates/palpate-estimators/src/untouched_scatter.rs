@@ -49,10 +49,7 @@ impl Rests {
     pub fn of_recording(recording: &Recording) -> Option<Self> {
         let by_row = || (0..recording.rows.len()).map(|row| row as f64).collect();
         let times_s: Vec<f64> = recording.times_s().unwrap_or_else(by_row);
-        let indices: Vec<usize> = (0..recording.rows.len()).collect();
-        let touches = |row: &usize| recording.rows[*row].touches();
-        let rests: Vec<&[usize]> =
-            indices.chunk_by(|a, b| touches(a) == touches(b)).filter(|run| !touches(&run[0])).collect();
+        let rests = recording.rests();
         if rests.len() < Self::LEAST {
             return None;
         }
@@ -61,7 +58,7 @@ impl Rests {
         let rest_times_s: Vec<f64> = rests.iter().map(|rest| time_of(rest)).collect();
         let lines: Vec<[f64; 2]> = (0..channels)
             .map(|c| {
-                let value = |rest: &&[usize]| mean(rest.iter().map(|row| recording.rows[*row].reading[c]));
+                let value = |rest: &Vec<usize>| mean(rest.iter().map(|row| recording.rows[*row].reading[c]));
                 line(&rest_times_s, &rests.iter().map(value).collect::<Vec<f64>>())
             })
             .collect();

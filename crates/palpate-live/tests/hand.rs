@@ -1,6 +1,6 @@
 //! Hands of all kinds press a board that has hysteresis, creep, residue, drift and a converter: every recorded press has a touch, and nobody waits for ever.
 
-use palpate_estimators::estimator::Status;
+use palpate_estimators::estimator::{Locator, Status};
 use palpate_estimators::fit::Fit;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
@@ -260,11 +260,8 @@ impl Tally {
 /// Number of touches of a session.
 const TOUCHES: usize = 4;
 
-/// Touches by the hand that calibrated the board, after a tare; `setup` is that of the locator.
-fn touch(rig: &Rig, setup: &Setup, style: HandStyle, faults: FaultConfig) -> Tally {
-    const RATE_HZ: usize = 100;
-    let mut bench = Bench::new(rig, style, faults, RATE_HZ as f64, 7);
-    let (calibration, ..) = bench.calibrate();
+/// The locator of a setup that learns from the presses of a calibration.
+fn fit(rig: &Rig, setup: &Setup, calibration: &Calibration) -> Locator {
     let mut rows = calibration.journal().rows().to_vec();
     if setup.surface().model().is_none() {
         // Raw channels have the numbers of the frames.
@@ -273,8 +270,49 @@ fn touch(rig: &Rig, setup: &Setup, style: HandStyle, faults: FaultConfig) -> Tal
         let values = rows.iter_mut().flat_map(|row| row.reading.iter_mut().zip(&factors));
         values.for_each(|(value, factor)| *value /= factor);
     }
-    let recording = Recording::new(setup.layout(), "presses", rows);
-    let locator = rig.estimator.fit(setup, &recording).unwrap();
+    rig.estimator.fit(setup, &Recording::new(setup.layout(), "presses", rows)).unwrap()
+}
+
+#[test]
+fn a_session_after_a_drifting_calibration_begins_untouched() {
+    let (rig, noise) = rig();
+    let names = rig.setup.layout().names();
+    let names: Vec<&str> = names.iter().map(|name| name.as_ref()).collect();
+    let measured = Setup::measured(0.3, &names).unwrap();
+    let faults = FaultConfig { hysteresis: 0.01, drift_per_s: noise, ..FaultConfig::default() };
+    let mut contacts_of_unaware = 0;
+    for setup in [rig.setup.clone().with_force(None).unwrap(), measured] {
+        let mut bench = Bench::new(&rig, HandStyle::default(), faults.clone(), 100.0, 7);
+        let (calibration, ..) = bench.calibrate();
+        let locator = fit(&rig, &setup, &calibration);
+        // Half a minute goes by.
+        for _ in 0..3000 {
+            bench.next(Instruction::Lift);
+        }
+        let untouched: Vec<Arrived> = (0..500).map(|_| bench.next(Instruction::Lift).0).collect();
+        let contacts = contacts_of(&locator, &untouched);
+        assert!(contacts <= 5, "{contacts} of 500 untouched readings are contacts");
+        let unaware = Locator { untouched_drift: None, ..locator };
+        contacts_of_unaware += contacts_of(&unaware, &untouched);
+    }
+    assert!(contacts_of_unaware > 500, "{contacts_of_unaware}");
+}
+
+/// Readings of a session that are no `no_contact`.
+fn contacts_of(locator: &Locator, arrived: &[Arrived]) -> usize {
+    let mut session = Session::new(locator, &SessionConfig::default()).unwrap();
+    let mut out = Vec::new();
+    arrived.iter().for_each(|arrived| session.receive(arrived, &mut out));
+    let is_contact = |output: &&Output| matches!(output, Output::Sample(sample) if sample.estimate.status != Status::NoContact);
+    out.iter().filter(is_contact).count()
+}
+
+/// Touches by the hand that calibrated the board, after a tare; `setup` is that of the locator.
+fn touch(rig: &Rig, setup: &Setup, style: HandStyle, faults: FaultConfig) -> Tally {
+    const RATE_HZ: usize = 100;
+    let mut bench = Bench::new(rig, style, faults, RATE_HZ as f64, 7);
+    let (calibration, ..) = bench.calibrate();
+    let locator = fit(rig, setup, &calibration);
     let mut session = Session::new(&locator, &SessionConfig::default()).unwrap();
     let (mut tally, mut out) = (Tally::default(), Vec::new());
     session.command(bench.start, Command::Tare, &mut out);

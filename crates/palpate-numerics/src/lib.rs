@@ -46,6 +46,6 @@ pub use random_order::random_order;
 pub use shared_error::{SharedError, with_shared_error};
 pub use sparse_cholesky::{SparseCholesky, SparseCholeskyError, SparseSymmetric};
 pub use statistics::{
-    FEWEST_FOR_95, conformal_95, mean, mean_and_variance, median, percentile, root_mean_square,
-    standard_error,
+    FEWEST_FOR_95, conformal_95, conformal_95_of_groups, mean, mean_and_variance, median, percentile,
+    root_mean_square, standard_error,
 };

@@ -49,9 +49,68 @@ pub fn conformal_95(mut sizes: Vec<f64>) -> Option<f64> {
     sizes.get(number.checked_sub(1)?).copied()
 }
 
+/// Bound of the sizes of errors that come in groups: one of a further group does not exceed it with a probability of about 0.95. `None` of fewer than
+/// [`FEWEST_FOR_95`] groups, and of an empty one.
+///
+/// Every group has the same weight, and shares it between its sizes: their distribution is the mean of the groups' (Dunn, Wasserman and Ramdas, *Journal of the American
+/// Statistical Association* 118, 2023: pooled CDFs). Of n independent sizes the bound is their quantile at 0.95·(n + 1)/n, as in [`conformal_95`]. Sizes of one
+/// group may be alike; n is the number of independent ones whose mean would scatter as the mean of the groups does (Kish, *Survey Sampling*, 1965: the
+/// effective sample size), at least the number of groups. Quantiles are interpolated between sizes (Hutson, *Statistics and Probability Letters* 42, 1999).
+pub fn conformal_95_of_groups(groups: &[&[f64]]) -> Option<f64> {
+    const SHARE: f64 = 0.95;
+    if groups.len() < FEWEST_FOR_95 || groups.iter().any(|group| group.is_empty()) {
+        return None;
+    }
+    let count = groups.len() as f64;
+    let weighted = |group: &&[f64]| {
+        let weight = 1.0 / (count * group.len() as f64);
+        group.iter().map(|size| (*size, weight)).collect::<Vec<_>>()
+    };
+    let mut sizes: Vec<(f64, f64)> = groups.iter().flat_map(weighted).collect();
+    sizes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let quantile = weighted_quantile(&sizes, SHARE);
+    let share_beyond =
+        |group: &&[f64]| group.iter().filter(|size| **size > quantile).count() as f64 / group.len() as f64;
+    let (_, variance) = mean_and_variance(groups.iter().map(share_beyond));
+    let independent = (SHARE * (1.0 - SHARE) * (count - 1.0) / variance).clamp(count, sizes.len() as f64);
+    Some(weighted_quantile(&sizes, SHARE * (1.0 + 1.0 / independent)))
+}
+
+/// Quantile of values in rising order with weights that add up to 1, by straight lines between the cumulated weights.
+fn weighted_quantile(values: &[(f64, f64)], share: f64) -> f64 {
+    let (mut cumulated, mut below) = (0.0, f64::NAN);
+    for (value, weight) in values {
+        if cumulated + weight >= share {
+            let part = (share - cumulated) / weight;
+            // Immense values that are one have no difference.
+            return if *value > below { below + part * (value - below) } else { *value };
+        }
+        (cumulated, below) = (cumulated + weight, *value);
+    }
+    below
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn alike_sizes_of_a_group_count_as_one() {
+        let sizes: Vec<f64> = (1..=60).map(f64::from).collect();
+        let single: Vec<&[f64]> = sizes.chunks(1).collect();
+        let bound = |groups: &[&[f64]]| conformal_95_of_groups(groups).unwrap();
+        assert!((bound(&single[..19]) - 19.0).abs() < 1e-9);
+        assert!((bound(&single) - 0.95 * 61.0).abs() < 0.06, "{}", bound(&single));
+        let repeated: Vec<Vec<f64>> = sizes.iter().map(|size| vec![*size; 7]).collect();
+        let repeated: Vec<&[f64]> = repeated.iter().map(Vec::as_slice).collect();
+        assert!((bound(&repeated) - bound(&single)).abs() < 1.0);
+        // The sizes of like groups are independent.
+        let thousand: Vec<f64> = (1..=1000).map(f64::from).collect();
+        assert!((bound(&[thousand.as_slice(); 20]) - 950.0).abs() < 1.0);
+        assert_eq!(conformal_95_of_groups(&single[..18]), None);
+        assert_eq!(conformal_95_of_groups(&[&[][..]; 20]), None);
+        assert_eq!(bound(&[&[f64::MAX][..]; 20]), f64::MAX);
+    }
 
     #[test]
     fn nineteen_errors_in_twenty_are_within_the_conformal_bound() {

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use palpate_estimators::centroid::Centroid;
 use palpate_estimators::estimator::{Estimator, contenders};
-use palpate_estimators::evaluation::{Evaluation, Located, Split, evaluate_splits};
+use palpate_estimators::evaluation::{Evaluation, Located, Split, SplitOrigin, evaluate_splits};
 use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulateError;
@@ -248,7 +248,8 @@ impl ArraySensor {
         let trial = |k: u64| {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_add(k));
             let training = self.recording(&self.presses, seed, &mut rng);
-            Split { training, judged: self.recording(&judged, seed, &mut rng), offsets: None }
+            let judged = self.recording(&judged, seed, &mut rng);
+            Split { training, judged, offsets: None, origin: SplitOrigin::Calibration }
         };
         (0..count).map(trial).collect()
     }

@@ -7,6 +7,7 @@ use crate::progress::{self, Observer};
 use crate::remark::remark;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
+use palpate_estimators::description;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::recording::{Recording, Row, comment_with_placement};
@@ -628,6 +629,8 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Re
     out.write(locator.to_json().map_err(Complaint::new)?.as_bytes())?;
     let presses = recording.touched().rows.len();
     output::say(format!("{} fitted to {presses} presses: {}", locator.kind(), arguments.out.display()))?;
+    let checked = description::interval_check(locator.interval_check.as_ref());
+    checked.into_iter().try_for_each(output::say)?;
     let assessment = observer
         .watch(|watch| Assessment::new(rig, &recording, arguments.seed, watch))
         .map_err(|Cancelled| Failure::Interrupted("stopped before its error was estimated".to_owned()))?;

@@ -84,6 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "seed": arguments.seed,
             "rows": recording.rows.len(),
             "training"?: training,
+            "interval_check": locator.interval_check,
             "learnt"?: learnt.map(|(linear, names)| learnt::json(linear, &names)),
         });
     }
@@ -94,7 +95,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         recording.rows.len(),
         arguments.out.display()
     ))?;
-    let lines = learnt.map(|(linear, names)| description::learnt_summary(linear, &names)).unwrap_or_default();
+    let mut lines =
+        learnt.map(|(linear, names)| description::learnt_summary(linear, &names)).unwrap_or_default();
+    lines.extend(description::interval_check(locator.interval_check.as_ref()));
     lines.iter().try_for_each(|line| output::say(format!("  {line}")))
 }
 
@@ -102,11 +105,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
     let cost = rig.estimator.fit_cost(&rig.setup, recording);
     if rig.estimator != Estimator::Auto {
-        return cost;
+        return cost.with_interval_check(recording);
     }
     let choice = cost.seconds.min(f64::from(arguments.auto_seconds));
     // The one that is chosen takes no longer than one fold of all.
-    FitCost { seconds: choice + cost.seconds / CHOICE_FOLDS as f64, ..cost }
+    let chosen =
+        FitCost { seconds: cost.seconds / CHOICE_FOLDS as f64, ..cost }.with_interval_check(recording);
+    FitCost { seconds: choice + chosen.seconds, ..cost }
 }
 
 /// The rig with its estimator chosen by cross-validation where it is `auto`, saying why.

@@ -1,7 +1,7 @@
 use super::*;
 use crate::arrangement::all_over;
 use crate::estimator::{Estimator, Locator, contenders};
-use crate::fit::Fit;
+use crate::fit::{Fit, FitTask};
 use crate::fixtures::{digit, paper, plate, raw_setup};
 use crate::influence::Influence;
 use crate::recording::Recording;
@@ -16,7 +16,9 @@ use palpate_mechanics::units::{newtons, um};
 /// Locators of every method that suits a setup; networks are trained for as long as a test may take.
 fn locators(setup: &Setup, presses: &Recording) -> Vec<Locator> {
     let all = contenders(setup, &Estimator::default(), 200 * presses.rows.len());
-    all.iter().filter_map(|estimator| estimator.fit(setup, presses).ok()).collect()
+    all.iter()
+        .filter_map(|estimator| estimator.fit_without_interval_check(FitTask::new(setup, presses)).ok())
+        .collect()
 }
 
 /// Readings of a recording; and of nothing, of three times as much, of the first and the last together, and far beyond all that is read.
@@ -119,7 +121,10 @@ fn a_batch_of_every_method_answers_as_readings_one_by_one_do() {
 /// A locator on the paper's beam, and readings of several blocks.
 fn several_blocks() -> (Locator, Vec<f64>) {
     let example = paper(um(5.0), 4);
-    let locator = Influence::default().fit(&example.setup, &example.simulate(1)).unwrap().into_locator();
+    let locator = Influence::default()
+        .fit_without_interval_check(FitTask::new(&example.setup, &example.simulate(1)))
+        .unwrap()
+        .into_locator();
     let contacts = all_over(example.setup.surface().extent()).into_iter();
     let contacts: Vec<_> = contacts.map(|position| Contact { position, force_n: newtons(3.0) }).collect();
     let recording = simulate_contacts(&example.setup, &contacts, 1, 2).unwrap();

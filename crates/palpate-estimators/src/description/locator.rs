@@ -5,8 +5,10 @@ use crate::centroid::Weighing;
 use crate::estimator::{Locator, Method};
 use crate::influence::InfluenceLocator;
 use crate::influence::measured::{MeasuredLocator, NuisanceRole};
+use crate::interval_check::{Coverage, IntervalCheck};
 use crate::network::Topology;
 use palpate_mechanics::units::format_count;
+use palpate_numerics::FEWEST_FOR_95;
 
 /// A locator: its setup, what it learnt, how its estimates are checked, and the recording that it was fitted to.
 pub fn locator(locator: &Locator) -> Vec<String> {
@@ -39,6 +41,7 @@ pub fn locator(locator: &Locator) -> Vec<String> {
         None => "untouched readings are not told from contacts: it does not know what the board reads then"
             .to_owned(),
     });
+    lines.extend(interval_check(locator.interval_check.as_ref()));
     let recording = &provenance.recording;
     let placement =
         recording.placement_sd_m.map_or_else(String::new, |sd_m| format!(", {}", super::placement(sd_m)));
@@ -47,6 +50,27 @@ pub fn locator(locator: &Locator) -> Vec<String> {
         lines.push(format!("    sha256 {digest}"));
     }
     lines
+}
+
+/// The check of a locator's 95 % intervals at held-out places.
+pub fn interval_check(check: Option<&IntervalCheck>) -> Vec<String> {
+    let Some(check) = check else {
+        return vec![format!(
+            "95 % intervals: not checked, which takes presses at {FEWEST_FOR_95} places or more"
+        )];
+    };
+    let line = |what: &str, Coverage { before_percent, after_percent, factor }: Coverage| {
+        let widened = match factor > 1.0 {
+            true => format!("; {after_percent:.1} % once widened by the factor {factor:.2}"),
+            false => String::new(),
+        };
+        format!(
+            "95 % intervals at {} places held out: {before_percent:.1} % hold the {what}{widened}",
+            check.places
+        )
+    };
+    let position = line("position", check.position);
+    [position].into_iter().chain(check.force.map(|force| line("force", force))).collect()
 }
 
 fn method(locator: &Locator) -> Vec<String> {

@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::estimator::{ContactEstimate, Estimator, Locator, Method, Status};
-use crate::fit::Fit;
+use crate::fit::{Fit, FitTask};
 use crate::fixtures;
 use crate::setup::Setup;
 use crate::simulate::{clean_reading, simulate_at};
@@ -24,7 +24,7 @@ fn locator(setup: &Setup, theory: DigitTheory) -> Locator {
     let pressed = setup.clone().known_force(1.0).unwrap();
     let recording = simulate_at(&pressed, &[Position::along(0.1)], 1, 0).unwrap();
     let config = Estimator::Digit(DigitEstimator::of_theory(theory));
-    config.fit(setup, &recording).unwrap()
+    config.fit_without_interval_check(FitTask::new(setup, &recording)).unwrap()
 }
 
 fn method(locator: &Locator) -> &DigitLocator {
@@ -290,7 +290,7 @@ fn benches_that_do_not_suit_are_refused_in_words() {
         let pressed = setup.clone().known_force(1.0).unwrap();
         let recording = simulate_at(&pressed, &[Position::along(0.1)], 1, 0).unwrap();
         let config = Estimator::Digit(DigitEstimator::default());
-        config.fit(setup, &recording).unwrap_err().to_string()
+        config.fit_without_interval_check(FitTask::new(setup, &recording)).unwrap_err().to_string()
     };
     let with = |change: &dyn Fn(&mut Setup)| {
         let mut setup = good.clone();
@@ -316,7 +316,7 @@ fn for_small_forces_influence_functions_are_at_the_limit() {
         source: crate::influence::InfluenceSource::Mechanics,
         ..Default::default()
     });
-    let locator = config.fit(&rig.setup, &recording).unwrap();
+    let locator = config.fit_without_interval_check(FitTask::new(&rig.setup, &recording)).unwrap();
     let limit = rig.setup.cramer_rao_bound().unwrap();
     let positions: Vec<Position> =
         (0..200).map(|i| Position::along(0.03 + 0.09 * f64::from(i) / 200.0)).collect();

@@ -5,6 +5,7 @@
 
 use super::{CHOICE_FOLDS, Estimator, is_learnt};
 use crate::features::FeatureKind;
+use crate::fit::CHECK_FOLDS;
 use crate::gaussian_process::folds_taken;
 use crate::influence::measured::{MeasuredInfluence, most_nodes, most_nuisance_nodes};
 use crate::influence::{Influence, Structure, force_linear, learning, sizes_over_a_model};
@@ -14,6 +15,7 @@ use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::{neighbours, network};
 use palpate_mechanics::surface::{Extent, SolutionCost, Solving, Surface, SurfaceSpec};
+use palpate_numerics::FEWEST_FOR_95;
 use palpate_numerics::regression::{INDUCING, MOST_EXACT};
 use std::collections::HashSet;
 
@@ -27,6 +29,16 @@ pub struct FitCost {
 }
 
 impl FitCost {
+    /// The cost with that of the check of intervals at held-out places, where the recording has enough of these.
+    #[must_use]
+    pub fn with_interval_check(self, recording: &Recording) -> Self {
+        let folds = CHECK_FOLDS as f64;
+        let has_check = recording.distinct_positions().len() >= FEWEST_FOR_95;
+        let checked = if has_check { (folds - 1.0) * self.seconds } else { 0.0 };
+        // Each fold is fitted to all others.
+        Self { seconds: self.seconds + checked, ..self }
+    }
+
     fn and(self, other: Self) -> Self {
         Self { memory_bytes: self.memory_bytes + other.memory_bytes, seconds: self.seconds + other.seconds }
     }

@@ -28,7 +28,10 @@ use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
 use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
 use crate::evaluation::{Evaluation, EvaluationError, Split, evaluate_splits};
-use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue};
+use crate::fit::{
+    ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue,
+    fit_with_interval_check,
+};
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{
     BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, InfluencesAtNodes,
@@ -120,8 +123,20 @@ macro_rules! estimators {
                 }
             }
 
-            /// Fits with a seed, watched. A method that is learnt has a [`ReadingCheck`] beside it.
             fn fit_task(&self, task: FitTask) -> Result<Locator, FitError> {
+                match self {
+                    // The folds of the check need no choice of their own.
+                    Self::Auto => choose(task, None)?.best.fit_task(task),
+                    _ => fit_with_interval_check(self, task),
+                }
+            }
+
+            fn drift_course(&self, task: FitTask, asked: &Recording) -> Option<OffsetCourse> {
+                Influence::offset_course(task, asked).ok().flatten()
+            }
+
+            /// Fits with a seed, watched. A method that is learnt has a [`ReadingCheck`] beside it.
+            fn fit_without_interval_check(&self, task: FitTask) -> Result<Locator, FitError> {
                 task.check_channels()?;
                 let method = self.fit_method(task)?;
                 let mut check = if is_learnt(method.kind()) { ReadingCheck::fit(task)? } else { None };
@@ -430,8 +445,15 @@ impl Locator {
     /// # Errors
     /// [`NoBaseline`] where calibration does not tell what the surface reads untouched.
     pub fn tare(&self) -> Result<Tare<Vec<f64>>, NoBaseline> {
-        // What a locator holds is finite.
-        Tare::new(self.untouched_reading()?).map_err(|_| NoBaseline { kind: self.kind() })
+        let tare = Tare::new(self.untouched_reading()?);
+        let tare = match &self.untouched_drift {
+            Some(drift) => {
+                tare.and_then(|tare| tare.with_drift(drift.last.clone(), drift.reach(self.layout())))
+            }
+            None => tare,
+        };
+        // Channels and values of a locator are checked.
+        tare.map_err(|_| NoBaseline { kind: self.kind() })
     }
 
     /// Locates a reading by a tare of its own, which follows the baseline as [`Tare::follow`] does. `tared` is the tared reading afterwards.
@@ -594,7 +616,7 @@ pub fn take_off_drift(
     watch: Watch,
 ) -> Result<Option<Vec<f64>>, InfluenceFitError> {
     let mut spans: Option<Vec<f64>> = None;
-    for Split { training, judged, offsets } in splits {
+    for Split { training, judged, offsets, .. } in splits {
         *offsets = Influence::offset_course(FitTask::new(setup, training).watch(watch), judged)?;
         for found in offsets.iter().map(OffsetCourse::spans) {
             let spans = spans.get_or_insert_with(|| vec![0.0; found.len()]);

@@ -1,6 +1,6 @@
 //! Simulated calibrations: press a setup with faulty sensors, fit, touch it, locate.
 
-use super::{Evaluation, EvaluationError, Split};
+use super::{Evaluation, EvaluationError, Split, SplitOrigin};
 use crate::arrangement::{Training, all_over};
 use crate::fit::{Fit, FitTask, Fitted, Locate, SeedList};
 use crate::setup::Setup;
@@ -156,7 +156,8 @@ impl Calibration {
         } else {
             simulate_at_watched(&self.pressed, &self.presses, 1, seed, watch)?
         };
-        Ok(Split { training, judged: recording.subset(touched), offsets: None })
+        let judged = recording.subset(touched);
+        Ok(Split { training, judged, offsets: None, origin: SplitOrigin::Calibration })
     }
 
     /// Recordings with `count` seeds from the first on, as [`Calibration::simulate`] makes them.

@@ -7,6 +7,7 @@ pub use palpate_numerics::{median, percentile};
 
 use crate::batch::{BatchError, BatchOptions};
 use crate::fit::{Fit, FitTask, Fitted, Locate, ReadingError};
+use crate::interval_check::{HeldOutEstimate, widen_by_other_folds};
 use crate::load_profile::Cells;
 use crate::offset_course::OffsetCourse;
 use crate::recording::{Fold, Recording, Row, TooFewPositions};
@@ -38,10 +39,13 @@ pub struct Located {
 impl Located {
     /// The contact of a row beside the estimate of its reading.
     fn new(row: &Row, contact: &ContactEstimate, extent: Extent) -> Self {
-        let truth = row.position;
+        Self::of_contact(row.position, row.force_n, contact, extent)
+    }
+
+    fn of_contact(truth: Position, force_n: Option<f64>, contact: &ContactEstimate, extent: Extent) -> Self {
         Self {
             truth,
-            force_n: row.force_n,
+            force_n,
             estimate: contact.position,
             covered: covered(contact, truth, extent),
             interval_score_m: interval_score_m(contact, truth, extent),
@@ -346,6 +350,17 @@ pub struct Split {
     pub judged: Recording,
     /// Offsets at the rows to judge by, to be brought to those that a locator learns; `None` to judge by the readings as they are.
     pub offsets: Option<OffsetCourse>,
+    /// Its origin.
+    pub origin: SplitOrigin,
+}
+
+/// Origin of a split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SplitOrigin {
+    /// A fold of a recording: intervals are widened as those of a locator that is fitted to all of it, by the factor of the other folds.
+    Fold,
+    /// A calibration of its own: intervals are those of the method.
+    Calibration,
 }
 
 /// An evaluation over some splits together, and the time it took.
@@ -370,6 +385,7 @@ impl Split {
             training: recording.subset(&fold.training),
             judged: recording.subset(&fold.held_out),
             offsets: None,
+            origin: SplitOrigin::Fold,
         };
         Ok(folds.iter().map(split).collect())
     }
@@ -387,21 +403,30 @@ pub fn evaluate_splits<E: Fit>(
     clock: &dyn Fn() -> f64,
     watch: Watch,
 ) -> Result<TimedEvaluation, EvaluationError<E::Error>> {
-    let mut evaluation = Evaluation { extent: setup.surface().extent(), located: Vec::new() };
+    let extent = setup.surface().extent();
+    let mut estimates: Vec<HeldOutEstimate> = Vec::new();
     let (mut fitting_s, mut locating_s) = (0.0, 0.0);
-    for split in splits {
+    for (fold, split) in splits.iter().enumerate() {
         let start = clock();
         let task = FitTask { setup, recording: &split.training, seed, watch };
-        let locator = estimator.fit_task(task).map_err(EvaluationError::Fit)?;
+        let locator = estimator.fit_without_interval_check(task).map_err(EvaluationError::Fit)?;
         let fitted = clock();
         let tared = split
             .offsets
             .as_ref()
             .map(|course| course.tared(&split.judged, locator.method.offsets().as_deref()));
-        let part = Evaluation::new(&locator, tared.as_ref().unwrap_or(&split.judged))?;
+        let judged = tared.as_ref().unwrap_or(&split.judged);
+        let found: Vec<HeldOutEstimate> = locator.estimates_of(judged, fold).collect::<Result<_, _>>()?;
         (fitting_s, locating_s) = (fitting_s + (fitted - start), locating_s + (clock() - fitted));
-        evaluation.located.extend(part.located);
+        estimates.extend(found);
     }
+    if splits.iter().all(|split| split.origin == SplitOrigin::Fold) {
+        widen_by_other_folds(&mut estimates, extent);
+    }
+    let located = estimates.iter().map(|HeldOutEstimate { truth, force_n, estimate, .. }| {
+        Located::of_contact(*truth, *force_n, &estimate.contact, extent)
+    });
+    let evaluation = Evaluation { extent, located: located.collect() };
     let readings = evaluation.located.len().max(1) as f64;
     Ok(TimedEvaluation {
         evaluation,

@@ -89,6 +89,10 @@ impl Fit for Influence {
         }
         Ok(InfluenceLocator::Beam(Box::new(self.fit_beam(task)?)))
     }
+
+    fn drift_course(&self, task: FitTask, asked: &Recording) -> Option<OffsetCourse> {
+        Self::offset_course(task, asked).ok().flatten()
+    }
 }
 
 impl Influence {

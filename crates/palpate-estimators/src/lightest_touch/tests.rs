@@ -3,7 +3,7 @@
 use super::*;
 use crate::closed_form::ClosedForm;
 use crate::estimator::{Estimator, Locator, Method};
-use crate::fit::Fit;
+use crate::fit::{Fit, FitTask};
 use crate::fixtures::{Example, paper, plate};
 use crate::influence::{Influence, InfluenceLocator, Structure};
 use crate::recording::Row;
@@ -61,7 +61,8 @@ fn on_a_beam_it_is_true_within_a_tenth() {
             Estimator::ClosedForm(ClosedForm { false_alarm_rate: rate }),
         ];
         for estimator in estimators {
-            let locator = estimator.fit(&setup, &bench.simulate(0)).unwrap();
+            let locator =
+                estimator.fit_without_interval_check(FitTask::new(&setup, &bench.simulate(0))).unwrap();
             let touch = Influence { false_alarm_rate: rate, ..Influence::default() }.lightest_touch(&limit);
             check(&format!("{} at {rate}", locator.kind()), &bench, &locator, &touch, &positions);
         }
@@ -78,7 +79,10 @@ fn on_a_plate_it_is_true_within_a_tenth() {
     let at = |x: f64, y: f64| Position { x_m: x * length_m, y_m: y * width_m };
     let limit = bench.setup.cramer_rao_bound().unwrap();
     let touch = Influence::default().lightest_touch(&limit);
-    let locator = Influence::default().fit(&setup, &bench.simulate(0)).unwrap().into_locator();
+    let locator = Influence::default()
+        .fit_without_interval_check(FitTask::new(&setup, &bench.simulate(0)))
+        .unwrap()
+        .into_locator();
     check("plate", &bench, &locator, &touch, &[at(0.5, 0.5), at(0.2, 0.35)]);
 }
 
@@ -103,7 +107,7 @@ fn on_a_surface_without_a_model_it_is_true_within_a_tenth() {
         });
     }
     let config = Influence { structure: Structure::ForceLinear, ..Influence::default() };
-    let locator = config.fit(&setup, &recording).unwrap().into_locator();
+    let locator = config.fit_without_interval_check(FitTask::new(&setup, &recording)).unwrap().into_locator();
     let Method::Influence(InfluenceLocator::ForceLinear(linear)) = &locator.method else { panic!() };
     let positions = [0.1, 0.2].map(Position::along);
     check("force-linear", &bench, &locator, &linear.lightest_touch(), &positions);

@@ -258,6 +258,14 @@ impl Recording {
         (!untouched.is_empty()).then(|| (0..self.channels.len()).map(channel).collect())
     }
 
+    /// Runs of rows in a row in which nothing touched, by their indices.
+    pub fn rests(&self) -> Vec<Vec<usize>> {
+        let indices: Vec<usize> = (0..self.rows.len()).collect();
+        let touches = |row: &usize| self.rows[*row].touches();
+        let runs = indices.chunk_by(|a, b| touches(a) == touches(b));
+        runs.filter(|run| !touches(&run[0])).map(<[usize]>::to_vec).collect()
+    }
+
     /// One row of each position in which something touched, drawn at random, as presses of a position may come in the order of their depths; `None`
     /// where those are all rows.
     pub fn one_row_a_position(&self, seed: u64) -> Option<Self> {

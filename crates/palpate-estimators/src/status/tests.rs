@@ -4,7 +4,7 @@ use super::*;
 use crate::closed_form::ClosedForm;
 use crate::digit::{DigitEstimator, DigitTheory};
 use crate::estimator::{Estimator, Locator};
-use crate::fit::{Fit, Fitted};
+use crate::fit::{Fit, FitTask, Fitted};
 use crate::fixtures::{Example, beam, digit, paper, plate, raw_recording};
 use crate::influence::{ForceLinearLocator, Influence, InfluenceLocator, Structure};
 use crate::neighbours::Neighbours;
@@ -93,7 +93,8 @@ struct FalseAlarms {
 }
 
 fn false_alarms(case: &Case, setup: &Setup) -> FalseAlarms {
-    let locator = case.estimator.fit(setup, &case.bench.simulate(0)).unwrap();
+    let locator =
+        case.estimator.fit_without_interval_check(FitTask::new(setup, &case.bench.simulate(0))).unwrap();
     let clean = CleanSensors::new(setup.surface().model().unwrap(), setup.layout());
     let (errors, extent) = (ChannelErrors::none(setup.layout()), setup.surface().extent());
     let bound = noise_bound(setup.layout().len(), FalseAlarmRate::DEFAULT);
@@ -252,7 +253,7 @@ fn force_linear_locator() -> Fitted<ForceLinearLocator> {
     let setup = Setup::measured(bench.setup.surface().extent().length_m(), &names).unwrap();
     recording.kinds = setup.layout().kinds();
     let config = Influence { structure: Structure::ForceLinear, ..Influence::default() };
-    config.fit(&setup, &recording).unwrap().map(|method| match method {
+    config.fit_without_interval_check(FitTask::new(&setup, &recording)).unwrap().map(|method| match method {
         InfluenceLocator::ForceLinear(linear) => *linear,
         other => panic!("{other:?}"),
     })
@@ -303,7 +304,7 @@ fn surfaces_with_a_model_exceed_another_rate_no_more_than_the_default_one() {
         estimators.iter().flat_map(|estimator| [Some(3.0), None].map(|force_n| (estimator, force_n)))
     {
         let setup = bench.setup.clone().with_force(force_n).unwrap();
-        let locator = estimator.fit(&setup, &bench.simulate(0)).unwrap();
+        let locator = estimator.fit_without_interval_check(FitTask::new(&setup, &bench.simulate(0))).unwrap();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
         let is_alarm = |_: &usize| {
             let noise = measure(layout, &silence, &errors, &mut rng);
@@ -350,7 +351,7 @@ fn as_many_readings_as_unknowns_can_be_outside_the_model() {
     let pressed = Contact { position: Position::along(0.2), force_n: 3.0 };
     let lifted: Vec<f64> = clean_reading(&beam(), setup.layout(), pressed).iter().map(|r| -r).collect();
     for estimator in [influence(), Estimator::ClosedForm(ClosedForm::default())] {
-        let locator = estimator.fit(&setup, &bench.simulate(0)).unwrap();
+        let locator = estimator.fit_without_interval_check(FitTask::new(&setup, &bench.simulate(0))).unwrap();
         assert_eq!(locator.locate(&lifted).unwrap().status, Status::OutsideModel);
         let outside = (0.0, OUTSIDE_MODEL_RATE);
         let case = Case { name: "two sensors", bench: bench.clone(), estimator, readings: 20_000, outside };
@@ -403,7 +404,7 @@ fn nothing_is_located_whose_interval_is_the_surface() {
         let setup = bench.setup.clone().unknown_force();
         let presses = bench.simulate(0);
         for estimator in [influence(), Estimator::Neighbours(Neighbours::default())] {
-            let locator = estimator.fit(&setup, &presses).unwrap();
+            let locator = estimator.fit_without_interval_check(FitTask::new(&setup, &presses)).unwrap();
             let kind = locator.kind();
             for force_n in forces_n {
                 let [told, open] = left_open(&locator, &bench, force_n, CONTACTS);

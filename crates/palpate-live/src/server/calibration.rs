@@ -16,6 +16,7 @@ use crate::source::{Source, SourceError, SourceUrl};
 use crate::stage::StageUrl;
 use crate::stamp::HostClock;
 use crate::whole_file;
+use palpate_estimators::description;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::recording::{Row, comment_with_placement};
@@ -725,10 +726,12 @@ impl Calibrator {
         let json = locator.to_json().map_err(|error| error.to_string())?;
         whole_file::write(out, json.as_bytes())
             .map_err(|error| format!("cannot write {}: {error}", out.display()))?;
+        let mut remarks = description::interval_check(locator.interval_check.as_ref());
         begin(locator)?;
         self.lock().phase = Phase::Assessing;
         let assessment =
             Assessment::new(rig, &recording, *seed, Watch::NONE).map_err(|error| error.to_string())?;
+        remarks.extend(assessment.remarks);
         let held_out = assessment.held_out;
         let outcome = OutcomeRecord {
             locator: out.display().to_string(),
@@ -738,7 +741,7 @@ impl Calibrator {
             mean_mm: held_out.map(|held_out| held_out.mean_m * 1e3),
             gain_percent: assessment.gain.map(|gain| gain.percent),
             stop_percent: assessment.gain.map(|gain| gain.stop_percent),
-            remarks: assessment.remarks,
+            remarks,
         };
         Ok((outcome, assessment.errors_m))
     }

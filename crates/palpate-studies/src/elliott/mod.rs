@@ -223,6 +223,7 @@ impl Elliott {
                 training: reduce(&setup.trial.training),
                 judged: reduce(&setup.trial.judged),
                 offsets: None,
+                origin: setup.trial.origin,
             };
             let recording = reduce(&setup.moving.recording);
             let moving = TimedRecording { recording, ..setup.moving.clone() };

@@ -1,0 +1,134 @@
+//! Drift of an untouched surface in the course of a recording: how far the untouched reading may have gone by the time of use.
+
+use crate::locator_fault::LocatorFault;
+use crate::recording::Recording;
+use palpate_mechanics::sensing::Layout;
+use palpate_numerics::{mean, normal_quantile};
+use serde::{Deserialize, Serialize};
+
+/// Drift of the untouched reading in the course of a recording.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UntouchedDrift {
+    /// Untouched reading of each channel in the last rest.
+    pub last: Vec<f64>,
+    /// Range of each channel's untouched readings.
+    pub range: Vec<f64>,
+}
+
+impl UntouchedDrift {
+    /// Fewer rests show no drift.
+    const FEWEST_RESTS: usize = 5;
+    /// Of the test that noise does not explain the course of the rests.
+    const SIGNIFICANCE: f64 = 0.05;
+
+    /// The drift between the rests of a recording; `None` where noise explains their course, or the rests are too few.
+    pub fn of_recording(recording: &Recording) -> Option<Self> {
+        let rests = recording.rests();
+        if rests.len() < Self::FEWEST_RESTS {
+            return None;
+        }
+        let channels = recording.channels.len();
+        let value = |row: &usize, channel: usize| recording.rows[*row].reading[channel];
+        let level = |rest: &Vec<usize>, channel: usize| mean(rest.iter().map(|row| value(row, channel)));
+        let levels = |channel| rests.iter().map(|rest| level(rest, channel)).collect::<Vec<f64>>();
+        // Of each channel, so that all together err at this level.
+        let share = Self::SIGNIFICANCE / channels as f64;
+        if !(0..channels).any(|channel| is_drifting(&levels(channel), share)) {
+            return None;
+        }
+        let range = |channel: usize| {
+            let values = || rests.iter().flatten().map(|row| value(row, channel));
+            values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+        };
+        let last = rests.last()?;
+        Some(Self {
+            last: (0..channels).map(|channel| level(last, channel)).collect(),
+            range: (0..channels).map(range).collect(),
+        })
+    }
+
+    /// Largest change of each channel after the last rest that is taken for more drift: that of the recording again. Disabled channels may change by any
+    /// amount.
+    pub fn reach(&self, layout: &Layout) -> Vec<f64> {
+        let reach = |(range, dead): (&f64, bool)| if dead { f64::INFINITY } else { *range };
+        self.range.iter().zip(layout.sensors().iter().map(|sensor| sensor.channel.dead)).map(reach).collect()
+    }
+
+    /// Checks what a file may have got wrong.
+    ///
+    /// # Errors
+    /// [`LocatorFault`], naming what does not fit together.
+    pub fn check(&self, channels: usize) -> Result<(), LocatorFault> {
+        LocatorFault::check_count("last untouched channels", channels, self.last.len())?;
+        LocatorFault::check_count("ranges of untouched channels", channels, self.range.len())?;
+        LocatorFault::check_numbers("last untouched reading", &self.last, |_| true, "a finite number")?;
+        LocatorFault::check_numbers(
+            "range of untouched readings",
+            &self.range,
+            |range| range >= 0.0,
+            "finite and at least 0",
+        )
+    }
+}
+
+/// Whether values in the order of time drift, with this probability of an error where they are independent.
+///
+/// Von Neumann's ratio η = Σ(xᵢ₊₁ − xᵢ)²/Σ(xᵢ − x̄)² has the mean 2 for n independent normal values and the variance 4·(n − 2)/(n² − 1) (*Annals of Mathematical
+/// Statistics* 12, 1941). It is about normal, and small where they drift.
+fn is_drifting(values: &[f64], share: f64) -> bool {
+    let n = values.len() as f64;
+    let average = mean(values.iter().copied());
+    let squares: f64 = values.iter().map(|value| (value - average).powi(2)).sum();
+    let steps: f64 = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+    let bound = 2.0 + normal_quantile(share) * (4.0 * (n - 2.0) / (n * n - 1.0)).sqrt();
+    squares > 0.0 && steps < bound * squares
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Row;
+    use crate::setup::Setup;
+    use palpate_core::Position;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    /// Presses with two untouched rows after each, of noise 1 and a drift of the second channel a press.
+    fn recording(presses: usize, drift: f64, seed: u64) -> Recording {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut row = |force_n: f64, press: usize| {
+            let reading = [0.0, drift].map(|drift| {
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                100.0 * force_n + drift * press as f64 + noise
+            });
+            let position = Position::along(0.1);
+            let (nuisances, time_s, reading) = (Vec::new(), None, reading.to_vec());
+            Row { position, force_n: Some(force_n), nuisances, time_s, reading }
+        };
+        let rows =
+            (0..presses).flat_map(|press| [2.0, 0.0, 0.0].map(|force_n| row(force_n, press))).collect();
+        Recording::new(Setup::measured(0.3, &["a", "b"]).unwrap().layout(), "presses", rows)
+    }
+
+    #[test]
+    fn noise_is_taken_for_a_drift_in_one_of_twenty_recordings() {
+        let drifting = |seed: &u64| UntouchedDrift::of_recording(&recording(20, 0.0, *seed)).is_some();
+        let found = (0..400).filter(drifting).count();
+        // 20 expected, with a standard deviation of 4.4.
+        assert!((7..=33).contains(&found), "{found}");
+    }
+
+    #[test]
+    fn a_drift_is_as_large_as_the_range_of_the_untouched_rows() {
+        let UntouchedDrift { last, range } = UntouchedDrift::of_recording(&recording(20, 2.0, 1)).unwrap();
+        assert!(last[0].abs() < 3.0 && (last[1] - 38.0).abs() < 3.0, "{last:?}");
+        assert!(range[0] < 6.0 && (range[1] - 38.0).abs() < 6.0, "{range:?}");
+    }
+
+    #[test]
+    fn four_rests_show_no_drift() {
+        assert_eq!(UntouchedDrift::of_recording(&recording(4, 50.0, 1)), None);
+    }
+}
