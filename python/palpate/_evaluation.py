@@ -87,6 +87,10 @@ class Comparison(Result):
         Share of the contacts whose error is within the tolerance.
     coverage : ndarray of float64
         Share of the 95 % regions that hold their contact, NaN where there are none.
+    interval_score : ndarray of float64
+        Mean interval score of the 95 % intervals, in metres.
+    force_mean, force_coverage : ndarray of float64
+        Mean error of the estimated forces in newtons, and share of their 95 % intervals that hold the force; NaN where no force is estimated.
     limit_ratio : ndarray of float64
         Mean error over that of an estimator at the limit, NaN where the bench has none.
     fit_seconds, locate_seconds : ndarray of float64
@@ -109,6 +113,9 @@ class Comparison(Result):
     max: Floats
     effective_length: Floats
     coverage: Floats
+    interval_score: Floats
+    force_mean: Floats
+    force_coverage: Floats
     limit_ratio: Floats
     fit_seconds: Floats
     locate_seconds: Floats
@@ -134,6 +141,9 @@ class Comparison(Result):
             "max error [mm]": 1e3 * self.max,
             f"within {1e3 * self.tolerance:g} mm [%]": 100 * self.effective_length,
             "covered [%]": 100 * self.coverage,
+            "interval score [mm]": 1e3 * self.interval_score,
+            "mean force error [N]": self.force_mean,
+            "force covered [%]": 100 * self.force_coverage,
             "times the limit": self.limit_ratio,
             "fit [s]": self.fit_seconds,
             "a reading [us]": 1e6 * self.locate_seconds,
@@ -321,4 +331,5 @@ def _columns(evaluation: Evaluation) -> dict[str, Any]:
         columns["estimated y [mm]"] = 1e3 * evaluation.estimated_y
     columns["error [mm]"] = 1e3 * evaluation.error
     columns["covered"] = evaluation.covered
+    columns["estimated force [N]"] = evaluation.estimated_force
     return columns

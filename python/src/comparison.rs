@@ -218,6 +218,10 @@ fn columns(fields: &Fields<'_>, comparisons: &[Comparison], tolerance_m: f64) ->
     fields
         .column("effective_length", evaluations().map(|of| Some(share(of.effective_percent(tolerance_m)))))?;
     fields.column("coverage", evaluations().map(|of| of.coverage_percent().map(share)))?;
+    fields.column("interval_score", evaluations().map(evaluation::Evaluation::interval_score_m))?;
+    let forces = || evaluations().map(evaluation::Evaluation::force_summary);
+    fields.column("force_mean", forces().map(|forces| Some(forces?.average_n)))?;
+    fields.column("force_coverage", forces().map(|forces| Some(share(forces?.coverage_percent))))?;
     fields.column("fit_seconds", comparisons.iter().map(|comparison| Some(comparison.tried.fit_seconds)))?;
     let locate_s = |comparison: &Comparison| Some(1e-9 * comparison.tried.locate_ns);
     fields.column("locate_seconds", comparisons.iter().map(locate_s))

@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use palpate::estimators::evaluation::{self, ErrorSummary, Located, Portion, limit_ratio, percentage_error};
+use palpate::estimators::estimator::Status;
+use palpate::estimators::evaluation::{
+    self, ErrorSummary, Located, LocatedForce, Portion, limit_ratio, percentage_error,
+};
 use palpate::estimators::setup;
 use palpate::mechanics::contact::Position;
 use palpate::mechanics::surface::Extent;
@@ -67,6 +70,8 @@ impl Evaluation {
         fields.column("error", located().map(|located| Some(located.error_m())))?;
         fields.column("covered", located().map(|located| located.covered.map(f64::from)))?;
         fields.column("interval_score", located().map(|located| located.interval_score_m))?;
+        let force = |located: &Located| located.force.map(|force| force.estimate_n);
+        fields.column("estimated_force", located().map(force))?;
         Ok(fields.into_dict())
     }
 
@@ -153,6 +158,44 @@ impl Evaluation {
     #[getter]
     fn interval_score(&self) -> Option<f64> {
         self.inner.interval_score_m()
+    }
+
+    /// Share of the contacts whose estimate has each status, by the status; None where statuses were not kept.
+    ///
+    /// Returns
+    /// -------
+    /// dict of float
+    #[getter]
+    fn statuses<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(percents) = self.inner.status_percents() else { return Ok(None) };
+        let fields = Fields::new(py);
+        percents.iter().try_for_each(|(status, percent)| fields.set(status.name(), percent / 100.0))?;
+        Ok(Some(fields.into_dict()))
+    }
+
+    /// Forces that the locator estimated, in newtons, NaN where it estimated none: of the shape (contacts).
+    #[getter]
+    fn estimated_force<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.field(py, "estimated_force")
+    }
+
+    /// Summary of the errors of estimated forces; None where the locator estimates none, or the contacts' are not known.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     "count"; "mean", "median", "p95" and "max" of the absolute errors in newtons; "coverage", the share of the 95 % intervals that hold
+    ///     the force.
+    fn force_summary<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(forces) = self.inner.force_summary() else { return Ok(None) };
+        let fields = Fields::new(py);
+        fields.set("count", forces.count)?;
+        fields.set("mean", forces.average_n)?;
+        fields.set("median", forces.median_n)?;
+        fields.set("p95", forces.p95_n)?;
+        fields.set("max", forces.largest_n)?;
+        fields.set("coverage", forces.coverage_percent / 100.0)?;
+        Ok(Some(fields.into_dict()))
     }
 
     /// Mean error over that of an estimator at the limit, where the bench has one; None elsewhere.
@@ -258,7 +301,7 @@ impl Evaluation {
     /// Returns
     /// -------
     /// ndarray
-    ///     Of the shape (contacts), with the fields "x", "force", "estimated_x", "error", "covered", "interval_score", and on a plane "y" and
+    ///     Of the shape (contacts), with the fields "x", "force", "estimated_x", "error", "covered", "interval_score", "estimated_force", and on a plane "y" and
     ///     "estimated_y".
     fn to_numpy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         py.import("palpate._results")?.call_method1("structured", (self.fields(py)?,))
@@ -341,15 +384,28 @@ fn figure(value: f64) -> String {
     four.to_string()
 }
 
-/// A contact as values that Python pickles: truth, force, estimate, whether it is covered, interval score.
-type PackedContact = ((f64, f64), Option<f64>, (f64, f64), Option<bool>, Option<f64>);
+/// A contact as values that Python pickles: truth, force, estimate, whether it is covered, interval score, number of the status in
+/// `Status::ALL`, estimated force and whether that is covered.
+type PackedContact =
+    ((f64, f64), Option<f64>, (f64, f64), Option<bool>, Option<f64>, Option<usize>, Option<(f64, bool)>);
 
 fn packed(located: &Located) -> PackedContact {
-    let Located { truth, force_n, estimate, covered, interval_score_m } = *located;
-    ((truth.x_m, truth.y_m), force_n, (estimate.x_m, estimate.y_m), covered, interval_score_m)
+    let Located { truth, force_n, estimate, covered, interval_score_m, status, force } = *located;
+    let status = status.and_then(|status| Status::ALL.iter().position(|of| *of == status));
+    let force = force.map(|force| (force.estimate_n, force.covered));
+    ((truth.x_m, truth.y_m), force_n, (estimate.x_m, estimate.y_m), covered, interval_score_m, status, force)
 }
 
-fn unpacked((truth, force_n, estimate, covered, interval_score_m): PackedContact) -> Located {
+fn unpacked((truth, force_n, estimate, covered, interval_score_m, status, force): PackedContact) -> Located {
     let position = |(x_m, y_m)| Position { x_m, y_m };
-    Located { truth: position(truth), force_n, estimate: position(estimate), covered, interval_score_m }
+    let force = force.map(|(estimate_n, covered)| LocatedForce { estimate_n, covered });
+    Located {
+        truth: position(truth),
+        force_n,
+        estimate: position(estimate),
+        covered,
+        interval_score_m,
+        status: status.and_then(|number| Status::ALL.get(number).copied()),
+        force,
+    }
 }

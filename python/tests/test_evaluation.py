@@ -49,6 +49,26 @@ def test_a_locator_is_judged_as_the_command_judges(command, examples, tmp_path):
     assert_same_errors(locator.evaluate(recording), told)
 
 
+def test_forces_and_statuses_are_judged_as_the_command_judges(command, tmp_path):
+    setup = pp.Setup(pp.Beam("400 mm", "40 mm", "1.2 mm", "200 GPa"), pp.deflection(8, noise="5 um"))
+    presses = setup.simulate(pp.even(24), force="3 N", repeats=2)
+    locator = pp.Influence().fit(presses)
+    locator.save(tmp_path / "locator.json")
+    check = locator.interval_check
+    assert check["places"] == 24 and check["position"]["factor"] >= 1 and check["force"]["before_percent"] > 50
+    again = setup.simulate(pp.even(30), force="2 N", seed=4)
+    again.to_csv(tmp_path / "again.csv")
+    told = json.loads(command("evaluate", tmp_path / "locator.json", "--json", "--data", tmp_path / "again.csv"))
+    evaluation = locator.evaluate(again)
+    forces = evaluation.force_summary()
+    for name in ("count", "mean", "median", "p95", "max"):
+        assert near(forces[name], told["force_errors_n"][name])
+    assert near(100 * forces["coverage"], told["force_errors_n"]["coverage_95"])
+    assert near(forces["mean"], np.mean(np.abs(evaluation.estimated_force - 2)))
+    assert {name: 100 * share for name, share in evaluation.statuses.items()} == pytest.approx(told["statuses_percent"])
+    assert pickle.loads(pickle.dumps(evaluation)) == evaluation
+
+
 def test_a_plate_is_judged_as_the_command_judges(command, plate, tmp_path):
     locator = pp.GaussianProcess().fit(plate.simulate(pp.grid(6, 4), seed=1))
     locator.save(tmp_path / "locator.json")

@@ -8,6 +8,7 @@ use palpate_estimators::evaluation::Evaluation;
 use palpate_estimators::recording::{Provenance, csv_row};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
+use std::collections::BTreeMap;
 
 /// The file with the errors of each position.
 pub const ERRORS_CSV: &str = "errors.csv";
@@ -54,8 +55,8 @@ pub fn position_cells(position: Position, extent: Extent) -> Vec<String> {
     extent.coordinates_m(position).map(|at_m| cell(Some(at_m * 1e3))).collect()
 }
 
-/// Columns of errors in millimetres, and of the share of the 95 % regions that hold their contact.
-pub const ERROR_COLUMNS: [&str; 7] = [
+/// Columns of errors in millimetres and newtons, and of the shares of the 95 % regions and of the force's 95 % intervals that hold their contact.
+pub const ERROR_COLUMNS: [&str; 9] = [
     "readings",
     "mean_error_mm",
     "median_error_mm",
@@ -63,6 +64,8 @@ pub const ERROR_COLUMNS: [&str; 7] = [
     "rms_error_mm",
     "max_error_mm",
     "covered_percent",
+    "mean_force_error_n",
+    "force_covered_percent",
 ];
 
 /// Cells of [`ERROR_COLUMNS`].
@@ -72,7 +75,39 @@ pub fn error_cells(evaluation: &Evaluation) -> Vec<String> {
     let mut cells = vec![errors.count.to_string()];
     cells.extend(figures_m.map(|error_m| cell(Some(error_m * 1e3))));
     cells.push(cell(evaluation.coverage_percent()));
+    let forces = evaluation.force_summary();
+    cells.push(cell(forces.map(|forces| forces.average_n)));
+    cells.push(cell(forces.map(|forces| forces.coverage_percent)));
     cells
+}
+
+/// Share of the answers with each status in %, by its name; `None` where statuses were not kept.
+pub fn status_percents(evaluation: &Evaluation) -> Option<BTreeMap<&'static str, f64>> {
+    let percents = evaluation.status_percents()?;
+    Some(percents.into_iter().map(|(status, percent)| (status.name(), percent)).collect())
+}
+
+/// Errors of estimated forces as JSON has them.
+#[derive(serde::Serialize)]
+pub struct ForceErrors {
+    count: usize,
+    mean: f64,
+    median: f64,
+    p95: f64,
+    max: f64,
+    coverage_95: f64,
+}
+
+/// The errors of estimated forces; `None` where there are none.
+pub fn force_errors(evaluation: &Evaluation) -> Option<ForceErrors> {
+    evaluation.force_summary().map(|forces| ForceErrors {
+        count: forces.count,
+        mean: forces.average_n,
+        median: forces.median_n,
+        p95: forces.p95_n,
+        max: forces.largest_n,
+        coverage_95: forces.coverage_percent,
+    })
 }
 
 /// The files of a recording with their digests, in words.

@@ -116,6 +116,10 @@ impl Estimate {
 }
 
 impl Status {
+    /// Every status.
+    pub const ALL: [Self; 5] =
+        [Self::Located, Self::NoContact, Self::Ambiguous, Self::OutsideModel, Self::OutsideSurface];
+
     /// Its name in files and on streams.
     pub const fn name(self) -> &'static str {
         match self {

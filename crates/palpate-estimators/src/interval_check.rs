@@ -191,16 +191,15 @@ fn position_ratio(held_out: &HeldOutEstimate, extent: Extent) -> Option<f64> {
 }
 
 fn force_ratio(held_out: &HeldOutEstimate) -> Option<f64> {
-    let contact = held_out.estimate.contact;
-    let (uncertainty, estimate_n) = (contact.uncertainty?, contact.force_n?);
+    let contact = &held_out.estimate.contact;
+    Some(ratio_of(force_interval_n(contact)?, contact.force_n?, held_out.force_n?))
+}
+
+/// The 95 % interval of an estimated force, in newtons; `None` of a force that is known, and of none.
+pub(crate) fn force_interval_n(contact: &ContactEstimate) -> Option<(f64, f64)> {
+    let (uncertainty, force_n) = (contact.uncertainty?, contact.force_n?);
     let sd_n = uncertainty.covariance[5].sqrt();
-    let interval = match uncertainty.force_95_n {
-        Some(interval) => interval,
-        None if sd_n > 0.0 => normal_interval_95(estimate_n, sd_n),
-        // A force that is known, not estimated.
-        None => return None,
-    };
-    Some(ratio_of(interval, estimate_n, held_out.force_n?))
+    uncertainty.force_95_n.or_else(|| (sd_n > 0.0).then(|| normal_interval_95(force_n, sd_n)))
 }
 
 impl Widening {

@@ -79,7 +79,8 @@ impl ComparisonReport<'_> {
         };
         let caption = html! {
             "Location errors in mm, best mean first; 95th percentile and root mean square (RMS). Effective: share of the readings within "
-            (number(self.tolerance_m * 1e3)) " mm. Covered: share of the 95 % intervals that hold the contact. × limit: mean \
+            (number(self.tolerance_m * 1e3)) " mm. Covered: share of the 95 % intervals that hold the contact. Score: mean interval score, \
+             small where narrow intervals hold the contact. Force: mean error of the force. × limit: mean \
              error over what physics allows, where the limit is at most " (small)
             " of the length, 1/80 of it away from the ends. A dash: the estimator or the bench has none."
         };
@@ -87,7 +88,8 @@ impl ComparisonReport<'_> {
             let evaluation = &comparison.tried.evaluation;
             Some((comparison, evaluation, evaluation.summary(None)?))
         });
-        Table::from_rows(tried)
+        let has_forces = self.comparisons.iter().any(|of| of.tried.evaluation.force_summary().is_some());
+        let table = Table::from_rows(tried)
             .short("estimator", |(comparison, ..)| comparison.estimator.kind())
             .mm("mean", |(.., summary)| summary.average_m)
             .number("% of length", |(_, of, summary)| {
@@ -98,6 +100,17 @@ impl ComparisonReport<'_> {
             .mm("RMS", |(.., summary)| summary.rmse_m)
             .number("effective, %", |(_, evaluation, _)| evaluation.effective_percent(self.tolerance_m))
             .number("covered, %", |(_, evaluation, _)| evaluation.coverage_percent())
+            .mm("score", |(_, evaluation, _)| evaluation.interval_score_m());
+        let table = if has_forces {
+            table
+                .number("force, N", |(_, of, _)| of.force_summary().map(|forces| forces.average_n))
+                .number("force covered, %", |(_, of, _)| {
+                    of.force_summary().map(|forces| forces.coverage_percent)
+                })
+        } else {
+            table
+        };
+        table
             .number("× limit", |(_, evaluation, _)| limit_ratio(self.setup, evaluation))
             .number("fit, ms", |(comparison, ..)| comparison.tried.fit_seconds * 1e3)
             .number("a reading, µs", |(comparison, ..)| comparison.tried.locate_ns * 1e-3)

@@ -90,6 +90,30 @@ impl EvaluationReport<'_> {
                 }
                 li { "Within " (mm(self.tolerance_m)) " mm: " b { (number(effective)) " %" } " of the readings." }
             }
+            @if let (Some(percent), Some(score_m)) =
+                (self.evaluation.coverage_percent(), self.evaluation.interval_score_m())
+            {
+                li {
+                    "95 % intervals: " b { (number(percent)) " %" } " of the contacts in them, mean interval score "
+                    (number(score_m * 1e3)) " mm."
+                }
+            }
+            @if let Some(forces) = self.evaluation.force_summary() {
+                li {
+                    "Force: average error " b { (number(forces.average_n)) " N" } ", largest " (number(forces.largest_n)) " N; "
+                    (number(forces.coverage_percent)) " % in their 95 % intervals."
+                }
+            }
+            @if let Some(statuses) = self.evaluation.status_percents() {
+                li {
+                    "Statuses: "
+                    (statuses.iter().filter(|(_, percent)| *percent > 0.0)
+                        .map(|(status, percent)| format!("{} % {}", number(*percent), status.name()))
+                        .collect::<Vec<_>>()
+                        .join(", "))
+                    "."
+                }
+            }
         }
     }
 

@@ -294,8 +294,12 @@ pub struct TrainedSeed {
 }
 
 impl From<Calibrated<Method>> for TrainedSeed {
-    fn from(Calibrated { seed, locator, evaluation }: Calibrated<Method>) -> Self {
+    fn from(Calibrated { seed, locator, mut evaluation }: Calibrated<Method>) -> Self {
         let training = locator.training_outcome();
+        // Files of a study have neither, and its results do not depend on whether a fit comes from one.
+        for located in &mut evaluation.located {
+            (located.status, located.force) = (None, None);
+        }
         Self { seed, training, weights: locator.weights().to_vec(), evaluation }
     }
 }

@@ -12,7 +12,7 @@ use crate::tare::{TareOption, tare_splits};
 use crate::target::{Inputs, TargetFolder};
 use crate::{input, output, progress, tables};
 use palpate_estimators::estimator::{self, CompareOptions, Compared, Comparison, contenders};
-use palpate_estimators::evaluation::{Evaluation, Split, limit_ratio, percentage_error};
+use palpate_estimators::evaluation::{Evaluation, ForceSummary, Split, limit_ratio, percentage_error};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Progress, Watch};
 use palpate_report::{ComparisonReport, comparison_report};
@@ -242,6 +242,9 @@ fn json_row(rig: &Rig, comparison: &Comparison, arguments: &Arguments) -> Option
         "error_percent": percentage_error(summary.average_m, evaluation.extent.length_m()),
         "effective_percent": evaluation.effective_percent(arguments.tolerance),
         "coverage_95": evaluation.coverage_percent(),
+        "interval_score_mm": evaluation.interval_score_m().map(|score_m| score_m * 1e3),
+        "statuses_percent": tables::status_percents(evaluation),
+        "force_errors_n": tables::force_errors(evaluation),
         "limit_ratio": limit_ratio(&rig.setup, evaluation),
         "fit_seconds": comparison.tried.fit_seconds,
         "locate_ns": comparison.tried.locate_ns,
@@ -254,7 +257,8 @@ fn table(rig: &Rig, comparisons: &[Comparison], arguments: &Arguments) -> String
         Some((comparison, evaluation, evaluation.summary(None)?))
     });
     let or_dash = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
-    Table::from_rows(rows)
+    let has_forces = comparisons.iter().any(|of| of.tried.evaluation.force_summary().is_some());
+    let table = Table::from_rows(rows)
         .column("error, mm (% of length)", |(comparison, ..)| comparison.estimator.kind().to_owned())
         .column("mean", |(_, evaluation, summary)| {
             let percent = percentage_error(summary.average_m, evaluation.extent.length_m());
@@ -267,6 +271,19 @@ fn table(rig: &Rig, comparisons: &[Comparison], arguments: &Arguments) -> String
         .column("95 % covers, %", |(_, evaluation, _)| {
             or_dash(evaluation.coverage_percent().map(|percent| format!("{percent:.1}")))
         })
+        .column("score, mm", |(_, evaluation, _)| {
+            or_dash(evaluation.interval_score_m().map(|score_m| format!("{:.3}", score_m * 1e3)))
+        });
+    let table = if has_forces {
+        table.column("force: mean, N (95 % covers, %)", |(_, evaluation, _)| {
+            let in_words =
+                |forces: ForceSummary| format!("{:.3} ({:.1})", forces.average_n, forces.coverage_percent);
+            or_dash(evaluation.force_summary().map(in_words))
+        })
+    } else {
+        table
+    };
+    table
         .column("× limit", |(_, evaluation, _)| {
             or_dash(limit_ratio(&rig.setup, evaluation).map(|ratio| format!("{ratio:.3}")))
         })

@@ -14,7 +14,7 @@ use crate::{input, output, tables};
 use palpate_estimators::arrangement::all_over;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{
-    ErrorSummary, Evaluation, Portion, Split, evaluate_splits, percentage_error,
+    ErrorSummary, Evaluation, ForceSummary, Portion, Split, evaluate_splits, percentage_error,
 };
 use palpate_estimators::recording::{Provenance, Recording};
 use palpate_estimators::simulate::simulate_at_watched;
@@ -137,7 +137,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         "effective_percent": evaluation.effective_percent(arguments.tolerance),
         "coverage_95": evaluation.coverage_percent(),
         "interval_score_mm": evaluation.interval_score_m().map(|score_m| score_m * 1e3),
+        "statuses_percent": tables::status_percents(evaluation),
         "errors": errors,
+        "force_errors_n": tables::force_errors(evaluation),
     })
 }
 
@@ -290,6 +292,19 @@ fn print(
         output::say(format!(
             "95 % intervals: {percent:.1} % of the contacts in them, interval score {score}"
         ))?;
+    }
+    if let Some(forces) = answers.evaluation.force_summary() {
+        let ForceSummary { average_n, median_n, p95_n, largest_n, coverage_percent, .. } = forces;
+        output::say(format!(
+            "error of the force: average {average_n:.3} N, median {median_n:.3} N, 95th percentile {p95_n:.3} N, largest {largest_n:.3} N; \
+             {coverage_percent:.1} % in their 95 % intervals"
+        ))?;
+    }
+    if let Some(statuses) = answers.evaluation.status_percents() {
+        let shares = statuses.iter().filter(|(_, percent)| *percent > 0.0);
+        let shares: Vec<String> =
+            shares.map(|(status, percent)| format!("{percent:.1} % `{}`", status.name())).collect();
+        output::say(format!("statuses: {}", shares.join(", ")))?;
     }
     output::say_report("", arguments.out.as_deref())
 }

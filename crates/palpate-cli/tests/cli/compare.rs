@@ -184,8 +184,8 @@ fn tables_stand_beside_the_reports() {
         read("page/errors.csv")
             .starts_with("# palpate 0.1.0, estimators compared on rig.toml, 2 simulated calibrations")
     );
-    let figures =
-        "readings,mean_error_mm,median_error_mm,p95_error_mm,rms_error_mm,max_error_mm,covered_percent";
+    let figures = "readings,mean_error_mm,median_error_mm,p95_error_mm,rms_error_mm,max_error_mm,covered_percent,\
+                   mean_force_error_n,force_covered_percent";
     let (errors, trials) = (rows("page/errors.csv"), rows("page/trials.csv"));
     assert_eq!(errors[0].join(","), format!("estimator,position_mm,{figures}"));
     assert_eq!(trials[0].join(","), format!("estimator,trial,{figures}"));

@@ -1,7 +1,8 @@
 //! Comparison of estimators on the same trials.
 
+use super::trial_splits::TrialSplits;
 use super::{Estimator, FitCost};
-use crate::evaluation::{Split, TimedEvaluation, evaluate_splits};
+use crate::evaluation::{Split, TimedEvaluation};
 use crate::setup::Setup;
 use palpate_numerics::watch::{Cancelled, Watch};
 
@@ -83,6 +84,7 @@ pub fn compare(
 ) -> Result<Compared, Cancelled> {
     let mut compared = Compared::default();
     let of = contenders.len();
+    let splits = TrialSplits::new(setup, trials, options.seed, options.clock);
     for (done, estimator) in contenders.into_iter().enumerate() {
         let kind = estimator.kind();
         let observe = || options.watch.counted(kind, "estimators", done, of);
@@ -93,7 +95,7 @@ pub fn compare(
             continue;
         }
         let go_on = |_| observe().is_ok();
-        match evaluate_splits(setup, &estimator, trials, options.seed, options.clock, Watch::new(&go_on)) {
+        match splits.evaluate(&estimator, Watch::new(&go_on)) {
             Ok(tried) => compared.comparisons.push(Comparison { estimator, tried }),
             Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
             Err(error) => compared.left_out.push((kind, error.to_string())),

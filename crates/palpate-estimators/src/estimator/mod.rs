@@ -5,6 +5,7 @@ mod cost;
 mod locator_file;
 mod memory;
 mod settings;
+mod trial_splits;
 
 pub use crate::fit::{LocatorProvenance, ReadingError};
 pub use crate::load_profile::{
@@ -23,11 +24,12 @@ pub use settings::Setting;
 
 use std::borrow::Cow;
 use std::sync::Arc;
+use trial_splits::TrialSplits;
 
 use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
 use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
-use crate::evaluation::{Evaluation, EvaluationError, Split, evaluate_splits};
+use crate::evaluation::{Evaluation, EvaluationError, Split};
 use crate::fit::{
     ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue,
     fit_with_interval_check,
@@ -137,14 +139,12 @@ macro_rules! estimators {
 
             /// Fits with a seed, watched. A method that is learnt has a [`ReadingCheck`] beside it.
             fn fit_without_interval_check(&self, task: FitTask) -> Result<Locator, FitError> {
-                task.check_channels()?;
-                let method = self.fit_method(task)?;
-                let mut check = if is_learnt(method.kind()) { ReadingCheck::fit(task)? } else { None };
-                if method.knows_its_errors() && let Some(by) = check {
-                    check = Some(by.keeping_intervals(task, |reading| method.locate(reading))?);
+                if let Self::Auto = self {
+                    return choose(task, None)?.best.fit_without_interval_check(task);
                 }
-                let locator = Fitted { check: check.map(Box::new), ..Fitted::new(task, method) };
-                Ok(locator.with_scatter_of(task.recording))
+                task.check_channels()?;
+                let check = if is_learnt(self.kind()) { ReadingCheck::fit(task)? } else { None };
+                self.fit_beside_check(task, check)
             }
 
             fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Locator>) -> Result<(), FitError> {
@@ -205,6 +205,22 @@ estimators! {
 /// True of kinds that go from a reading to a position and do not know what a contact reads: these have a [`ReadingCheck`].
 pub(crate) fn is_learnt(kind: &str) -> bool {
     matches!(kind, "network" | "network-lm" | "gaussian-process" | "neighbours" | "centroid")
+}
+
+impl Estimator {
+    /// Fits the method beside a reading check that was fitted to the same recording; none for one that needs none.
+    fn fit_beside_check(&self, task: FitTask, check: Option<ReadingCheck>) -> Result<Locator, FitError> {
+        task.check_channels()?;
+        let method = self.fit_method(task)?;
+        let check = match check {
+            Some(by) if method.knows_its_errors() => {
+                Some(by.keeping_intervals(task, |reading| method.locate(reading))?)
+            }
+            check => check,
+        };
+        let locator = Fitted { check: check.map(Box::new), ..Fitted::new(task, method) };
+        Ok(locator.with_scatter_of(task.recording))
+    }
 }
 
 impl Method {
@@ -668,10 +684,11 @@ pub fn choose(task: FitTask, limit: Option<TimeLimit>) -> Result<Choice, FitErro
     let (mut tried, mut left_out, mut last) = (Vec::new(), Vec::new(), None);
     let contenders = contenders(setup, &Estimator::Auto, recording.rows.len());
     let count = contenders.len();
+    let trials = TrialSplits::new(setup, &splits, seed, &|| 0.0);
     for (done, estimator) in contenders.into_iter().enumerate() {
         let kind = estimator.kind();
         watch.counted("trying estimators", "estimators", done, count)?;
-        match evaluate_splits(setup, &estimator, &splits, seed, &|| 0.0, limited) {
+        match trials.evaluate(&estimator, limited) {
             Ok(one) => {
                 if let Some(outcome) = Tried::of_evaluation(kind, &one.evaluation) {
                     tried.push((estimator, outcome));

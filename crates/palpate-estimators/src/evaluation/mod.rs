@@ -7,13 +7,13 @@ pub use palpate_numerics::{median, percentile};
 
 use crate::batch::{BatchError, BatchOptions};
 use crate::fit::{Fit, FitTask, Fitted, Locate, ReadingError};
-use crate::interval_check::{HeldOutEstimate, widen_by_other_folds};
+use crate::interval_check::{HeldOutEstimate, force_interval_n, widen_by_other_folds};
 use crate::load_profile::Cells;
 use crate::offset_course::OffsetCourse;
 use crate::recording::{Fold, Recording, Row, TooFewPositions};
 use crate::setup::Setup;
 use crate::simulate::SimulateError;
-use palpate_core::{ContactEstimate, Estimate};
+use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::Ldl;
@@ -34,21 +34,58 @@ pub struct Located {
     pub covered: Option<bool>,
     /// Score of the locator's 95 % intervals in metres, where it has them: see [`Evaluation::interval_score_m`].
     pub interval_score_m: Option<f64>,
+    /// Status of the estimate; `None` where only its position was kept.
+    pub status: Option<Status>,
+    /// Force that the locator estimated, where it did and the contact's is known.
+    pub force: Option<LocatedForce>,
+}
+
+/// Estimated force of one reading's contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocatedForce {
+    /// Force that the locator gave, in newtons.
+    pub estimate_n: f64,
+    /// Whether its 95 % interval holds the contact's force.
+    pub covered: bool,
+}
+
+/// Summary of the errors of estimated forces.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct ForceSummary {
+    /// Number of forces.
+    pub count: usize,
+    /// Mean of the absolute errors, in newtons.
+    pub average_n: f64,
+    /// Their median, in newtons.
+    pub median_n: f64,
+    /// Their 95th percentile, in newtons.
+    pub p95_n: f64,
+    /// The largest, in newtons.
+    pub largest_n: f64,
+    /// Share of the 95 % intervals that hold the force, in %.
+    pub coverage_percent: f64,
 }
 
 impl Located {
     /// The contact of a row beside the estimate of its reading.
-    fn new(row: &Row, contact: &ContactEstimate, extent: Extent) -> Self {
-        Self::of_contact(row.position, row.force_n, contact, extent)
+    fn new(row: &Row, estimate: &Estimate, extent: Extent) -> Self {
+        Self::of_contact(row.position, row.force_n, estimate, extent)
     }
 
-    fn of_contact(truth: Position, force_n: Option<f64>, contact: &ContactEstimate, extent: Extent) -> Self {
+    fn of_contact(truth: Position, force_n: Option<f64>, estimate: &Estimate, extent: Extent) -> Self {
+        let contact = &estimate.contact;
+        let force = || {
+            let (low, high) = force_interval_n(contact)?;
+            Some(LocatedForce { estimate_n: contact.force_n?, covered: (low..=high).contains(&force_n?) })
+        };
         Self {
             truth,
             force_n,
             estimate: contact.position,
             covered: covered(contact, truth, extent),
             interval_score_m: interval_score_m(contact, truth, extent),
+            status: Some(estimate.status),
+            force: force(),
         }
     }
 
@@ -148,7 +185,7 @@ impl Evaluation {
     pub fn new<M: Locate>(locator: &Fitted<M>, recording: &Recording) -> Result<Self, ReadingError> {
         let extent = locator.setup.surface().extent();
         let rows = recording.rows.iter().filter(|row| row.touches());
-        let located = rows.map(|row| Ok(Located::new(row, &locator.locate(&row.reading)?.contact, extent)));
+        let located = rows.map(|row| Ok(Located::new(row, &locator.locate(&row.reading)?, extent)));
         Ok(Self { extent, located: located.collect::<Result<_, _>>()? })
     }
 
@@ -177,7 +214,7 @@ impl Evaluation {
         // One thread takes the blocks one after the other.
         let take = |first: usize, estimates: &[Estimate]| {
             let judged = rows[first..].iter().zip(estimates);
-            let judged = judged.map(|(row, estimate)| Located::new(row, &estimate.contact, extent));
+            let judged = judged.map(|(row, estimate)| Located::new(row, estimate, extent));
             located.lock().unwrap_or_else(PoisonError::into_inner).extend(judged);
         };
         locator.locate_blocks(&readings, BatchOptions { watch, ..BatchOptions::default() }, &take)?;
@@ -210,6 +247,40 @@ impl Evaluation {
         let told: Vec<bool> = self.located.iter().filter_map(|located| located.covered).collect();
         let held = told.iter().filter(|covered| **covered).count();
         (!told.is_empty()).then(|| 100.0 * held as f64 / told.len() as f64)
+    }
+
+    /// Share of the answers with each status, in %, in the order of [`Status::ALL`]; `None` where statuses were not kept.
+    pub fn status_percents(&self) -> Option<Vec<(Status, f64)>> {
+        let statuses: Option<Vec<Status>> = self.located.iter().map(|located| located.status).collect();
+        let statuses = statuses.filter(|statuses| !statuses.is_empty())?;
+        let percent = |status: Status| {
+            let count = statuses.iter().filter(|of| **of == status).count();
+            (status, 100.0 * count as f64 / statuses.len() as f64)
+        };
+        Some(Status::ALL.into_iter().map(percent).collect())
+    }
+
+    /// Errors of the estimated forces; `None` where the locator estimates none, or the contacts' are not known.
+    pub fn force_summary(&self) -> Option<ForceSummary> {
+        let forces: Vec<(f64, bool)> = self
+            .located
+            .iter()
+            .filter_map(|located| {
+                let force = located.force?;
+                Some(((force.estimate_n - located.force_n?).abs(), force.covered))
+            })
+            .collect();
+        let mut errors_n: Vec<f64> = forces.iter().map(|(error_n, _)| *error_n).collect();
+        errors_n.sort_by(f64::total_cmp);
+        let covered = forces.iter().filter(|(_, covered)| *covered).count();
+        Some(ForceSummary {
+            count: errors_n.len(),
+            average_n: mean(errors_n.iter().copied()),
+            median_n: percentile(&errors_n, 50.0)?,
+            p95_n: percentile(&errors_n, 95.0)?,
+            largest_n: *errors_n.last()?,
+            coverage_percent: 100.0 * covered as f64 / forces.len() as f64,
+        })
     }
 
     /// Mean interval score of the 95 % intervals, in metres: narrow intervals that hold the contact are good ones, and the score is least on
@@ -403,13 +474,26 @@ pub fn evaluate_splits<E: Fit>(
     clock: &dyn Fn() -> f64,
     watch: Watch,
 ) -> Result<TimedEvaluation, EvaluationError<E::Error>> {
+    let fit = |_, task: FitTask| Ok((estimator.fit_without_interval_check(task)?, 0.0));
+    evaluate_splits_by(setup, splits, seed, clock, watch, fit)
+}
+
+/// The same with the locators of `fit`, which takes the number of a split, and gives seconds that a fit would have taken longer by itself.
+pub(crate) fn evaluate_splits_by<M: Locate, E: std::error::Error>(
+    setup: &Setup,
+    splits: &[Split],
+    seed: u64,
+    clock: &dyn Fn() -> f64,
+    watch: Watch,
+    fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
+) -> Result<TimedEvaluation, EvaluationError<E>> {
     let extent = setup.surface().extent();
     let mut estimates: Vec<HeldOutEstimate> = Vec::new();
     let (mut fitting_s, mut locating_s) = (0.0, 0.0);
     for (fold, split) in splits.iter().enumerate() {
         let start = clock();
         let task = FitTask { setup, recording: &split.training, seed, watch };
-        let locator = estimator.fit_without_interval_check(task).map_err(EvaluationError::Fit)?;
+        let (locator, shared_s) = fit(fold, task).map_err(EvaluationError::Fit)?;
         let fitted = clock();
         let tared = split
             .offsets
@@ -417,14 +501,14 @@ pub fn evaluate_splits<E: Fit>(
             .map(|course| course.tared(&split.judged, locator.method.offsets().as_deref()));
         let judged = tared.as_ref().unwrap_or(&split.judged);
         let found: Vec<HeldOutEstimate> = locator.estimates_of(judged, fold).collect::<Result<_, _>>()?;
-        (fitting_s, locating_s) = (fitting_s + (fitted - start), locating_s + (clock() - fitted));
+        (fitting_s, locating_s) = (fitting_s + (fitted - start) + shared_s, locating_s + (clock() - fitted));
         estimates.extend(found);
     }
     if splits.iter().all(|split| split.origin == SplitOrigin::Fold) {
         widen_by_other_folds(&mut estimates, extent);
     }
     let located = estimates.iter().map(|HeldOutEstimate { truth, force_n, estimate, .. }| {
-        Located::of_contact(*truth, *force_n, &estimate.contact, extent)
+        Located::of_contact(*truth, *force_n, estimate, extent)
     });
     let evaluation = Evaluation { extent, located: located.collect() };
     let readings = evaluation.located.len().max(1) as f64;

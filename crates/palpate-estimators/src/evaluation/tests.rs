@@ -7,7 +7,15 @@ fn evaluation() -> Evaluation {
     let located = (1..=10).map(|k| {
         let truth = Position::along(f64::from(k) * 0.01 - 0.005);
         let estimate = Position::along(truth.x_m + f64::from(k) * 0.5e-3);
-        Located { truth, force_n: None, estimate, covered: None, interval_score_m: None }
+        Located {
+            truth,
+            force_n: None,
+            estimate,
+            covered: None,
+            interval_score_m: None,
+            status: None,
+            force: None,
+        }
     });
     Evaluation { extent: Extent::line(0.1).unwrap(), located: located.collect() }
 }

@@ -53,6 +53,8 @@ fn errors_are_folded_over_the_gaps() {
         estimate: Position::along(x_m + error_m),
         covered: None,
         interval_score_m: None,
+        status: None,
+        force: None,
     };
     // Over a sensor, in the middle of a gap, and beyond the outermost sensor.
     let located = vec![off(0.1, 1e-3), off(0.2, 3e-3), off(0.25, 8e-3), off(0.05, 1.0)];

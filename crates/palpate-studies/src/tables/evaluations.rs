@@ -72,6 +72,8 @@ pub fn read(study: &PreparedStudy, row: &str) -> Result<Trained, RowProblem> {
             estimate: Position::along(estimates_m[i].ok_or_else(|| not_finite(ESTIMATES, NOT_TOLD))?),
             covered: held[i],
             interval_score_m: scores_m[i],
+            status: None,
+            force: None,
         });
     }
     let extent = study.study.arms[arm].rig.setup.surface().extent();

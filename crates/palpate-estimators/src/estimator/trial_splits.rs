@@ -1,0 +1,59 @@
+//! Splits on which several estimators are tried: learnt methods share the reading check of each.
+
+use super::{Estimator, FitError, Locator, is_learnt};
+use crate::evaluation::{EvaluationError, Split, TimedEvaluation, evaluate_splits_by};
+use crate::fit::FitTask;
+use crate::reading_check::ReadingCheck;
+use crate::setup::Setup;
+use palpate_numerics::watch::Watch;
+use std::cell::OnceCell;
+
+/// Splits on which estimators are tried, with the reading check of each, which is fitted once.
+pub(super) struct TrialSplits<'a> {
+    setup: &'a Setup,
+    splits: &'a [Split],
+    seed: u64,
+    clock: &'a dyn Fn() -> f64,
+    checks: Vec<OnceCell<TimedCheck>>,
+}
+
+/// A reading check, and the seconds that its fit took.
+struct TimedCheck {
+    check: Option<ReadingCheck>,
+    seconds: f64,
+}
+
+impl<'a> TrialSplits<'a> {
+    pub fn new(setup: &'a Setup, splits: &'a [Split], seed: u64, clock: &'a dyn Fn() -> f64) -> Self {
+        Self { setup, splits, seed, clock, checks: splits.iter().map(|_| OnceCell::new()).collect() }
+    }
+
+    /// Evaluates an estimator as [`evaluate_splits`](crate::evaluation::evaluate_splits) does. The time of a shared check counts for each estimator that has one.
+    pub fn evaluate(
+        &self,
+        estimator: &Estimator,
+        watch: Watch,
+    ) -> Result<TimedEvaluation, EvaluationError<FitError>> {
+        let fit = |split: usize, task: FitTask<'_>| self.fit(estimator, split, task);
+        evaluate_splits_by(self.setup, self.splits, self.seed, self.clock, watch, fit)
+    }
+
+    /// The locator of a split, and the seconds that its check took before.
+    fn fit(&self, estimator: &Estimator, split: usize, task: FitTask) -> Result<(Locator, f64), FitError> {
+        if !is_learnt(estimator.kind()) {
+            return Ok((estimator.fit_beside_check(task, None)?, 0.0));
+        }
+        let cell = &self.checks[split];
+        let known_s = cell.get().map_or(0.0, |known| known.seconds);
+        let TimedCheck { check, .. } = match cell.get() {
+            Some(known) => known,
+            None => {
+                task.check_channels()?;
+                let start = (self.clock)();
+                let check = ReadingCheck::fit(task)?;
+                cell.get_or_init(|| TimedCheck { check, seconds: (self.clock)() - start })
+            }
+        };
+        Ok((estimator.fit_beside_check(task, check.clone())?, known_s))
+    }
+}
