@@ -47,7 +47,7 @@ pub(crate) struct ImperfectionsKeys {
     pub touch_width: Option<At<NotNegative<Length>>>,
     /// Share by which a deviation as large as the range falls short of a linear one; 0 unless said otherwise.
     pub saturation: Option<Fraction>,
-    /// Force whose largest deviation over the surface is the range of a channel; that of [training] or [contact] unless said otherwise.
+    /// Force whose largest deviation over the surface is the range of a channel; that of the presses unless said otherwise.
     pub range_force: Option<Positive<Force>>,
     /// Time for which nothing touches before each press, and after the last; 4 s unless said otherwise.
     pub rest: Option<Positive<Time>>,
@@ -81,12 +81,11 @@ impl RelaxationKeys {
 const HOUR_S: f64 = 3600.0;
 
 impl At<ImperfectionsKeys> {
-    /// The imperfections of a surface whose sensors all measure `dimension`, if they do; `press_force_n` is the force of the presses.
+    /// The imperfections of a surface whose sensors all measure `dimension`, if they do.
     pub fn build(
         &self,
         surface: &SurfaceSpec,
         dimension: Option<Dimension>,
-        press_force_n: Option<f64>,
     ) -> Result<Imperfections, RigError> {
         if surface.model().is_none() {
             return Err(self.place.unused("a `measured` surface, which has no model to simulate"));
@@ -111,7 +110,7 @@ impl At<ImperfectionsKeys> {
             repeated_readings: self.repeated_readings.map_or(0, |rows| rows.get() as u32),
             touch_width_m: self.touch_width_m(surface)?,
             saturation: share(&self.saturation),
-            range_force_n: self.range_force.map(|force| force.si).or(press_force_n),
+            range_force_n: self.range_force.map(|force| force.si),
             schedule: self.schedule(),
         })
     }

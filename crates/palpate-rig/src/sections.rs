@@ -134,9 +134,7 @@ impl RigSections {
         let mut dimensions = setup.layout().sensors().iter().map(|sensor| sensor.kind.dimension());
         let first = dimensions.next();
         let dimension = first.filter(|first| dimensions.all(|other| other == *first));
-        let pressed_n =
-            self.0.training.as_ref().and_then(|training| training.force.as_ref()).map(|force| force.si);
-        let imperfections = keys.build(setup.surface(), dimension, pressed_n.or(setup.force_n()))?;
+        let imperfections = keys.build(setup.surface(), dimension)?;
         setup
             .with_imperfections(imperfections)
             .map_err(|error| RigProblem::Setup(error).at_place(&keys.place))

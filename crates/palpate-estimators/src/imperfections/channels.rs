@@ -24,6 +24,8 @@ pub struct ImperfectChannels {
 pub struct BenchState {
     /// Seed of gains, offsets and places of the bench.
     pub seed: u64,
+    /// Force under which the ranges of its channels were taken, in newtons.
+    pub range_force_n: f64,
     /// Time since its start, in seconds.
     pub time_s: f64,
     /// State of each channel.

@@ -35,6 +35,7 @@ pub struct SimulatedBench<'a> {
     rng: Xoshiro256PlusPlus,
     noise: StandardNoise,
     channels: Option<ImperfectChannels>,
+    range_force_n: f64,
     seed: u64,
 }
 
@@ -79,6 +80,7 @@ impl<'a> SimulatedBench<'a> {
             rng,
             noise: StandardNoise::new(None),
             channels: None,
+            range_force_n: 0.0,
             seed,
         })
     }
@@ -87,7 +89,8 @@ impl<'a> SimulatedBench<'a> {
     #[must_use]
     pub fn with_imperfections(mut self, imperfections: Imperfections, range_force_n: f64) -> Self {
         let untouched = self.clean(&[]);
-        let ranges = self.ranges(&untouched, imperfections.range_force_n.unwrap_or(range_force_n));
+        self.range_force_n = imperfections.range_force_n.unwrap_or(range_force_n);
+        let ranges = self.ranges(&untouched, self.range_force_n);
         self.noise = StandardNoise::new(Some(&imperfections));
         self.channels = Some(ImperfectChannels::new(imperfections, &untouched, &ranges, self.seed));
         self
@@ -152,7 +155,12 @@ impl<'a> SimulatedBench<'a> {
     /// State of the imperfections, from which [`SimulatedBench::resumed`] goes on; `None` without imperfections.
     pub fn state(&self) -> Option<BenchState> {
         let channels = self.channels.as_ref()?;
-        Some(BenchState { seed: self.seed, time_s: channels.time_s(), channels: channels.states().to_vec() })
+        Some(BenchState {
+            seed: self.seed,
+            range_force_n: self.range_force_n,
+            time_s: channels.time_s(),
+            channels: channels.states().to_vec(),
+        })
     }
 
     /// Largest deviation of each channel from its untouched reading, under a force on a grid of positions.

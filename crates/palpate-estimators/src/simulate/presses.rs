@@ -47,6 +47,16 @@ impl<'a> PressedBench<'a> {
         let largest_n = presses.iter().map(|press| press.contact.force_n.abs()).reduce(f64::max);
         let force_n = setup.force_n().or(largest_n.filter(|force_n| *force_n > 0.0));
         let force_n = imperfections.range_force_n.or(force_n).ok_or(SimulateError::NoForce)?;
+        Self::with_range_force(setup, force_n, seed, watch)
+    }
+
+    fn with_range_force(
+        setup: &'a Setup,
+        force_n: f64,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<Self, SimulateError> {
+        let imperfections = setup.imperfections().copied().unwrap_or_default();
         let bench = SimulatedBench::perfect_watched(setup, seed, watch)?;
         let bench = bench.with_imperfections(imperfections, force_n);
         let places = Xoshiro256PlusPlus::seed_from_u64(seed ^ PLACES);
@@ -60,7 +70,7 @@ impl<'a> PressedBench<'a> {
         seed: u64,
         watch: Watch,
     ) -> Result<Self, SimulateError> {
-        let pressed = Self::new(setup, &[], state.seed, watch)?;
+        let pressed = Self::with_range_force(setup, state.range_force_n, state.seed, watch)?;
         Ok(Self { bench: pressed.bench.resumed(state, seed), seed, ..pressed })
     }
 
