@@ -9,7 +9,7 @@ use palpate::estimators::batch::{BLOCK, BatchError, BatchOptions};
 use palpate::estimators::estimator;
 use palpate::estimators::evaluation;
 use palpate::estimators::setup;
-use palpate::estimators::simulate::simulate_at_watched;
+use palpate::estimators::simulate::simulate_use_watched;
 use palpate::numerics::watch::Watch;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -175,7 +175,13 @@ impl Locator {
             }
             None => {
                 let simulated = work::run_quietly_with(py, |watch| {
-                    simulate_at_watched(&self.setup, &all_over(extent), 1, seed, watch)
+                    simulate_use_watched(
+                        &self.setup,
+                        &self.inner.provenance.recording,
+                        &all_over(extent),
+                        seed,
+                        watch,
+                    )
                 })?;
                 made =
                     simulated.map_err(|error| refused(format!("{error}; give a recording to judge by")))?;

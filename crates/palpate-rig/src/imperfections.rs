@@ -2,9 +2,9 @@
 
 use serde::Deserialize;
 
-use palpate_estimators::imperfections::{Amount, Drift, Imperfections, Relaxation, Schedule};
+use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation, Schedule};
 use palpate_mechanics::surface::SurfaceSpec;
-use palpate_mechanics::units::Dimension;
+use palpate_mechanics::units::{Dimension, format_length_mm};
 
 use crate::document::At;
 use crate::error::RigError;
@@ -95,7 +95,7 @@ impl At<ImperfectionsKeys> {
         let drift = |line: &Option<At<ShareOrQuantity>>, random: &Option<At<ShareOrQuantity>>| {
             let line_per_s = amount::<Finite>(line, dimension, 1.0 / HOUR_S)?;
             let walk_per_root_s = amount::<AtLeastZero>(random, dimension, 1.0 / HOUR_S.sqrt())?;
-            Ok::<_, RigError>(Drift { line_per_s, walk_per_root_s })
+            Ok::<_, RigError>(OffsetDrift { line_per_s, walk_per_root_s })
         };
         Ok(Imperfections {
             hysteresis: share(&self.hysteresis),
@@ -132,7 +132,12 @@ impl At<ImperfectionsKeys> {
             Some(width) if width.si > 0.0 && matches!(surface, SurfaceSpec::Digit(_)) => {
                 Err(width.place.unused("a digit, whose readings under several forces do not add up"))
             }
-            Some(width) => Ok(width.si),
+            Some(width) => {
+                let shortest_m = surface.extent().sides_m().fold(f64::INFINITY, f64::min);
+                let bound =
+                    format!("less than {}, the shortest side of the surface", format_length_mm(shortest_m));
+                if width.si < shortest_m { Ok(width.si) } else { Err(width.place.refuse(bound)) }
+            }
         }
     }
 

@@ -17,7 +17,7 @@ use palpate_estimators::evaluation::{
     ErrorSummary, Evaluation, Portion, Split, evaluate_splits, percentage_error,
 };
 use palpate_estimators::recording::{Provenance, Recording};
-use palpate_estimators::simulate::simulate_at_watched;
+use palpate_estimators::simulate::simulate_use_watched;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_length_mm};
 use palpate_report::{EvaluationReport, Judged, evaluation_report};
@@ -199,11 +199,13 @@ fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
     Complaint::new(error).help("--data names a recording to judge by")
 }
 
-/// The bench pressed all over: for the paper's beam at every millimetre, on a plane in the middles of about 400 cells.
+/// The bench pressed all over after its calibration: for the paper's beam at every millimetre, on a plane in the middles of about 400 cells.
 fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
     let positions = all_over(locator.setup.surface().extent());
     Observer::of_stages()
-        .watch(|watch| simulate_at_watched(&locator.setup, &positions, 1, seed, watch))
+        .watch(|watch| {
+            simulate_use_watched(&locator.setup, &locator.provenance.recording, &positions, seed, watch)
+        })
         .map_err(|error| Failure::of_work(error, simulation_complaint))
 }
 

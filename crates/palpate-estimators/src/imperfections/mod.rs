@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use palpate_estimators::arrangement::Training;
-/// use palpate_estimators::imperfections::{Amount, Drift, Imperfections, Relaxation};
+/// use palpate_estimators::imperfections::{Amount, OffsetDrift, Imperfections, Relaxation};
 /// use palpate_estimators::setup::Setup;
 /// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
 ///
@@ -34,7 +34,7 @@ use serde::{Deserialize, Serialize};
 /// let worn = setup.with_imperfections(Imperfections {
 ///     hysteresis: 0.01,
 ///     residue: Relaxation { share: 0.02, time_s: 20.0 },
-///     common_drift: Drift { line_per_s: Amount::Share(0.02 / 3600.0), ..Drift::default() },
+///     common_drift: OffsetDrift { line_per_s: Amount::Share(0.02 / 3600.0), ..OffsetDrift::default() },
 ///     ..Imperfections::default()
 /// })?;
 /// let recording = worn.simulate(&Training::even(10), 0)?;
@@ -53,9 +53,9 @@ pub struct Imperfections {
     /// Share of the largest deviation of a touch that remains after it, and the time constant in which it fades; below 1.
     pub residue: Relaxation,
     /// Drift of the offset of each channel by itself; the line goes up and down in channels in turn.
-    pub drift: Drift,
+    pub drift: OffsetDrift,
     /// Drift of the offset that all channels share, as of the temperature.
-    pub common_drift: Drift,
+    pub common_drift: OffsetDrift,
     /// Drift of the gain of each channel by itself in a second: a line, up and down in channels in turn.
     pub gain_drift_per_s: f64,
     /// Drift of the gain that all channels share in a second: a line.
@@ -103,7 +103,7 @@ pub enum Amount {
 /// Drift of an offset: a line and a random walk.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Drift {
+pub struct OffsetDrift {
     /// Slope of the line, in a second.
     pub line_per_s: Amount,
     /// Standard deviation of the walk after a second; it grows with the root of the time.

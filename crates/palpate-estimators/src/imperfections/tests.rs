@@ -10,8 +10,8 @@ fn channels(imperfections: Imperfections, untouched: &[f64], ranges: &[f64]) -> 
 #[test]
 fn drift_and_creep_follow_their_formulas() {
     let imperfections = Imperfections {
-        drift: Drift { line_per_s: Amount::Value(0.5), ..Drift::default() },
-        common_drift: Drift { line_per_s: Amount::Share(0.01), ..Drift::default() },
+        drift: OffsetDrift { line_per_s: Amount::Value(0.5), ..OffsetDrift::default() },
+        common_drift: OffsetDrift { line_per_s: Amount::Share(0.01), ..OffsetDrift::default() },
         creep: [Relaxation { share: 0.2, time_s: 2.0 }, Relaxation { share: 0.1, time_s: 30.0 }],
         ..Imperfections::default()
     };
@@ -52,7 +52,7 @@ fn one_long_step_equals_many_short_ones() {
 
 #[test]
 fn random_walks_grow_with_the_root_of_time_and_may_be_shared() {
-    let walk = Drift { walk_per_root_s: Amount::Value(2.0), ..Drift::default() };
+    let walk = OffsetDrift { walk_per_root_s: Amount::Value(2.0), ..OffsetDrift::default() };
     let after_9_s = |imperfections: Imperfections| {
         let mut channels = channels(imperfections, &[0.0; 400], &[1.0; 400]);
         (0..900).fold(Vec::new(), |_, _| channels.advance(&[0.0; 400], 0.01))
@@ -148,7 +148,10 @@ fn numbers_out_of_range_are_refused_by_name() {
         Imperfections { creep: [Relaxation { share: 0.6, time_s: 1.0 }; 2], ..none },
         Imperfections { residue: Relaxation { share: f64::NAN, time_s: 1.0 }, ..none },
         Imperfections { common_gain_drift_per_s: f64::INFINITY, ..none },
-        Imperfections { drift: Drift { walk_per_root_s: Amount::Value(-1.0), ..Drift::default() }, ..none },
+        Imperfections {
+            drift: OffsetDrift { walk_per_root_s: Amount::Value(-1.0), ..OffsetDrift::default() },
+            ..none
+        },
         Imperfections { noise_freedom: Some(2.0), ..none },
         Imperfections { touch_width_m: 0.1, ..none },
         Imperfections { range_force_n: Some(0.0), ..none },

@@ -8,7 +8,7 @@ use crate::fixtures::{
     Example, along_the_beam, faulty_paper, moving_beam, moving_plate, over_the_plate, paper, plate, strip,
     swinging_beam,
 };
-use crate::imperfections::{Amount, Drift, Imperfections, Schedule};
+use crate::imperfections::{Amount, Imperfections, OffsetDrift, Schedule};
 use crate::setup::SetupError;
 use palpate_mechanics::sensing::ChannelModel;
 
@@ -252,7 +252,7 @@ fn a_fast_logger_repeats_its_readings() {
 fn calibration_and_use_are_one_bench_that_goes_on() {
     let imperfections = Imperfections {
         hysteresis: 0.02,
-        common_drift: Drift { line_per_s: Amount::Share(1e-5), walk_per_root_s: Amount::Share(1e-3) },
+        common_drift: OffsetDrift { line_per_s: Amount::Share(1e-5), walk_per_root_s: Amount::Share(1e-3) },
         schedule: Schedule { pause_s: 600.0, ..Schedule::default() },
         ..Imperfections::default()
     };
@@ -301,7 +301,7 @@ fn moving_contacts_and_loads_leave_hysteresis_and_drift_behind() {
     let imperfections = Imperfections {
         hysteresis: 0.1,
         touch_width_m: 5e-3,
-        common_drift: Drift { line_per_s: Amount::Share(1e-2), ..Drift::default() },
+        common_drift: OffsetDrift { line_per_s: Amount::Share(1e-2), ..OffsetDrift::default() },
         ..Imperfections::default()
     };
     let worn = setup.clone().with_imperfections(imperfections).unwrap();

@@ -1,5 +1,5 @@
 use super::*;
-use palpate_estimators::imperfections::{Amount, Drift, Imperfections, Relaxation, Schedule};
+use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation, Schedule};
 
 fn with(keys: &str) -> String {
     format!("{PAPER}\n[imperfections]\n{keys}\n")
@@ -31,7 +31,7 @@ fn every_imperfection_can_be_given() {
         pause = "10 min"
         "#,
     );
-    let drift = |line_per_s, walk_per_root_s| Drift { line_per_s, walk_per_root_s };
+    let drift = |line_per_s, walk_per_root_s| OffsetDrift { line_per_s, walk_per_root_s };
     let expected = Imperfections {
         hysteresis: 0.02,
         creep: [Relaxation { share: 0.03, time_s: 5.0 }, Relaxation { share: 0.01, time_s: 60.0 }],
