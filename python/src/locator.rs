@@ -9,7 +9,7 @@ use palpate::estimators::batch::{BLOCK, BatchError, BatchOptions};
 use palpate::estimators::estimator;
 use palpate::estimators::evaluation;
 use palpate::estimators::setup;
-use palpate::estimators::simulate::simulate_use_watched;
+use palpate::estimators::simulate::{contacts_at, simulate_use_watched};
 use palpate::numerics::watch::Watch;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -175,10 +175,11 @@ impl Locator {
             }
             None => {
                 let simulated = work::run_quietly_with(py, |watch| {
+                    let contacts = contacts_at(&self.setup, &all_over(extent))?;
                     simulate_use_watched(
                         &self.setup,
                         &self.inner.provenance.recording,
-                        &all_over(extent),
+                        &contacts,
                         seed,
                         watch,
                     )

@@ -161,32 +161,35 @@ pub fn simulate_at_watched(
     simulate_contacts_watched(setup, &contacts_at(setup, positions)?, repeats, seed, watch)
 }
 
-/// Contacts with the force of a bench that has a model.
-fn contacts_at(setup: &Setup, positions: &[Position]) -> Result<Vec<Contact>, SimulateError> {
+/// Contacts at positions with the force of a bench that has a model.
+///
+/// # Errors
+/// [`SimulateError::NoModel`] and [`SimulateError::NoForce`].
+pub fn contacts_at(setup: &Setup, positions: &[Position]) -> Result<Vec<Contact>, SimulateError> {
     setup.surface().model().ok_or(SimulateError::NoModel)?;
     let force_n = setup.force_n().ok_or(SimulateError::NoForce)?;
     Ok(positions.iter().map(|position| Contact { position: *position, force_n }).collect())
 }
 
-/// Presses a calibrated bench in use at each of `positions`, once, and records it, watched. A bench with imperfections is the one of the calibration,
+/// Touches a calibrated bench in use with each of `contacts`, once, and records it, watched. A bench with imperfections is the one of the calibration,
 /// whose provenance this is, after the pause of its schedule; the seed draws noise and random walks from there on. Another bench is drawn from
-/// the seed as by [`simulate_at`].
+/// the seed as by [`simulate_contacts`].
 ///
 /// # Errors
-/// Those of [`simulate_at_watched`].
+/// Those of [`simulate_contacts_watched`].
 pub fn simulate_use_watched(
     setup: &Setup,
     calibration: &Provenance,
-    positions: &[Position],
+    contacts: &[Contact],
     seed: u64,
     watch: Watch,
 ) -> Result<Recording, SimulateError> {
     let (Some(_), Some(state)) = (setup.imperfections(), &calibration.bench) else {
-        return simulate_at_watched(setup, positions, 1, seed, watch);
+        return simulate_contacts_watched(setup, contacts, 1, seed, watch);
     };
-    let presses: Vec<Press> =
-        contacts_at(setup, positions)?.into_iter().map(|contact| Press { contact, rows: 1 }).collect();
-    OffSurface::check("position", positions, setup.surface().extent())?;
+    let positions: Vec<Position> = contacts.iter().map(|contact| contact.position).collect();
+    OffSurface::check("position", &positions, setup.surface().extent())?;
+    let presses: Vec<Press> = contacts.iter().map(|contact| Press { contact: *contact, rows: 1 }).collect();
     let mut bench = PressedBench::resumed(setup, state, seed, watch)?;
     bench.pause();
     bench.record(&presses, None, watch)

@@ -17,9 +17,10 @@ use palpate_estimators::evaluation::{
     ErrorSummary, Evaluation, Portion, Split, evaluate_splits, percentage_error,
 };
 use palpate_estimators::recording::{Provenance, Recording};
-use palpate_estimators::simulate::simulate_use_watched;
+use palpate_estimators::simulate::{contacts_at, simulate_use_watched};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_length_mm};
+use palpate_numerics::watch::Watch;
 use palpate_report::{EvaluationReport, Judged, evaluation_report};
 use palpate_rig::Rig;
 use std::path::PathBuf;
@@ -201,12 +202,13 @@ fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
 
 /// The bench pressed all over after its calibration: for the paper's beam at every millimetre, on a plane in the middles of about 400 cells.
 fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
+    let calibration = &locator.provenance.recording;
     let positions = all_over(locator.setup.surface().extent());
-    Observer::of_stages()
-        .watch(|watch| {
-            simulate_use_watched(&locator.setup, &locator.provenance.recording, &positions, seed, watch)
-        })
-        .map_err(|error| Failure::of_work(error, simulation_complaint))
+    let simulate = |watch: Watch| {
+        let contacts = contacts_at(&locator.setup, &positions)?;
+        simulate_use_watched(&locator.setup, calibration, &contacts, seed, watch)
+    };
+    Observer::of_stages().watch(simulate).map_err(|error| Failure::of_work(error, simulation_complaint))
 }
 
 fn warn_of_training_data(locator: &Locator, recording: &Recording) {

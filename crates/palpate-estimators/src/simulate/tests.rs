@@ -264,7 +264,7 @@ fn calibration_and_use_are_one_bench_that_goes_on() {
         [split.training.rows.last(), split.judged.rows.first()].map(|row| row.unwrap().time_s.unwrap());
     assert!((start_s - end_s - 604.0).abs() < 1e-9, "{start_s} {end_s}");
     // Evaluating a locator goes on as well: with other walks, but from the same offsets.
-    let contacts = [Position::along(0.1)];
+    let contacts = [Contact { position: Position::along(0.1), force_n: 3.0 }];
     let used =
         simulate_use_watched(&example.setup, &split.training.provenance, &contacts, 9, Watch::NONE).unwrap();
     assert_eq!(used.rows[0].time_s, Some(start_s));
