@@ -124,7 +124,7 @@ impl Setup {
         let positions = training.positions(self.surface().extent())?;
         let pressed = self.pressed_by(training)?;
         let contacts = contacts_at(&pressed, &positions)?;
-        simulate_presses(&pressed, &contacts, training.repeats, training.placement_sd_m, seed, watch)
+        simulate_presses_watched(&pressed, &contacts, training.repeats, training.placement_sd_m, seed, watch)
     }
 }
 
@@ -219,11 +219,15 @@ pub fn simulate_contacts_watched(
     seed: u64,
     watch: Watch,
 ) -> Result<Recording, SimulateError> {
-    simulate_presses(setup, contacts, repeats, None, seed, watch)
+    simulate_presses_watched(setup, contacts, repeats, None, seed, watch)
 }
 
-/// The same by a person who misses the places by this standard deviation, where the bench has imperfections.
-fn simulate_presses(
+/// Presses of these contacts, watched, by a person who misses their places by this standard deviation in each direction, in metres, where the bench
+/// has imperfections; see [`simulate_contacts`].
+///
+/// # Errors
+/// Those of [`simulate_contacts_watched`].
+pub fn simulate_presses_watched(
     setup: &Setup,
     contacts: &[Contact],
     repeats: usize,

@@ -128,16 +128,18 @@ impl RigSections {
         })
     }
 
-    /// The setup with the imperfections of `[imperfections]`.
-    fn with_imperfections(&self, setup: Setup) -> Result<Setup, RigError> {
+    /// A setup with the imperfections of `[imperfections]`, where the text has this section.
+    ///
+    /// # Errors
+    /// [`RigError`] for imperfections that do not go with the setup.
+    pub fn with_imperfections(&self, setup: Setup) -> Result<Setup, RigError> {
         let Some(keys) = &self.0.imperfections else { return Ok(setup) };
         let mut dimensions = setup.layout().sensors().iter().map(|sensor| sensor.kind.dimension());
         let first = dimensions.next();
         let dimension = first.filter(|first| dimensions.all(|other| other == *first));
         let imperfections = keys.build(setup.surface(), dimension)?;
-        setup
-            .with_imperfections(imperfections)
-            .map_err(|error| RigProblem::Setup(error).at_place(&keys.place))
+        let setup = setup.with_imperfections(imperfections);
+        setup.map_err(|error| RigProblem::Setup(error).at_place(&keys.place))
     }
 
     /// `[training]` on a setup, of which the readings can be simulated or are recorded.

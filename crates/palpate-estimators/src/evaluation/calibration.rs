@@ -138,8 +138,8 @@ impl Calibration {
     /// Recordings of the presses to fit and of the contacts to judge. Both are read by the same faulty channels: their gains and offsets are the first
     /// draws of a seed. A reading's noise depends on the seed and on how many come before it alone.
     ///
-    /// With imperfections one bench makes both recordings, one after the other: equal presses in a row are one press that is read so often,
-    /// and untouched rows stand between presses and between contacts.
+    /// With imperfections one bench makes both recordings, one after the other: equal presses in a row are one press that is read so often, and
+    /// untouched rows stand between presses.
     ///
     /// # Errors
     /// [`SimulateError`] when the setup has no model or no force, or a position lies off the surface.
@@ -179,8 +179,8 @@ impl Calibration {
         let mut bench = PressedBench::new(&self.pressed, &presses, seed, watch)?;
         let training = bench.record(&presses, self.placement_sd_m, watch)?;
         bench.pause();
-        let judged = bench.record(&Press::from_rows(&self.contacts()?), None, watch)?;
-        Ok(Split { training, judged, offsets: None })
+        let judged = bench.record(&Press::from_rows(&self.contacts()?), None, watch)?.touched().into_owned();
+        Ok(Split { training, judged, offsets: None, origin: SplitOrigin::Calibration })
     }
 
     /// Recordings with `count` seeds from the first on, as [`Calibration::simulate`] makes them.

@@ -123,8 +123,7 @@ impl ChannelState {
         let saturated = saturate(x, range, imperfections.saturation);
         let half = 0.5 * imperfections.hysteresis * range;
         self.play = self.play.max(saturated - half).min(saturated + half);
-        let crept = self.creep(self.play, imperfections, step_s);
-        crept + self.leave_residue(crept, imperfections, step_s)
+        self.creep(self.play, imperfections, step_s) + self.leave_residue(self.play, imperfections, step_s)
     }
 
     /// The share c of each creep follows by z' = (x − z)/τ: (1 − Σc)·x + Σ c·z.
