@@ -5,7 +5,7 @@ use anyhow::{Context, Result, ensure};
 use palpate::estimators::arrangement::cells;
 use palpate::estimators::estimator::Locator;
 use palpate::estimators::imperfections::Imperfections;
-use palpate::estimators::simulate::{simulate_contacts, simulate_use_watched};
+use palpate::estimators::simulate::{simulate_presses_watched, simulate_use_watched};
 use palpate::numerics::random_order;
 use palpate::prelude::{
     Contact, Estimator, Evaluation, Extent, Fit, FitTask, Influence, Position, Recording, Rig, Row, Setup,
@@ -46,7 +46,7 @@ pub struct Bench<'a> {
     pub knowledge: Knowledge,
 }
 
-/// Untouched rows of each rest: as many as a person tares with.
+/// Untouched rows of each rest in use: as many as a person tares with.
 const UNTOUCHED_ROWS: u32 = 10;
 /// Forces in turn, as multiples of that of the presses: of contacts in use, and of calibrations of raw channels.
 const FORCE_SHARES: [f64; 3] = [1.0, 0.5, 2.0];
@@ -70,27 +70,28 @@ impl Bench<'_> {
     /// Calibrates the bench, and touches it at about `contacts` places.
     pub fn record(&self, contacts: usize, seed: u64) -> Result<Recordings> {
         let setup = self.setup()?;
-        let training = self.rig.training()?;
+        let mut training = self.rig.training()?.clone();
+        if self.world == World::Clean {
+            training.placement_sd_m = None;
+        }
         let force_n = training.force_n.or(setup.force_n()).context("the rig has no force of its presses")?;
         let calibration = match self.knowledge {
-            Knowledge::Model => setup.simulate(training, seed)?,
+            Knowledge::Model => setup.simulate(&training, seed)?,
             Knowledge::Measured => {
                 let places = training.positions(setup.surface().extent())?;
-                let presses = places.iter().flat_map(|place| with_shares(*place, force_n));
-                simulate_contacts(&setup.pressed_by(training)?, &presses.collect::<Vec<_>>(), 1, seed)?
+                let (pressed, presses) = (setup.pressed_by(&training)?, in_turn(&places, force_n));
+                let (repeats, placement_sd_m) = (training.repeats, training.placement_sd_m);
+                simulate_presses_watched(&pressed, &presses, repeats, placement_sd_m, seed, Watch::NONE)?
             }
         };
         let places = shuffled(all_over(setup.surface().extent(), contacts), seed);
-        let touched: Vec<Contact> = places
-            .iter()
-            .zip(FORCE_SHARES.iter().cycle())
-            .map(|(position, share)| Contact { position: *position, force_n: share * force_n })
-            .collect();
+        let touched = in_turn(&places, force_n);
         let provenance = &calibration.provenance;
+        let used = setup.clone().with_imperfections(with_many_untouched_rows(&setup)?)?;
         // Streams of noise of their own.
-        let touches = simulate_use_watched(&setup, provenance, &touched, seed.wrapping_add(1), Watch::NONE)?;
+        let touches = simulate_use_watched(&used, provenance, &touched, seed.wrapping_add(1), Watch::NONE)?;
         let light = light_touches(&setup, &places)?;
-        let light = simulate_use_watched(&setup, provenance, &light, seed.wrapping_add(2), Watch::NONE)?;
+        let light = simulate_use_watched(&used, provenance, &light, seed.wrapping_add(2), Watch::NONE)?;
         let known = self.known(&setup)?;
         let known_by = |recording: Recording| Recording { kinds: known.layout().kinds(), ..recording };
         Ok(Recordings {
@@ -105,11 +106,10 @@ impl Bench<'_> {
     fn setup(&self) -> Result<Setup> {
         let mut setup = self.rig.setup.clone();
         let of_rig = setup.imperfections().copied().context("the rig has no [imperfections]")?;
-        let mut imperfections = match self.world {
+        let imperfections = match self.world {
             World::Imperfect => of_rig,
             World::Clean => Imperfections { schedule: of_rig.schedule, ..Imperfections::default() },
         };
-        imperfections.schedule.untouched_rows = UNTOUCHED_ROWS;
         if self.world == World::Clean {
             setup.edit_sensors(|sensors| {
                 for channel in sensors.iter_mut().map(|sensor| &mut sensor.channel) {
@@ -133,6 +133,13 @@ impl Bench<'_> {
             Some(width_m) => Setup::measured_plane(extent.length_m(), width_m, &names)?,
         })
     }
+}
+
+/// Imperfections of a setup with the untouched rows of use.
+fn with_many_untouched_rows(setup: &Setup) -> Result<Imperfections> {
+    let mut imperfections = setup.imperfections().copied().context("the setup has no imperfections")?;
+    imperfections.schedule.untouched_rows = UNTOUCHED_ROWS;
+    Ok(imperfections)
 }
 
 impl Recordings {
@@ -189,9 +196,10 @@ fn tared(locator: &Locator, recording: &Recording, zero: Zero) -> Result<Recordi
     Ok(Recording { rows, ..recording.clone() })
 }
 
-/// A contact of each share of a force.
-fn with_shares(position: Position, force_n: f64) -> [Contact; 3] {
-    FORCE_SHARES.map(|share| Contact { position, force_n: share * force_n })
+/// Contacts at places with [`FORCE_SHARES`] of a force in turn.
+fn in_turn(places: &[Position], force_n: f64) -> Vec<Contact> {
+    let shares = places.iter().zip(FORCE_SHARES.iter().cycle());
+    shares.map(|(position, share)| Contact { position: *position, force_n: share * force_n }).collect()
 }
 
 /// Contacts of five times the force that is found with a probability of 95 % by the noise of the channels, where one is.

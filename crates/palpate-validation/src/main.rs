@@ -23,7 +23,7 @@ enum Experiment {
     /// Benches as they come, beside the same benches in a clean world
     RealBenches {
         /// Seeds of each bench
-        #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=1000))]
+        #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=1000))]
         seeds: u64,
         /// Contacts of each seed, about
         #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=10_000))]

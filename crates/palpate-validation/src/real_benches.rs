@@ -6,6 +6,8 @@ use anyhow::{Context, Result};
 use palpate::prelude::{Estimator, GaussianProcessEstimator, Influence, Rig};
 use serde::Serialize;
 use std::fmt::Write;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// The benches, by their file in the folder `examples`.
 pub const BENCHES: [(&str, &str); 4] = [
@@ -29,7 +31,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         let benches = BENCHES.map(|(name, _)| name.to_owned()).to_vec();
-        Self { benches, seeds: 3, contacts: 100 }
+        Self { benches, seeds: 2, contacts: 100 }
     }
 }
 
@@ -84,36 +86,30 @@ const WORLDS: [(World, &str); 2] = [(World::Clean, "clean"), (World::Imperfect, 
 const KNOWLEDGE: [(Knowledge, &str); 2] = [(Knowledge::Model, "model"), (Knowledge::Measured, "measured")];
 const ZEROS: [(Zero, &str); 2] = [(Zero::Once, "once"), (Zero::Each, "each")];
 
-/// Runs the experiment; `progress` is told what is done of how much.
+/// Runs the experiment, several cases at a time; `progress` is told what ends, and how much is done of how much.
 ///
 /// # Errors
 /// A bench that is not known, or cannot be simulated.
-pub fn run(options: &Options, mut progress: impl FnMut(&str, usize, usize)) -> Result<Results> {
+pub fn run(options: &Options, progress: impl Fn(&str, usize, usize) + Sync) -> Result<Results> {
     let benches = chosen(&options.benches)?;
-    let cases = cases();
-    let (mut rows, mut done) = (Vec::new(), 0);
-    let of = benches.len() * cases.len();
-    for (name, toml) in &benches {
-        let rig = Rig::from_toml(toml).with_context(|| format!("examples/{name}.toml"))?;
-        for (knowledge, world) in &cases {
-            progress(&format!("{name}, {}, {}", knowledge.1, world.1), done, of);
-            let bench = Bench { rig: &rig, world: world.0, knowledge: knowledge.0 };
-            for (estimator, figures) in judged(&bench, options).with_context(|| (*name).to_owned())? {
-                let row = |(tared, figures, failure): (&'static str, Figures, Option<String>)| TableRow {
-                    bench: (*name).to_owned(),
-                    knowledge: knowledge.1,
-                    estimator: estimator.clone(),
-                    world: world.1,
-                    tared,
-                    failure,
-                    figures,
-                };
-                rows.extend(figures.into_iter().map(row));
-            }
-            done += 1;
+    let cases = cases(&benches)?;
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let judged = Mutex::new(Vec::new());
+    let work = || {
+        while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let rows = case.rows(options);
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            progress(&format!("{}, {}, {}", case.name, case.knowledge.1, case.world.1), done, cases.len());
+            judged.lock().unwrap_or_else(PoisonError::into_inner).push((case.number, rows));
         }
-    }
-    progress("done", of, of);
+    };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(cases.len());
+    std::thread::scope(|scope| {
+        (0..threads).for_each(|_| drop(scope.spawn(work)));
+    });
+    let mut judged = judged.into_inner().unwrap_or_else(PoisonError::into_inner);
+    judged.sort_by_key(|(number, _)| *number);
+    let rows = judged.into_iter().map(|(_, rows)| rows).collect::<Result<Vec<_>>>()?.concat();
     Ok(Results {
         palpate: env!("CARGO_PKG_VERSION"),
         experiment: "real-benches",
@@ -133,10 +129,45 @@ fn chosen(names: &[String]) -> Result<Vec<(&'static str, &'static str)>> {
     names.iter().map(find).collect()
 }
 
-type Case = ((Knowledge, &'static str), (World, &'static str));
+/// A bench in a world, as a locator knows it.
+struct Case {
+    number: usize,
+    name: &'static str,
+    rig: Rig,
+    knowledge: (Knowledge, &'static str),
+    world: (World, &'static str),
+}
 
-fn cases() -> Vec<Case> {
-    KNOWLEDGE.into_iter().flat_map(|knowledge| WORLDS.map(|world| (knowledge, world))).collect()
+fn cases(benches: &[(&'static str, &'static str)]) -> Result<Vec<Case>> {
+    let mut cases = Vec::new();
+    for (name, toml) in benches {
+        let rig = Rig::from_toml(toml).with_context(|| format!("examples/{name}.toml"))?;
+        for knowledge in KNOWLEDGE {
+            cases.extend(WORLDS.map(|world| Case { number: 0, name, rig: rig.clone(), knowledge, world }));
+        }
+    }
+    cases.iter_mut().enumerate().for_each(|(number, case)| case.number = number);
+    Ok(cases)
+}
+
+impl Case {
+    /// Rows of every estimator by every zero, over all seeds.
+    fn rows(&self, options: &Options) -> Result<Vec<TableRow>> {
+        let bench = Bench { rig: &self.rig, world: self.world.0, knowledge: self.knowledge.0 };
+        let judged = judged(&bench, options).with_context(|| self.name.to_owned())?;
+        let rows = judged.into_iter().flat_map(|(estimator, by_zero)| {
+            by_zero.into_iter().map(move |(tared, figures, failure)| TableRow {
+                bench: self.name.to_owned(),
+                knowledge: self.knowledge.1,
+                estimator: estimator.clone(),
+                world: self.world.1,
+                tared,
+                failure,
+                figures,
+            })
+        });
+        Ok(rows.collect())
+    }
 }
 
 /// The estimators that are compared: that of the rig, and the two that learn from a recording.
@@ -225,9 +256,9 @@ mod tests {
     #[test]
     fn the_smallest_experiment_has_a_row_for_every_case_and_shows_the_worlds_apart() {
         let options = Options { benches: vec!["real-strip".to_owned()], seeds: 1, contacts: 12 };
-        let mut last = (0, 0);
-        let results = run(&options, |_, done, of| last = (done, of)).unwrap();
-        assert_eq!(last, (4, 4));
+        let calls = AtomicUsize::new(0);
+        let results = run(&options, |_, _, of| calls.store(of, Ordering::Relaxed)).unwrap();
+        assert_eq!(calls.into_inner(), 4);
         assert_eq!(results.rows.len(), 2 * 2 * 2 * 2);
         assert!(
             results.rows.iter().all(|row| row.failure.is_none() && row.figures.touches == 12),
