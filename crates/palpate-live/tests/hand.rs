@@ -309,7 +309,8 @@ fn a_session_after_a_drifting_calibration_begins_untouched() {
     let names = rig.setup.layout().names();
     let names: Vec<&str> = names.iter().map(|name| name.as_ref()).collect();
     let measured = Setup::measured(0.3, &names).unwrap();
-    let faults = FaultConfig { hysteresis: 0.01, drift_per_s: noise, ..FaultConfig::default() };
+    let faults =
+        imperfect(Imperfections { hysteresis: 0.01, drift: line(noise), ..Imperfections::default() });
     let mut contacts_of_unaware = 0;
     for setup in [rig.setup.clone().with_force(None).unwrap(), measured] {
         let mut bench = Bench::new(&rig, HandStyle::default(), faults.clone(), 100.0, 7);

@@ -96,11 +96,12 @@ struct Answers {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    arguments.tare.check_recorded(&arguments.files)?;
     let read = [Some(arguments.subject.as_path()), arguments.tare.path()].into_iter().flatten();
     let inputs = Inputs::new(arguments.files.paths().chain(read));
     let out = arguments.out.as_ref().map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
-    let answers = match RigOrLocator::read(&arguments.subject)? {
+    let subject = RigOrLocator::read(&arguments.subject)?;
+    arguments.tare.check_drifts(&arguments.files, subject.setup())?;
+    let answers = match subject {
         RigOrLocator::Rig(rig) => cross_validated(arguments, rig)?,
         RigOrLocator::Locator(locator) => located(arguments, locator)?,
     };
@@ -186,10 +187,11 @@ fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Fail
     let recording = match arguments.files.read(&locator.setup)? {
         Some(recording) => {
             warn_of_training_data(&locator, &recording);
-            tared_recording(&arguments.tare, &locator, recording)?
+            recording
         }
         None => simulated(&locator, arguments.seed)?,
     };
+    let recording = tared_recording(&arguments.tare, &locator, recording)?;
     let evaluation = Observer::of_stages()
         .watch(|watch| Evaluation::new_watched(&locator, &recording, watch))
         .map_err(|error| Failure::from_error(&error))?;
