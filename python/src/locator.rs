@@ -170,7 +170,7 @@ impl Locator {
                     None => &recording.inner,
                 }
             }
-            None if tare.is_some() => {
+            None if tare.is_some() && self.setup.imperfections().is_none() => {
                 return Err(refused("`tare` needs a recording: simulated readings do not drift"));
             }
             None => {
@@ -184,8 +184,12 @@ impl Locator {
                         watch,
                     )
                 })?;
-                made =
+                let simulated =
                     simulated.map_err(|error| refused(format!("{error}; give a recording to judge by")))?;
+                made = match tare {
+                    Some(tare) => tare::tared_recording(&self.inner, &self.channels, &simulated, tare)?,
+                    None => simulated,
+                };
                 &made
             }
         };
