@@ -84,7 +84,7 @@ impl Bench<'_> {
                 simulate_presses_watched(&pressed, &presses, repeats, placement_sd_m, seed, Watch::NONE)?
             }
         };
-        let places = shuffled(all_over(setup.surface().extent(), contacts), seed);
+        let places = shuffled(&all_over(setup.surface().extent(), contacts), seed);
         let touched = in_turn(&places, force_n);
         let provenance = &calibration.provenance;
         let used = setup.clone().with_imperfections(with_many_untouched_rows(&setup)?)?;
@@ -220,6 +220,6 @@ fn all_over(extent: Extent, count: usize) -> Vec<Position> {
     cells(extent, side(extent.length_m() / width_m), side(width_m / extent.length_m()))
 }
 
-fn shuffled(positions: Vec<Position>, seed: u64) -> Vec<Position> {
+fn shuffled(positions: &[Position], seed: u64) -> Vec<Position> {
     random_order(positions.len(), seed).into_iter().map(|i| positions[i]).collect()
 }
