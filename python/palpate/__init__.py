@@ -40,6 +40,7 @@ from ._estimators import (
     Network,
 )
 from ._evaluation import Comparison, ErrorsByPosition, compare, cross_validate
+from ._imperfections import Imperfections, Relaxation
 from ._influence import InfluenceFunctions
 from ._inspect import Inspection, inspect
 from ._limit import Limit, limit
@@ -83,6 +84,7 @@ __all__ = [
     "Evaluation",
     "FileError",
     "GaussianProcess",
+    "Imperfections",
     "Influence",
     "InfluenceFunctions",
     "Inspection",
@@ -102,6 +104,7 @@ __all__ = [
     "PalpateError",
     "Plate",
     "Recording",
+    "Relaxation",
     "Rig",
     "SensorCounts",
     "SensorOffer",

@@ -181,6 +181,32 @@ impl Setup {
         Ok(Self(Arc::new((*self.0).clone().with_noise(noise).map_err(refused)?)))
     }
 
+    /// The same setup with the imperfections of a real bench, which its simulations have; None for the faults of the sensors alone.
+    ///
+    /// Parameters
+    /// ----------
+    /// imperfections : Imperfections or None
+    ///
+    /// Raises
+    /// ------
+    /// FileError
+    ///     For a value out of its range, and for a surface without a model.
+    #[pyo3(signature = (imperfections))]
+    fn with_imperfections(&self, py: Python<'_>, imperfections: Option<Bound<'_, PyAny>>) -> PyResult<Self> {
+        let Some(imperfections) = imperfections else {
+            return Ok(Self(Arc::new((*self.0).clone().without_imperfections())));
+        };
+        let text =
+            py.import("palpate._imperfections")?.call_method1("imperfections_toml", (imperfections,))?;
+        Ok(Self(Arc::new(sections::with_imperfections(&text.extract::<String>()?, &self.0)?)))
+    }
+
+    /// True where simulations have the imperfections of a real bench.
+    #[getter]
+    fn is_imperfect(&self) -> bool {
+        self.0.imperfections().is_some()
+    }
+
     /// The training positions on this surface, each once.
     ///
     /// Returns

@@ -9,7 +9,7 @@ use palpate::estimators::batch::{BLOCK, BatchError, BatchOptions};
 use palpate::estimators::estimator;
 use palpate::estimators::evaluation;
 use palpate::estimators::setup;
-use palpate::estimators::simulate::simulate_at_watched;
+use palpate::estimators::simulate::{contacts_at, simulate_use_watched};
 use palpate::numerics::watch::Watch;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -170,15 +170,26 @@ impl Locator {
                     None => &recording.inner,
                 }
             }
-            None if tare.is_some() => {
+            None if tare.is_some() && self.setup.imperfections().is_none() => {
                 return Err(refused("`tare` needs a recording: simulated readings do not drift"));
             }
             None => {
                 let simulated = work::run_quietly_with(py, |watch| {
-                    simulate_at_watched(&self.setup, &all_over(extent), 1, seed, watch)
+                    let contacts = contacts_at(&self.setup, &all_over(extent))?;
+                    simulate_use_watched(
+                        &self.setup,
+                        &self.inner.provenance.recording,
+                        &contacts,
+                        seed,
+                        watch,
+                    )
                 })?;
-                made =
+                let simulated =
                     simulated.map_err(|error| refused(format!("{error}; give a recording to judge by")))?;
+                made = match tare {
+                    Some(tare) => tare::tared_recording(&self.inner, &self.channels, &simulated, tare)?,
+                    None => simulated,
+                };
                 &made
             }
         };

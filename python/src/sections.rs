@@ -18,6 +18,16 @@ pub fn setup(text: &str) -> PyResult<Setup> {
     setup.map_err(|error| of_rig(&error, "setup", text))
 }
 
+/// A setup with the imperfections that a section gives.
+///
+/// # Errors
+/// `FileError`, with the place.
+pub fn with_imperfections(text: &str, setup: &Setup) -> PyResult<Setup> {
+    let sections = RigSections::from_toml(text);
+    let setup = sections.and_then(|sections| sections.with_imperfections(setup.clone()));
+    setup.map_err(|error| of_rig(&error, "imperfections", text))
+}
+
 /// The estimator that a section says, for a setup.
 ///
 /// # Errors

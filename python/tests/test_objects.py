@@ -36,6 +36,43 @@ def test_values_survive_pickling_and_copying(beam, presses, locator):
     assert pickle.loads(pickle.dumps(pp.Influence().of(beam))).kind == "influence"
 
 
+def test_an_imperfect_setup_records_rests_and_survives_pickling(beam):
+    creep = [pp.Relaxation("2 %", "5 s"), pp.Relaxation(0.01, 60)]
+    imperfections = pp.Imperfections(hysteresis="2 %", creep=creep, drift_per_hour="10 um", noise_freedom=5, rest=3, untouched_rows=2)
+    worn = beam.with_imperfections(imperfections)
+    assert worn.is_imperfect and not beam.is_imperfect
+    assert pickle.loads(pickle.dumps(worn)) == worn != beam
+    presses = worn.simulate(pp.even(10), force="3 N", seed=3)
+    assert len(presses) == 10 + 2 * 11 and (presses.force == 0).sum() == 22
+    same = pp.Setup.from_toml(
+        """
+        [surface]
+        kind = "beam"
+        length = "400 mm"
+        width = "40 mm"
+        thickness = "1.2 mm"
+        youngs_modulus = "200 GPa"
+        [sensors]
+        measure = "deflection"
+        count = 8
+        noise = "5 um"
+        [imperfections]
+        hysteresis = "2 %"
+        creep = [{ share = "2 %", time = "5 s" }, { share = "1 %", time = "60 s" }]
+        drift_per_hour = "10 um"
+        noise_freedom = 5
+        rest = "3 s"
+        untouched_rows = 2
+        """
+    )
+    assert np.array_equal(same.simulate(pp.even(10), force="3 N", seed=3).readings, presses.readings)
+    assert worn.with_imperfections(None) == beam
+    with pytest.raises(pp.FileError, match="hysteresis"):
+        beam.with_imperfections(pp.Imperfections(hysteresis=1.5))
+    with pytest.raises(TypeError, match="they must be Imperfections"):
+        beam.with_imperfections("1 %")
+
+
 def test_estimates_survive_pickling(beam):
     setup = pp.Setup(
         pp.Beam("400 mm", "40 mm", "1.2 mm", "200 GPa"), pp.deflection(["150 mm"], noise="5 um"), force="3 N"

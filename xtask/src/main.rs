@@ -1,4 +1,4 @@
-//! The project's chores: `cargo xtask test | wire | web | wheel | tidy | rig-keys | bench | fuzz`.
+//! The project's chores: `cargo xtask test | validate | wire | web | wheel | tidy | rig-keys | bench | fuzz`.
 #![forbid(unsafe_code)]
 
 mod counts;
@@ -36,6 +36,12 @@ enum Chore {
         #[arg(long)]
         strict: bool,
     },
+    /// Run an experiment of palpate-validation, such as `real-benches`; `validate help` lists them
+    Validate {
+        /// Handed on to the experiment
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<String>,
+    },
     /// Build the sinks for ROS 2 and Foxglove, which take minutes to compile, and run their tests, clippy and docs
     Wire,
     /// Build the dashboard of `palpate serve` into web/dist, from which compiling takes it; needs Node
@@ -70,6 +76,11 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().chore {
         Chore::Test { strict } => {
             test::run(&root, if strict { skipped::Skips::Fail } else { skipped::Skips::Pass })
+        }
+        Chore::Validate { arguments } => {
+            let mut experiment = Command::new("cargo");
+            experiment.args(["run", "--quiet", "--package", "palpate-validation", "--"]).args(arguments);
+            run::shown(&mut experiment)
         }
         Chore::Wire => wire::run(&root),
         Chore::Web => dashboard::build(&root),

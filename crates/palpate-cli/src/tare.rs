@@ -38,9 +38,18 @@ impl TareOption {
         if self.tare.is_some() { ", tared" } else { "" }
     }
 
-    /// Refuses a tare of readings that are simulated, which do not drift.
+    /// Refuses a tare without a recording.
     pub fn check_recorded(&self, files: &RecordingFiles) -> Result<(), Failure> {
         if self.tare.is_some() && files.data.is_none() {
+            let complaint = Complaint::new("--tare needs a recording: simulated calibrations start at zero");
+            return Err(complaint.help("--data names a recording to judge by").into());
+        }
+        Ok(())
+    }
+
+    /// Refuses a tare of readings that are simulated, unless the bench has imperfections.
+    pub fn check_drifts(&self, files: &RecordingFiles, setup: &Setup) -> Result<(), Failure> {
+        if self.tare.is_some() && files.data.is_none() && setup.imperfections().is_none() {
             let complaint = Complaint::new("--tare: simulated readings do not drift");
             return Err(complaint.help("--data names a recording to judge by").into());
         }

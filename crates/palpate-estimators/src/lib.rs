@@ -37,6 +37,7 @@ pub mod fit;
 mod fixtures;
 pub mod gaussian_process;
 mod held_out;
+pub mod imperfections;
 pub mod influence;
 pub mod interval_check;
 pub mod lightest_touch;

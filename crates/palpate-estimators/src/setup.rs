@@ -5,6 +5,7 @@ use std::io::Read;
 use serde::{Deserialize, Serialize};
 
 use crate::arrangement::inner_grid;
+use crate::imperfections::Imperfections;
 use crate::recording::{self, Columns, CsvError, Recording, Schema};
 use palpate_mechanics::contact::{OffSurface, Position};
 use palpate_mechanics::limit::{CramerRaoBound, Force, LimitError};
@@ -27,6 +28,8 @@ pub struct Setup {
     #[serde(skip_serializing_if = "Option::is_none")]
     greatest_force_n: Option<f64>,
     columns: Option<Columns>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    imperfections: Option<Imperfections>,
 }
 
 /// A setup as a file has it.
@@ -39,15 +42,21 @@ struct Unchecked {
     #[serde(default)]
     greatest_force_n: Option<f64>,
     columns: Option<Columns>,
+    #[serde(default)]
+    imperfections: Option<Imperfections>,
 }
 
 impl TryFrom<Unchecked> for Setup {
     type Error = SetupError;
 
     fn try_from(unchecked: Unchecked) -> Result<Self, SetupError> {
-        let Unchecked { surface, layout, force_n, greatest_force_n, columns } = unchecked;
+        let Unchecked { surface, layout, force_n, greatest_force_n, columns, imperfections } = unchecked;
         let setup = Self { columns, ..Self::new(surface) };
-        Ok(setup.with_layout(layout)?.with_force(force_n)?.with_greatest_force(greatest_force_n)?)
+        let setup = setup.with_layout(layout)?.with_force(force_n)?.with_greatest_force(greatest_force_n)?;
+        match imperfections {
+            Some(imperfections) => setup.with_imperfections(imperfections),
+            None => Ok(setup),
+        }
     }
 }
 
@@ -111,6 +120,9 @@ pub enum SetupError {
         /// The noise.
         noise: Quantity,
     },
+    /// A soft layer on a digit.
+    #[error("a soft layer spreads a touch over several points; a digit bends too far for readings to add up")]
+    SoftLayerOnDigit,
     /// A sensor that cannot be.
     #[error(transparent)]
     Layout(#[from] LayoutError),
@@ -170,6 +182,7 @@ impl Setup {
             force_n: None,
             greatest_force_n: None,
             columns: None,
+            imperfections: None,
         }
     }
 
@@ -344,6 +357,29 @@ impl Setup {
         let named = greatest_force_n.map(|force_n| ("the greatest force in newtons", force_n));
         OutOfRange::check_positive(named)?;
         Ok(Self { greatest_force_n, ..self })
+    }
+
+    /// The same with these imperfections, which its simulations have; estimators do not read them.
+    ///
+    /// # Errors
+    /// [`SetupError`] for a number out of its range, and for a soft layer on a digit.
+    pub fn with_imperfections(self, imperfections: Imperfections) -> Result<Self, SetupError> {
+        imperfections.check(self.surface.extent())?;
+        if imperfections.touch_width_m > 0.0 && matches!(self.surface, SurfaceSpec::Digit(_)) {
+            return Err(SetupError::SoftLayerOnDigit);
+        }
+        Ok(Self { imperfections: Some(imperfections), ..self })
+    }
+
+    /// The same without imperfections: simulations have the faults of the channels alone, and no course in time.
+    #[must_use]
+    pub fn without_imperfections(self) -> Self {
+        Self { imperfections: None, ..self }
+    }
+
+    /// Imperfections of its simulations; `None` where they have the faults of the channels alone.
+    pub fn imperfections(&self) -> Option<&Imperfections> {
+        self.imperfections.as_ref()
     }
 
     /// Knowledge of the contact force.

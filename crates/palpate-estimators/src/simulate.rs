@@ -1,6 +1,8 @@
 //! Recordings made by the model of a surface instead of its bench.
 
+mod bench;
 mod moving;
+mod presses;
 
 use std::sync::Arc;
 
@@ -8,7 +10,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::arrangement::{ArrangementError, Training};
-use crate::recording::{Recording, Row};
+use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Setup;
 use palpate_mechanics::contact::{Contact, OffSurface, Position};
 use palpate_mechanics::sensing::{ChannelErrors, Layout, LayoutError, Sensor, measure};
@@ -16,7 +18,9 @@ use palpate_mechanics::surface::{Extent, ResponseFunction, Surface, UniformLoad,
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::{Cancelled, Watch};
 
+pub use bench::SimulatedBench;
 pub use moving::{MovingContact, MovingContacts, simulate_moving, simulate_moving_watched};
+pub(crate) use presses::{Press, PressedBench};
 
 /// A rig that cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -88,67 +92,6 @@ pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -
     CleanSensors::new(surface, layout).reading(contact)
 }
 
-/// A simulated bench that is read again and again: gains, offsets and places of its sensors are drawn once, noise for each reading.
-///
-/// ```
-/// use palpate_estimators::{setup::Setup, simulate::SimulatedBench};
-/// use palpate_mechanics::contact::{Contact, Position};
-/// use palpate_mechanics::sensing::SensorKind::Deflection;
-/// use palpate_mechanics::surface::Beam;
-/// use palpate_mechanics::units::{gpa, mm, um};
-///
-/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
-/// let mut bench = SimulatedBench::new(&setup, 0)?;
-/// let clean = bench.clean(&[Contact { position: Position::along(mm(180.0)), force_n: 3.0 }]);
-/// let (first, second) = (bench.measure(&clean), bench.measure(&clean));
-/// assert!(first != second && (first[3] - clean[3]).abs() < um(30.0));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub struct SimulatedBench<'a> {
-    layout: &'a Layout,
-    sensors: CleanSensors<'a>,
-    errors: ChannelErrors,
-    rng: Xoshiro256PlusPlus,
-}
-
-impl<'a> SimulatedBench<'a> {
-    /// The bench of a setup as a seed has it.
-    ///
-    /// # Errors
-    /// [`SimulateError::NoModel`] for a measured surface, [`SimulateError::Surface`] where the surface's equations are not solved.
-    pub fn new(setup: &'a Setup, seed: u64) -> Result<Self, SimulateError> {
-        Self::new_watched(setup, seed, Watch::NONE)
-    }
-
-    /// The same, watched while the surface is solved.
-    ///
-    /// # Errors
-    /// Those of [`SimulatedBench::new`], and [`SimulateError::Cancelled`].
-    pub fn new_watched(setup: &'a Setup, seed: u64, watch: Watch) -> Result<Self, SimulateError> {
-        let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
-        surface.check_solution_watched(watch)?;
-        let (placed, errors, rng) = draw_faults(setup, seed);
-        let sensors = CleanSensors::new_watched(surface, &placed, watch)?;
-        Ok(Self { layout: setup.layout(), sensors, errors, rng })
-    }
-
-    /// Faultless reading under contacts on the surface, in the SI unit of each sensor: the sum of what each contact alone makes, and 0 under none.
-    pub fn clean(&self, contacts: &[Contact]) -> Vec<f64> {
-        let mut sum = vec![0.0; self.layout.len()];
-        for contact in contacts {
-            let reading = self.sensors.reading(*contact);
-            sum.iter_mut().zip(reading).for_each(|(sum, value)| *sum += value);
-        }
-        sum
-    }
-
-    /// A reading of the faulty channels, with fresh noise, of what faultless ones read.
-    pub fn measure(&mut self, clean: &[f64]) -> Vec<f64> {
-        measure(self.layout, clean, &self.errors, &mut self.rng)
-    }
-}
-
 impl Setup {
     /// The bench as it is when pressed to calibrate: with the force of these presses.
     ///
@@ -159,7 +102,8 @@ impl Setup {
     }
 
     /// Presses the simulated surface at the training positions, with the force of the training presses, and records what its
-    /// faulty channels report; see [`simulate_at`].
+    /// faulty channels report; see [`simulate_at`]. With imperfections the presses lie beside the positions of their rows by the placement
+    /// of the training.
     ///
     /// # Errors
     /// [`SimulateError`] when the bench lacks a model or a force, or the positions cannot be laid out.
@@ -178,12 +122,17 @@ impl Setup {
         watch: Watch,
     ) -> Result<Recording, SimulateError> {
         let positions = training.positions(self.surface().extent())?;
-        simulate_at_watched(&self.pressed_by(training)?, &positions, training.repeats, seed, watch)
+        let pressed = self.pressed_by(training)?;
+        let contacts = contacts_at(&pressed, &positions)?;
+        simulate_presses_watched(&pressed, &contacts, training.repeats, training.placement_sd_m, seed, watch)
     }
 }
 
 /// Presses the bench's simulated surface with its force at each of `positions`, `repeats` times in a row, and records what its
 /// faulty channels report. Gains, offsets and the places of sensors are drawn once for the recording, noise for each reading.
+///
+/// A setup with imperfections has a course in time: each press is read `repeats` times, untouched rows (force 0) stand before, between and
+/// after the presses, and every row has its time; see [`Schedule`](crate::imperfections::Schedule).
 ///
 /// The same seed gives the same recording.
 ///
@@ -209,11 +158,41 @@ pub fn simulate_at_watched(
     seed: u64,
     watch: Watch,
 ) -> Result<Recording, SimulateError> {
+    simulate_contacts_watched(setup, &contacts_at(setup, positions)?, repeats, seed, watch)
+}
+
+/// Contacts at positions with the force of a bench that has a model.
+///
+/// # Errors
+/// [`SimulateError::NoModel`] and [`SimulateError::NoForce`].
+pub fn contacts_at(setup: &Setup, positions: &[Position]) -> Result<Vec<Contact>, SimulateError> {
     setup.surface().model().ok_or(SimulateError::NoModel)?;
     let force_n = setup.force_n().ok_or(SimulateError::NoForce)?;
-    let contacts: Vec<Contact> =
-        positions.iter().map(|position| Contact { position: *position, force_n }).collect();
-    simulate_contacts_watched(setup, &contacts, repeats, seed, watch)
+    Ok(positions.iter().map(|position| Contact { position: *position, force_n }).collect())
+}
+
+/// Touches a calibrated bench in use with each of `contacts`, once, and records it, watched. A bench with imperfections is the one of the calibration,
+/// whose provenance this is, after the pause of its schedule; the seed draws noise and random walks from there on. Another bench is drawn from
+/// the seed as by [`simulate_contacts`].
+///
+/// # Errors
+/// Those of [`simulate_contacts_watched`].
+pub fn simulate_use_watched(
+    setup: &Setup,
+    calibration: &Provenance,
+    contacts: &[Contact],
+    seed: u64,
+    watch: Watch,
+) -> Result<Recording, SimulateError> {
+    let (Some(_), Some(state)) = (setup.imperfections(), &calibration.bench) else {
+        return simulate_contacts_watched(setup, contacts, 1, seed, watch);
+    };
+    let positions: Vec<Position> = contacts.iter().map(|contact| contact.position).collect();
+    OffSurface::check("position", &positions, setup.surface().extent())?;
+    let presses: Vec<Press> = contacts.iter().map(|contact| Press { contact: *contact, rows: 1 }).collect();
+    let mut bench = PressedBench::resumed(setup, state, seed, watch)?;
+    bench.pause();
+    bench.record(&presses, None, watch)
 }
 
 /// The same with a force of each contact's own.
@@ -240,7 +219,29 @@ pub fn simulate_contacts_watched(
     seed: u64,
     watch: Watch,
 ) -> Result<Recording, SimulateError> {
+    simulate_presses_watched(setup, contacts, repeats, None, seed, watch)
+}
+
+/// Presses of these contacts, watched, by a person who misses their places by this standard deviation in each direction, in metres, where the bench
+/// has imperfections; see [`simulate_contacts`].
+///
+/// # Errors
+/// Those of [`simulate_contacts_watched`].
+pub fn simulate_presses_watched(
+    setup: &Setup,
+    contacts: &[Contact],
+    repeats: usize,
+    placement_sd_m: Option<f64>,
+    seed: u64,
+    watch: Watch,
+) -> Result<Recording, SimulateError> {
     let positions: Vec<Position> = contacts.iter().map(|contact| contact.position).collect();
+    if setup.imperfections().is_some() {
+        OffSurface::check("position", &positions, setup.surface().extent())?;
+        let presses: Vec<Press> =
+            contacts.iter().map(|contact| Press { contact: *contact, rows: repeats }).collect();
+        return PressedBench::new(setup, &presses, seed, watch)?.record(&presses, placement_sd_m, watch);
+    }
     let mut bench = SimulatedBench::new_watched(setup, seed, watch)?;
     OffSurface::check("position", &positions, setup.surface().extent())?;
     let mut rows = Vec::new();
@@ -258,7 +259,8 @@ pub fn simulate_contacts_watched(
 }
 
 /// Spreads `loads` over the bench's simulated surface, all at once, `repeats` times in a row, and gives what its faulty channels
-/// report. Gains, offsets and the places of sensors are drawn once, noise for each reading.
+/// report. Gains, offsets and the places of sensors are drawn once, noise for each reading. Imperfections act by their schedule; a soft layer
+/// does not, as the loads say themselves how far they spread.
 ///
 /// The same seed gives the same readings.
 ///
@@ -294,12 +296,29 @@ pub fn simulate_loads_watched(
             clean.push(loads.iter().map(|load| load.force_n() * load.mean(&*function)).sum());
         }
     }
+    let mut worn = match setup.imperfections() {
+        Some(imperfections) => {
+            let largest_n = loads.iter().map(|load| load.force_n().abs()).fold(0.0, f64::max);
+            let bench = SimulatedBench::perfect_watched(setup, seed, watch)?;
+            Some((
+                bench.with_imperfections(*imperfections, setup.force_n().unwrap_or(largest_n)),
+                imperfections.schedule,
+            ))
+        }
+        None => None,
+    };
     let mut readings = Vec::new();
     for i in 0..repeats {
         if i.is_multiple_of(READINGS_EACH) {
             watch.counted(STAGE, "readings", i, repeats)?;
         }
-        readings.push(measure(setup.layout(), &clean, &errors, &mut rng));
+        readings.push(match &mut worn {
+            Some((bench, schedule)) => {
+                let values = bench.advance(&clean, if i == 0 { schedule.settle_s } else { schedule.row_s() });
+                bench.measure(&values)
+            }
+            None => measure(setup.layout(), &clean, &errors, &mut rng),
+        });
     }
     Ok(readings)
 }

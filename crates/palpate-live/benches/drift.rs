@@ -8,6 +8,7 @@ use cpu_time::ProcessTime;
 use palpate_core::Status;
 use palpate_estimators::estimator::{Creep, Drift, Locator, TrackerConfig};
 use palpate_estimators::fit::{Fit, FitTask};
+use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation};
 use palpate_live::input::{Arrival, Arrived};
 use palpate_live::sample::Sample;
 use palpate_live::session::{Follower, Output, Session, SessionConfig};
@@ -30,10 +31,13 @@ fn main() {
     assert_ne!(known, unknown);
     println!("force    faults                       state     error   cov  located  after");
     let none = FaultConfig::default();
-    let line = FaultConfig { drift_per_s: 0.02 * NOISE_M, ..none.clone() };
-    let walk = FaultConfig { walk_per_root_s: 0.1 * NOISE_M, ..none.clone() };
-    let creep = FaultConfig { creep: 0.05, creep_s: 20.0, ..none.clone() };
-    let all = FaultConfig { drift_per_s: 0.02 * NOISE_M, ..creep.clone() };
+    let line = OffsetDrift { line_per_s: Amount::Value(0.02 * NOISE_M), ..OffsetDrift::default() };
+    let walk = OffsetDrift { walk_per_root_s: Amount::Value(0.1 * NOISE_M), ..OffsetDrift::default() };
+    let creep = [Relaxation { share: 0.05, time_s: 20.0 }, Relaxation::default()];
+    let drifting = |drift| imperfect(Imperfections { drift, ..Imperfections::default() });
+    let creeping = |drift| imperfect(Imperfections { drift, creep, ..Imperfections::default() });
+    let (walk, creep, all) = (drifting(walk), creeping(OffsetDrift::default()), creeping(line));
+    let line = drifting(line);
     let faults = [
         ("none", none),
         ("line, 0.02 sd/s", line),
@@ -53,11 +57,17 @@ fn main() {
     }
 }
 
+/// Faults of a board with these imperfections.
+fn imperfect(imperfections: Imperfections) -> FaultConfig {
+    FaultConfig { imperfections, ..FaultConfig::default() }
+}
+
 /// A locator calibrated by presses on the surface that creeps.
 fn calibrated(rig: &Rig, faults: &FaultConfig) -> Locator {
     let mut recording = rig.simulate(0).expect("a surface with a model");
-    if faults.creep > 0.0 {
-        let came = 1.0 - faults.creep * (-PRESSED_S / faults.creep_s).exp();
+    let [creep, _] = faults.imperfections.creep;
+    if creep.share > 0.0 {
+        let came = 1.0 - creep.share * (-PRESSED_S / creep.time_s).exp();
         recording.rows.iter_mut().flat_map(|row| &mut row.reading).for_each(|value| *value *= came);
     }
     rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).expect("an influence locator")
@@ -68,9 +78,10 @@ fn states(faults: &FaultConfig) -> Vec<(&'static str, TrackerConfig)> {
     let nothing = TrackerConfig::default();
     let drift = TrackerConfig { drift: Some(Drift::default()), ..nothing };
     // (1 − c)·r of a reading r is fresh, and c·r comes.
-    let creep = Creep { share: faults.creep / (1.0 - faults.creep), time_s: faults.creep_s };
+    let [of_board, _] = faults.imperfections.creep;
+    let creep = Creep { share: of_board.share / (1.0 - of_board.share), time_s: of_board.time_s };
     let mut states = vec![("neither", nothing), ("drift", drift)];
-    if faults.creep > 0.0 {
+    if of_board.share > 0.0 {
         states.push(("both", TrackerConfig { creep: Some(creep), ..drift }));
     }
     states
@@ -142,7 +153,7 @@ fn samples(rig: &Rig, locator: &Locator, faults: &FaultConfig, x_mm: f64, seed: 
     let config = BoardConfig { rate_hz: RATE_HZ, seed, ..BoardConfig::default() };
     let board =
         SimulatedBoard::new(&rig.setup, &config, Finger::random(rig, seed)).expect("a surface with a model");
-    let mut board = board.with_faults(faults.clone(), seed);
+    let mut board = board.with_faults(faults.clone(), seed).expect("faults in their ranges");
     let mut session = Session::new(locator, &SessionConfig::default()).expect("each reading by itself");
     let mut out = Vec::new();
     board.finger_mut().obey("lift").expect("a line of the finger");

@@ -2,6 +2,7 @@
 
 use palpate_estimators::estimator::{Locator, Status};
 use palpate_estimators::fit::Fit;
+use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulatedBench;
@@ -57,6 +58,21 @@ fn rig() -> (Rig, f64) {
     (Rig::from_toml(&clamped_strip(1e6 * noise)).unwrap(), noise)
 }
 
+/// Drift of each channel by a line of this slope.
+fn line(per_s: f64) -> OffsetDrift {
+    OffsetDrift { line_per_s: Amount::Value(per_s), ..OffsetDrift::default() }
+}
+
+/// Creep of one share.
+fn creep(share: f64, time_s: f64) -> [Relaxation; 2] {
+    [Relaxation { share, time_s }, Relaxation::default()]
+}
+
+/// Faults of a board with these imperfections.
+fn imperfect(imperfections: Imperfections) -> FaultConfig {
+    FaultConfig { imperfections, ..FaultConfig::default() }
+}
+
 /// A board that a hand presses.
 struct Bench<'a> {
     rig: &'a Rig,
@@ -69,7 +85,8 @@ impl<'a> Bench<'a> {
     fn new(rig: &'a Rig, style: HandStyle, faults: FaultConfig, rate_hz: f64, seed: u64) -> Self {
         let config = BoardConfig { seed, rate_hz, ..BoardConfig::default() };
         let finger = Finger::random(rig, seed);
-        let board = SimulatedBoard::new(&rig.setup, &config, finger).unwrap().with_faults(faults, seed);
+        let board = SimulatedBoard::new(&rig.setup, &config, finger).unwrap();
+        let board = board.with_faults(faults, seed).unwrap();
         let hand = Hand::new(style, rig.setup.surface().extent(), seed);
         Self { rig, board, hand, start: HostClock::new().now() }
     }
@@ -127,7 +144,7 @@ impl<'a> Bench<'a> {
 
 fn calibrate(style: HandStyle, faults: FaultConfig, rate_hz: f64, seed: u64) -> Outcome {
     let (rig, noise) = rig();
-    let hysteresis = faults.hysteresis;
+    let hysteresis = faults.imperfections.hysteresis;
     let (calibration, mut outcome, contacts) = Bench::new(&rig, style, faults, rate_hz, seed).calibrate();
     let bench = SimulatedBench::new(&rig.setup, 0).unwrap();
     let untouched = bench.clean(&[]);
@@ -163,21 +180,29 @@ fn every_press_of_any_hand_has_a_touch() {
     ];
     let benches = [
         ("ideal", FaultConfig::default()),
-        ("hysteresis 1 %", FaultConfig { hysteresis: 0.01, converter_step: noise, ..FaultConfig::default() }),
+        (
+            "hysteresis 1 %",
+            FaultConfig {
+                converter_step: Some(noise),
+                ..imperfect(Imperfections { hysteresis: 0.01, ..Imperfections::default() })
+            },
+        ),
         (
             "hysteresis 3 %, drift",
-            FaultConfig { hysteresis: 0.03, drift_per_s: 2.0 * noise, ..FaultConfig::default() },
+            imperfect(Imperfections {
+                hysteresis: 0.03,
+                drift: line(2.0 * noise),
+                ..Imperfections::default()
+            }),
         ),
         (
             "creep, residue, drift",
-            FaultConfig {
-                creep: 0.03,
-                creep_s: 5.0,
-                residue: 0.01,
-                residue_s: 20.0,
-                drift_per_s: noise,
-                ..FaultConfig::default()
-            },
+            imperfect(Imperfections {
+                creep: creep(0.03, 5.0),
+                residue: Relaxation { share: 0.01, time_s: 20.0 },
+                drift: line(noise),
+                ..Imperfections::default()
+            }),
         ),
     ];
     let (mut presses, mut asked_again) = (0, 0);
@@ -204,8 +229,10 @@ fn presses_on_slow_boards_and_on_boards_that_repeat_readings_have_a_touch() {
     let slow = HandStyle { press_s: 1.0, lift_s: 1.0, ..exact };
     let hovering = HandStyle { hover_share: 0.08, hover_s: 0.3, lift_s: 0.3, ..exact };
     let ideal = FaultConfig::default();
-    let repeating = |repeats| FaultConfig { repeats, ..ideal.clone() };
-    let worn = FaultConfig { hysteresis: 0.01, converter_step: noise, drift_per_s: noise, ..ideal.clone() };
+    let repeating =
+        |repeated_readings| imperfect(Imperfections { repeated_readings, ..Imperfections::default() });
+    let imperfections = Imperfections { hysteresis: 0.01, drift: line(noise), ..Imperfections::default() };
+    let worn = FaultConfig { converter_step: Some(noise), ..imperfect(imperfections) };
     let runs = [
         ("quick, each reading twice", exact, 100.0, repeating(1)),
         ("slow, each reading 10 times", slow, 100.0, repeating(9)),
@@ -213,7 +240,10 @@ fn presses_on_slow_boards_and_on_boards_that_repeat_readings_have_a_touch() {
             "early lift, each reading 5 times, hysteresis, drift",
             early,
             100.0,
-            FaultConfig { repeats: 4, ..worn.clone() },
+            FaultConfig {
+                imperfections: Imperfections { repeated_readings: 4, ..imperfections },
+                ..worn.clone()
+            },
         ),
         ("tapping, each reading 25 times", HandStyle { taps: 2, ..exact }, 200.0, repeating(24)),
         ("quick, 10 readings a second", exact, 10.0, ideal.clone()),
@@ -221,7 +251,7 @@ fn presses_on_slow_boards_and_on_boards_that_repeat_readings_have_a_touch() {
     ];
     let mut asked_again = 0;
     for (i, (name, style, rate_hz, faults)) in runs.into_iter().enumerate() {
-        let repeats_noted = usize::from(faults.repeats > 0);
+        let repeats_noted = usize::from(faults.imperfections.repeated_readings > 0);
         let outcome = calibrate(style, faults, rate_hz, i as u64);
         println!("{name}: {outcome:?}");
         assert!(outcome.is_finished && outcome.presses == 20, "{name}: {outcome:?}");
@@ -279,7 +309,8 @@ fn a_session_after_a_drifting_calibration_begins_untouched() {
     let names = rig.setup.layout().names();
     let names: Vec<&str> = names.iter().map(|name| name.as_ref()).collect();
     let measured = Setup::measured(0.3, &names).unwrap();
-    let faults = FaultConfig { hysteresis: 0.01, drift_per_s: noise, ..FaultConfig::default() };
+    let faults =
+        imperfect(Imperfections { hysteresis: 0.01, drift: line(noise), ..Imperfections::default() });
     let mut contacts_of_unaware = 0;
     for setup in [rig.setup.clone().with_force(None).unwrap(), measured] {
         let mut bench = Bench::new(&rig, HandStyle::default(), faults.clone(), 100.0, 7);
@@ -350,13 +381,11 @@ fn every_touch_ends_within_a_second_of_the_lift() {
     let names: Vec<&str> = names.iter().map(|name| name.as_ref()).collect();
     let measured = Setup::measured(0.3, &names).unwrap();
     let exact = HandStyle { placement_m: 5e-4, lift_s: 0.5, ..HandStyle::default() };
-    let worn = FaultConfig {
-        creep: 0.01,
-        creep_s: 3.0,
-        residue: 0.005,
-        residue_s: 20.0,
-        drift_per_s: 2.0 * noise,
-        ..FaultConfig::default()
+    let worn = Imperfections {
+        creep: creep(0.01, 3.0),
+        residue: Relaxation { share: 0.005, time_s: 20.0 },
+        drift: line(2.0 * noise),
+        ..Imperfections::default()
     };
     let setups = [
         ("model, known force", rig.setup.clone(), true),
@@ -366,7 +395,7 @@ fn every_touch_ends_within_a_second_of_the_lift() {
     ];
     for (name, setup, is_force_known) in setups {
         for hysteresis in [0.0, 0.01, 0.03] {
-            let tally = touch(&rig, &setup, exact, FaultConfig { hysteresis, ..worn.clone() });
+            let tally = touch(&rig, &setup, exact, imperfect(Imperfections { hysteresis, ..worn }));
             println!("{name}, hysteresis {hysteresis}: {tally:?}");
             let Tally { ended, touch_downs, lift_offs, unpaired } = tally;
             assert_eq!(

@@ -3,6 +3,7 @@
 use palpate_core::Status;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
+use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation};
 use palpate_live::event::Event;
 use palpate_live::feed::FeedWatch;
 use palpate_live::input::{Arrival, Arrived};
@@ -228,10 +229,15 @@ fn drift_and_creep_are_followed_by_the_trackers_state() {
     let mut presses = rig.simulate(0).unwrap();
     presses.rows.iter_mut().flat_map(|row| &mut row.reading).for_each(|value| *value *= 0.95);
     let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &presses)).unwrap();
-    let faults = FaultConfig { drift_per_s: 1e-7, creep: 0.05, creep_s: 20.0, ..FaultConfig::default() };
+    let imperfections = Imperfections {
+        drift: OffsetDrift { line_per_s: Amount::Value(1e-7), ..OffsetDrift::default() },
+        creep: [Relaxation { share: 0.05, time_s: 20.0 }, Relaxation::default()],
+        ..Imperfections::default()
+    };
+    let faults = FaultConfig { imperfections, ..FaultConfig::default() };
     let held = |creep: Option<CreepConfig>| {
         let mut bench = Bench::new(&rig, &locator, Estimation::Track { frequency_hz: None, creep });
-        bench.board = bench.board.with_faults(faults.clone(), 5);
+        bench.board = bench.board.with_faults(faults.clone(), 5).unwrap();
         let mut bench = bench.untouched_first();
         bench.take(20 * 500);
         bench.finger("finger 117 0 3");

@@ -3,6 +3,7 @@
 //! `PALPATE_SOAK_MINUTES=60 cargo test -p palpate-live --test soak -- --nocapture` takes an hour of readings, as fast as they are located.
 
 use palpate_estimators::fit::{Fit, FitTask};
+use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation};
 use palpate_live::input::{Arrival, Arrived};
 use palpate_live::recording::RecordingSwitch;
 use palpate_live::session::{Estimation, Session, SessionConfig};
@@ -27,22 +28,20 @@ fn every_line_is_accounted_for_and_memory_stays_flat() {
     let rig = Rig::from_toml(RIG).unwrap();
     let recording = rig.simulate(0).unwrap();
     let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
-    let faults = FaultConfig {
-        dropped: 0.005,
-        torn: 0.005,
-        drift_per_s: 1e-8,
-        walk_per_root_s: 1e-8,
-        creep: 0.02,
-        creep_s: 5.0,
-        ..FaultConfig::default()
+    let imperfections = Imperfections {
+        drift: OffsetDrift { line_per_s: Amount::Value(1e-8), walk_per_root_s: Amount::Value(1e-8) },
+        creep: [Relaxation { share: 0.02, time_s: 5.0 }, Relaxation::default()],
+        ..Imperfections::default()
     };
+    let faults = FaultConfig { dropped: 0.005, torn: 0.005, imperfections, ..FaultConfig::default() };
     let mut board = SimulatedBoard::new(
         &rig.setup,
         &BoardConfig { rate_hz: RATE_HZ, seed: 1, ..BoardConfig::default() },
         Finger::random(&rig, 1),
     )
     .unwrap()
-    .with_faults(faults, 1);
+    .with_faults(faults, 1)
+    .unwrap();
     let mut session = Session::new(&locator, &SessionConfig::default()).unwrap();
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("soak");
     let _ = std::fs::remove_dir_all(&folder);

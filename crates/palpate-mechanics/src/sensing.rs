@@ -392,13 +392,23 @@ pub fn measure(
     errors: &ChannelErrors,
     rng: &mut impl Rng,
 ) -> Vec<f64> {
-    let drawn = errors.gains.iter().zip(&errors.offsets);
+    let noise: Vec<f64> = layout.sensors.iter().map(|_| rng.sample(StandardNormal)).collect();
+    measure_with_noise(layout, clean_reading, errors, &noise)
+}
+
+/// Readings of faulty channels as [`measure`] makes them, with this noise of variance 1, a value a sensor.
+pub fn measure_with_noise(
+    layout: &Layout,
+    clean_reading: &[f64],
+    errors: &ChannelErrors,
+    noise: &[f64],
+) -> Vec<f64> {
+    let drawn = errors.gains.iter().zip(&errors.offsets).zip(noise);
     let channels = layout.sensors.iter().map(|sensor| &sensor.channel);
     channels
         .zip(clean_reading)
         .zip(drawn)
-        .map(|((channel, value), (gain, offset))| {
-            let noise: f64 = rng.sample(StandardNormal);
+        .map(|((channel, value), ((gain, offset), noise))| {
             channel.report((1.0 + gain) * value + offset + channel.noise_sd * noise)
         })
         .collect()

@@ -50,6 +50,7 @@ mod document;
 mod error;
 mod estimator;
 mod first_rig;
+mod imperfections;
 mod in_words;
 mod motion;
 mod recording;

@@ -13,6 +13,7 @@ use crate::design::DesignKeys;
 use crate::document::{self, At};
 use crate::error::{RigError, RigProblem};
 use crate::estimator::EstimatorKeys;
+use crate::imperfections::ImperfectionsKeys;
 use crate::motion::{self, MotionKeys};
 use crate::recording::RecordingKeys;
 use crate::sensors::{self, SensorsKeys};
@@ -69,6 +70,8 @@ pub(crate) struct RigFile {
     pub design: Option<At<DesignKeys>>,
     /// The machine that presses by itself.
     pub stage: Option<StageKeys>,
+    /// Imperfections of a real bench, for simulations.
+    pub imperfections: Option<At<ImperfectionsKeys>>,
 }
 
 /// Greatest number of values that a recording of the training positions should hold in memory.
@@ -97,7 +100,7 @@ impl RigSections {
         self.0.surface.as_ref().ok_or_else(|| missing("[surface]"))?.build()
     }
 
-    /// `[surface]` and `[sensors]`, with what `[contact]` says of the force and `[recording]` of the columns.
+    /// `[surface]` and `[sensors]`, with what `[contact]` says of the force, `[recording]` of the columns, and `[imperfections]` of simulations.
     ///
     /// # Errors
     /// [`RigError`] without a surface or sensors, and for what does not go together.
@@ -118,10 +121,25 @@ impl RigSections {
             Ok(setup.with_force(force_n)?.with_greatest_force(greatest_force_n)?)
         });
         let setup = setup.map_err(|error| RigProblem::Setup(error).without_place())?;
+        let setup = self.with_imperfections(setup)?;
         Ok(match columns {
             Some(columns) => setup.recorded_as(columns),
             None => setup,
         })
+    }
+
+    /// A setup with the imperfections of `[imperfections]`, where the text has this section.
+    ///
+    /// # Errors
+    /// [`RigError`] for imperfections that do not go with the setup.
+    pub fn with_imperfections(&self, setup: Setup) -> Result<Setup, RigError> {
+        let Some(keys) = &self.0.imperfections else { return Ok(setup) };
+        let mut dimensions = setup.layout().sensors().iter().map(|sensor| sensor.kind.dimension());
+        let first = dimensions.next();
+        let dimension = first.filter(|first| dimensions.all(|other| other == *first));
+        let imperfections = keys.build(setup.surface(), dimension)?;
+        let setup = setup.with_imperfections(imperfections);
+        setup.map_err(|error| RigProblem::Setup(error).at_place(&keys.place))
     }
 
     /// `[training]` on a setup, of which the readings can be simulated or are recorded.
@@ -137,7 +155,10 @@ impl RigSections {
             return Err(RigProblem::NoForce.at_place(&keys.place));
         }
         check_force(keys.force.as_ref(), surface)?;
-        let values = training.count.saturating_mul(training.repeats).saturating_mul(setup.layout().len());
+        let untouched =
+            setup.imperfections().map_or(0, |imperfections| imperfections.schedule.untouched_rows);
+        let rows = training.repeats.saturating_add(untouched as usize);
+        let values = training.count.saturating_mul(rows).saturating_mul(setup.layout().len());
         if values > MOST_VALUES {
             let value = format!("{values} values, positions × repeats × sensors");
             return Err(keys.place.refuse_as(value, format!("at most {MOST_VALUES}")));

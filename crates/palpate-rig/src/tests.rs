@@ -1,4 +1,5 @@
 mod digits;
+mod imperfections;
 mod loads;
 mod planes;
 mod plates;

@@ -70,6 +70,7 @@ bounds! {
     AboveZero: "greater than 0" if |si| si > 0.0;
     AtLeastZero: "at least 0" if |si| si >= 0.0;
     BelowOne: "at least 0 and below 1" if |si| (0.0..1.0).contains(&si);
+    TailFreedom: "greater than 2" if |si| si > 2.0;
 }
 
 /// The range of false-alarm rates.
@@ -101,6 +102,9 @@ pub(crate) enum Written {
     Text(String),
     Number(f64),
 }
+
+/// A share of the range of the sensors, or a quantity that they measure.
+pub(crate) type ShareOrQuantity = Written;
 
 impl Written {
     fn si(&self, wanted: Dimension) -> Result<f64, UnitError> {

@@ -12,6 +12,7 @@ pub use palpate_estimators::estimator::{
 pub use palpate_estimators::evaluation::{Calibration, Evaluation, Portion, cross_validate};
 pub use palpate_estimators::fit::{Fit, FitTask, Fitted, Locate};
 pub use palpate_estimators::gaussian_process::GaussianProcessEstimator;
+pub use palpate_estimators::imperfections::Imperfections;
 pub use palpate_estimators::influence::Influence;
 pub use palpate_estimators::neighbours::Neighbours;
 pub use palpate_estimators::network::{LevenbergMarquardt, Network};

@@ -188,6 +188,7 @@ impl<'a> Page<'a> {
             "Span" => "span of time, as in `\"0 s..10 s\"`, `\"95 s..\"` or `\"..2 min\"`".to_owned(),
             "Point" => "length; on a plane a list: along and across".to_owned(),
             "Written" => "quantity that the sensors measure".to_owned(),
+            "ShareOrQuantity" => "share of the range, or quantity that the sensors measure".to_owned(),
             "bool" => "`true` or `false`".to_owned(),
             "String" => "text".to_owned(),
             "i64" => "whole number".to_owned(),

@@ -4,7 +4,7 @@ use super::Finding;
 use super::project::{Crate, Project};
 
 /// Top to bottom: a crate may depend on those above it.
-const ORDER: [&str; 15] = [
+const ORDER: [&str; 16] = [
     "palpate-core",
     "palpate-numerics",
     "palpate-testing",
@@ -15,6 +15,7 @@ const ORDER: [&str; 15] = [
     "palpate-studies",
     "palpate-report",
     "palpate",
+    "palpate-validation",
     "palpate-export",
     "palpate-live",
     "palpate-cli",

@@ -17,9 +17,10 @@ use palpate_estimators::evaluation::{
     ErrorSummary, Evaluation, ForceSummary, Portion, Split, evaluate_splits, percentage_error,
 };
 use palpate_estimators::recording::{Provenance, Recording};
-use palpate_estimators::simulate::simulate_at_watched;
+use palpate_estimators::simulate::{contacts_at, simulate_use_watched};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_length_mm};
+use palpate_numerics::watch::Watch;
 use palpate_report::{EvaluationReport, Judged, evaluation_report};
 use palpate_rig::Rig;
 use std::path::PathBuf;
@@ -95,11 +96,12 @@ struct Answers {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    arguments.tare.check_recorded(&arguments.files)?;
     let read = [Some(arguments.subject.as_path()), arguments.tare.path()].into_iter().flatten();
     let inputs = Inputs::new(arguments.files.paths().chain(read));
     let out = arguments.out.as_ref().map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
-    let answers = match RigOrLocator::read(&arguments.subject)? {
+    let subject = RigOrLocator::read(&arguments.subject)?;
+    arguments.tare.check_drifts(&arguments.files, subject.setup())?;
+    let answers = match subject {
         RigOrLocator::Rig(rig) => cross_validated(arguments, rig)?,
         RigOrLocator::Locator(locator) => located(arguments, locator)?,
     };
@@ -187,10 +189,11 @@ fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Fail
     let recording = match arguments.files.read(&locator.setup)? {
         Some(recording) => {
             warn_of_training_data(&locator, &recording);
-            tared_recording(&arguments.tare, &locator, recording)?
+            recording
         }
         None => simulated(&locator, arguments.seed)?,
     };
+    let recording = tared_recording(&arguments.tare, &locator, recording)?;
     let evaluation = Observer::of_stages()
         .watch(|watch| Evaluation::new_watched(&locator, &recording, watch))
         .map_err(|error| Failure::from_error(&error))?;
@@ -201,12 +204,15 @@ fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
     Complaint::new(error).help("--data names a recording to judge by")
 }
 
-/// The bench pressed all over: for the paper's beam at every millimetre, on a plane in the middles of about 400 cells.
+/// The bench pressed all over after its calibration: for the paper's beam at every millimetre, on a plane in the middles of about 400 cells.
 fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
+    let calibration = &locator.provenance.recording;
     let positions = all_over(locator.setup.surface().extent());
-    Observer::of_stages()
-        .watch(|watch| simulate_at_watched(&locator.setup, &positions, 1, seed, watch))
-        .map_err(|error| Failure::of_work(error, simulation_complaint))
+    let simulate = |watch: Watch| {
+        let contacts = contacts_at(&locator.setup, &positions)?;
+        simulate_use_watched(&locator.setup, calibration, &contacts, seed, watch)
+    };
+    Observer::of_stages().watch(simulate).map_err(|error| Failure::of_work(error, simulation_complaint))
 }
 
 fn warn_of_training_data(locator: &Locator, recording: &Recording) {

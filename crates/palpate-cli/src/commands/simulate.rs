@@ -5,7 +5,7 @@ use crate::progress::Observer;
 use crate::target::{Inputs, Target};
 use crate::{input, output, target};
 use palpate_estimators::arrangement::{EveryError, every};
-use palpate_estimators::recording;
+use palpate_estimators::recording::{self, comment_with_placement};
 use palpate_estimators::simulate::simulate_at_watched;
 use palpate_mechanics::units::format_count;
 use palpate_numerics::watch::Watch;
@@ -53,7 +53,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = recording
         .map_err(|error| Failure::of_work(error, |error| Complaint::about(&arguments.rig, error)))?;
     let mut csv = Vec::new();
-    recording::write(&recording, rig.setup.surface().extent(), &comment(arguments), &mut csv)
+    let comment = comment_with_placement(&comment(arguments), recording.provenance.placement_sd_m);
+    recording::write(&recording, rig.setup.surface().extent(), &comment, &mut csv)
         .map_err(|error| target::cannot("write", out.path(), &error))?;
     out.write(&csv)?;
     output::say(format!(

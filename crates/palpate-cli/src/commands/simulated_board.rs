@@ -4,6 +4,7 @@ use crate::failure::{Complaint, Failure};
 use crate::input;
 use crate::progress::interrupted;
 use crate::remark::remark;
+use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation};
 use palpate_live::simulated_board::{
     BoardConfig, FaultConfig, Finger, FrameForm, Link, LinkUrl, LoadCell, SimulatedBoard,
 };
@@ -40,33 +41,33 @@ pub struct Arguments {
     /// Pull the cable for a second, every so often
     #[arg(long, value_name = "TIME", value_parser = input::time)]
     disconnect_every: Option<f64>,
-    /// Drift of each channel in a second, in its SI unit or raw; upward and downward channels in turn
-    #[arg(long, value_name = "NUMBER", default_value_t = 0.0, allow_negative_numbers = true)]
-    drift: f64,
-    /// Random walk of each channel: its standard deviation after a second, in its SI unit or raw
-    #[arg(long, value_name = "NUMBER", default_value_t = 0.0)]
-    walk: f64,
-    /// Share of a reading that follows the contact slowly
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = input::share)]
-    creep: f64,
-    /// Time constant of the creep
-    #[arg(long, value_name = "TIME", default_value = "5 s", value_parser = input::time)]
-    creep_time: f64,
-    /// Hysteresis of each channel: its width as a share of the channel's range under the finger
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = input::share)]
-    hysteresis: f64,
-    /// Share of the largest reading of a touch that remains after it
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = input::share)]
-    residue: f64,
-    /// Time constant in which the residue fades
-    #[arg(long, value_name = "TIME", default_value = "20 s", value_parser = input::time)]
-    residue_time: f64,
-    /// Step of the channels' converters, in their SI unit or raw [default: continuous values]
-    #[arg(long, value_name = "NUMBER", default_value_t = 0.0)]
-    converter_step: f64,
-    /// Frames that repeat each reading after the first, as of a logger that is faster than its sensors
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    repeats: u32,
+    /// Drift of each channel in a second, in its SI unit or raw; upward and downward channels in turn [default: that of the rig]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    drift: Option<f64>,
+    /// Random walk of each channel: its standard deviation after a second, in its SI unit or raw [default: that of the rig]
+    #[arg(long, value_name = "NUMBER")]
+    walk: Option<f64>,
+    /// Share of a reading that follows the contact slowly [default: that of the rig]
+    #[arg(long, value_name = "SHARE", value_parser = input::share)]
+    creep: Option<f64>,
+    /// Time constant of the creep [default: that of the rig, or 5 s]
+    #[arg(long, value_name = "TIME", value_parser = input::time)]
+    creep_time: Option<f64>,
+    /// Hysteresis of each channel: its width as a share of the channel's range under the finger [default: that of the rig]
+    #[arg(long, value_name = "SHARE", value_parser = input::share)]
+    hysteresis: Option<f64>,
+    /// Share of the largest reading of a touch that remains after it [default: that of the rig]
+    #[arg(long, value_name = "SHARE", value_parser = input::share)]
+    residue: Option<f64>,
+    /// Time constant in which the residue fades [default: that of the rig, or 20 s]
+    #[arg(long, value_name = "TIME", value_parser = input::time)]
+    residue_time: Option<f64>,
+    /// Step of the channels' converters, in their SI unit or raw [default: the resolution of the rig's sensors]
+    #[arg(long, value_name = "NUMBER")]
+    converter_step: Option<f64>,
+    /// Frames that repeat each reading after the first, as of a logger that is faster than its sensors [default: as the rig]
+    #[arg(long, value_name = "N")]
+    repeats: Option<u32>,
     /// A script of the finger: CSV of time in s, x and y in mm, force in N [default: a random finger]
     #[arg(long, value_name = "FILE.csv")]
     finger: Option<PathBuf>,
@@ -139,26 +140,50 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     };
     let config = BoardConfig { rate_hz: arguments.rate, seed: arguments.seed, load_cell, frames };
-    let faults = FaultConfig {
-        dropped: arguments.drop,
-        torn: arguments.torn,
-        drift_per_s: arguments.drift,
-        walk_per_root_s: arguments.walk,
-        creep: arguments.creep,
-        creep_s: arguments.creep_time,
-        hysteresis: arguments.hysteresis,
-        residue: arguments.residue,
-        residue_s: arguments.residue_time,
-        converter_step: arguments.converter_step,
-        repeats: arguments.repeats,
-    };
     let board = SimulatedBoard::new(&rig.setup, &config, finger)
+        .and_then(|board| board.with_faults(arguments.faults(&rig), arguments.seed))
         .map_err(|error| Complaint::about(&arguments.rig, error))?;
-    let board = board.with_faults(faults, arguments.seed);
     let machine = machine(arguments, &rig)?;
     let link = Link::open(&arguments.to).map_err(Complaint::new)?;
     remark!("{}", link.name());
     Plugged { board, link, machine, away_until: None, commands: 0 }.run(arguments)
+}
+
+/// Time constants of a creep and of a residue whose share alone is given, in seconds.
+const CREEP_S: f64 = 5.0;
+const RESIDUE_S: f64 = 20.0;
+
+impl Arguments {
+    /// Faults of the board: the imperfections of the rig, but for those that options give.
+    fn faults(&self, rig: &Rig) -> FaultConfig {
+        let faults = FaultConfig::of_setup(&rig.setup);
+        let Imperfections { hysteresis, creep, residue, drift, repeated_readings, .. } = faults.imperfections;
+        let [first, second] = creep;
+        let amount = |option: Option<f64>, of_rig| option.map_or(of_rig, Amount::Value);
+        let imperfections = Imperfections {
+            hysteresis: self.hysteresis.unwrap_or(hysteresis),
+            creep: [relaxation(first, self.creep, self.creep_time, CREEP_S), second],
+            residue: relaxation(residue, self.residue, self.residue_time, RESIDUE_S),
+            drift: OffsetDrift {
+                line_per_s: amount(self.drift, drift.line_per_s),
+                walk_per_root_s: amount(self.walk, drift.walk_per_root_s),
+            },
+            repeated_readings: self.repeats.unwrap_or(repeated_readings),
+            ..faults.imperfections
+        };
+        FaultConfig {
+            dropped: self.drop,
+            torn: self.torn,
+            converter_step: self.converter_step,
+            imperfections,
+        }
+    }
+}
+
+/// A relaxation of the rig, but for what options give.
+fn relaxation(of_rig: Relaxation, share: Option<f64>, time_s: Option<f64>, usual_s: f64) -> Relaxation {
+    let rig_s = if of_rig.share > 0.0 { of_rig.time_s } else { usual_s };
+    Relaxation { share: share.unwrap_or(of_rig.share), time_s: time_s.unwrap_or(rig_s) }
 }
 
 fn load_cell(arguments: &Arguments, rig: &Rig) -> Result<Option<LoadCell>, Failure> {

@@ -4,6 +4,7 @@
 use crate::support::attempt::Attempt;
 use crate::support::command::folder;
 use palpate_estimators::estimator::Locator;
+use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation};
 use palpate_estimators::simulate::SimulatedBench;
 use palpate_live::simulated_board::{
     BoardConfig, FaultConfig, Finger, Hand, HandStyle, Instruction, Link, SimulatedBoard,
@@ -48,7 +49,7 @@ fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
     let mut link = Link::open(&"pty".parse().unwrap()).unwrap();
     let config = BoardConfig { seed, ..BoardConfig::default() };
     let board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, seed)).unwrap();
-    let mut board = board.with_faults(faults, seed);
+    let mut board = board.with_faults(faults, seed).unwrap();
     let mut hand = Hand::new(style, rig.setup.surface().extent(), seed);
     let from = format!("serial://{}", link.name());
     let arguments =
@@ -95,8 +96,14 @@ fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
 #[test]
 fn hands_of_all_kinds_calibrate_a_board_at_a_serial_port() {
     let exact = HandStyle { placement_m: 5e-4, ..HandStyle::default() };
-    let hysteresis = |hysteresis| FaultConfig { hysteresis, ..FaultConfig::default() };
-    let drift = FaultConfig { drift_per_s: 2.0 * NOISE, creep: 0.03, creep_s: 5.0, ..hysteresis(0.01) };
+    let imperfect = |imperfections| FaultConfig { imperfections, ..FaultConfig::default() };
+    let hysteresis = |hysteresis| imperfect(Imperfections { hysteresis, ..Imperfections::default() });
+    let drift = imperfect(Imperfections {
+        hysteresis: 0.01,
+        drift: OffsetDrift { line_per_s: Amount::Value(2.0 * NOISE), ..OffsetDrift::default() },
+        creep: [Relaxation { share: 0.03, time_s: 5.0 }, Relaxation::default()],
+        ..Imperfections::default()
+    });
     let hands = [
         ("quick", exact, FaultConfig::default()),
         ("slow", HandStyle { press_s: 1.0, lift_s: 1.0, ..exact }, hysteresis(0.01)),

@@ -4,7 +4,7 @@ use super::{Evaluation, EvaluationError, Split, SplitOrigin};
 use crate::arrangement::{Training, all_over};
 use crate::fit::{Fit, FitTask, Fitted, Locate, SeedList};
 use crate::setup::Setup;
-use crate::simulate::{SimulateError, simulate_at_watched, simulate_contacts_watched};
+use crate::simulate::{Press, PressedBench, SimulateError, simulate_at_watched, simulate_contacts_watched};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::ChannelModel;
 use palpate_numerics::OutOfRange;
@@ -43,6 +43,8 @@ pub struct Calibration {
     known: Setup,
     /// Positions of the presses, each as often as it is pressed.
     presses: Vec<Position>,
+    /// Standard deviation in each direction of the pressed place about the asked one, in metres, on a setup with imperfections.
+    placement_sd_m: Option<f64>,
     /// Positions of the contacts afterwards, each as often as it is read.
     contacts: Vec<Position>,
 }
@@ -76,6 +78,7 @@ impl Calibration {
             force_shares: &[1.0],
             known: setup.clone(),
             presses: Vec::new(),
+            placement_sd_m: None,
             contacts: all_over(setup.surface().extent()),
         })
     }
@@ -86,7 +89,8 @@ impl Calibration {
     /// [`SimulateError`] when the positions cannot be laid out on the surface, or for a force out of its range.
     pub fn from_training(setup: &Setup, training: &Training) -> Result<Self, SimulateError> {
         let positions = training.positions(setup.surface().extent())?;
-        Ok(Self::new(setup, training.force_n)?.pressed_at(&positions, training.repeats))
+        let calibration = Self::new(setup, training.force_n)?.pressed_at(&positions, training.repeats);
+        Ok(Self { placement_sd_m: training.placement_sd_m, ..calibration })
     }
 
     /// The same by presses at other positions, `repeats` at each.
@@ -134,6 +138,9 @@ impl Calibration {
     /// Recordings of the presses to fit and of the contacts to judge. Both are read by the same faulty channels: their gains and offsets are the first
     /// draws of a seed. A reading's noise depends on the seed and on how many come before it alone.
     ///
+    /// With imperfections one bench makes both recordings, one after the other: equal presses in a row are one press that is read so often, and
+    /// untouched rows stand between presses.
+    ///
     /// # Errors
     /// [`SimulateError`] when the setup has no model or no force, or a position lies off the surface.
     pub fn simulate(&self, seed: u64) -> Result<Split, SimulateError> {
@@ -147,6 +154,9 @@ impl Calibration {
     pub fn simulate_watched(&self, seed: u64, watch: Watch) -> Result<Split, SimulateError> {
         let force_n = self.touched.force_n().ok_or(SimulateError::NoForce)?;
         let presses = self.presses.iter().map(|position| Contact { position: *position, force_n });
+        if self.touched.imperfections().is_some() {
+            return self.simulate_in_time(seed, watch);
+        }
         let all: Vec<Contact> = presses.chain(self.contacts()?).collect();
         let rows: Vec<usize> = (0..all.len()).collect();
         let (pressed, touched) = rows.split_at(self.presses.len());
@@ -157,6 +167,19 @@ impl Calibration {
             simulate_at_watched(&self.pressed, &self.presses, 1, seed, watch)?
         };
         let judged = recording.subset(touched);
+        Ok(Split { training, judged, offsets: None, origin: SplitOrigin::Calibration })
+    }
+
+    /// Recordings of a bench with imperfections.
+    fn simulate_in_time(&self, seed: u64, watch: Watch) -> Result<Split, SimulateError> {
+        let force_n = self.pressed.force_n().ok_or(SimulateError::NoForce)?;
+        let pressed: Vec<Contact> =
+            self.presses.iter().map(|position| Contact { position: *position, force_n }).collect();
+        let presses = Press::from_rows(&pressed);
+        let mut bench = PressedBench::new(&self.pressed, &presses, seed, watch)?;
+        let training = bench.record(&presses, self.placement_sd_m, watch)?;
+        bench.pause();
+        let judged = bench.record(&Press::from_rows(&self.contacts()?), None, watch)?.touched().into_owned();
         Ok(Split { training, judged, offsets: None, origin: SplitOrigin::Calibration })
     }
 
@@ -232,7 +255,9 @@ impl Calibration {
 
     /// Whether every channel reports what its sensor reads.
     fn is_faultless(&self) -> bool {
-        self.pressed.layout().sensors().iter().all(|sensor| sensor.channel == ChannelModel::default())
+        let channels = self.pressed.layout().sensors();
+        let are_perfect = channels.iter().all(|sensor| sensor.channel == ChannelModel::default());
+        are_perfect && self.pressed.imperfections().is_none()
     }
 }
 

@@ -35,6 +35,7 @@ fn recording_of(rows: Vec<Row>) -> Recording {
             repeats: None,
             seed: None,
             placement_sd_m: None,
+            bench: None,
         },
         rows,
     }

@@ -502,6 +502,7 @@ mod tests {
             repeats: None,
             seed: None,
             placement_sd_m: None,
+            bench: None,
         };
         let kinds = vec![SensorKind::Deflection];
         Recording { channels: vec!["d".into()], kinds, rows: rows.collect(), provenance }

@@ -48,6 +48,7 @@ pub use zero_force::ZeroForce;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::imperfections::BenchState;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_numerics::{mean, random_order};
@@ -124,6 +125,9 @@ pub struct Provenance {
     /// said so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placement_sd_m: Option<f64>,
+    /// State in which the recording left a simulated bench with imperfections.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bench: Option<BenchState>,
 }
 
 /// One way to hold positions out: the rows to fit, and the rows to judge by.
@@ -156,6 +160,7 @@ impl Recording {
             repeats: None,
             seed: None,
             placement_sd_m: None,
+            bench: None,
         };
         Self { channels: layout.names(), kinds: layout.kinds(), rows, provenance }
     }

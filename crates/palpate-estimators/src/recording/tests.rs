@@ -352,6 +352,7 @@ fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
         repeats: None,
         seed: None,
         placement_sd_m: None,
+        bench: None,
     };
     Recording {
         channels: vec!["good".to_owned(), "bad".to_owned()],

@@ -3,7 +3,8 @@
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{CleanSensors, READINGS_EACH, STAGE, SimulateError};
+use super::{CleanSensors, READINGS_EACH, STAGE, SimulateError, SimulatedBench};
+use crate::imperfections::spread_contact;
 use crate::recording::{Recording, Row, TimedRecording};
 use crate::setup::Setup;
 use palpate_mechanics::contact::Contact;
@@ -78,7 +79,7 @@ impl MovingContacts {
 /// Moves contacts over the bench's simulated surface, and records what the faulty channels report: over a beam that swings,
 /// from its balance under them, or over a plate that is in balance at every reading. Gains and offsets are drawn once for
 /// the recording, noise for each reading. While a contact is lifted its force is 0, and its position is where it comes down
-/// again.
+/// again. Imperfections act in the course of the motion.
 ///
 /// The same seed gives the same recording.
 ///
@@ -110,27 +111,45 @@ pub fn simulate_moving_watched(
     let errors = ChannelErrors::draw(layout, &mut rng);
     let count = (moving.duration_s() * moving.rate_hz).floor() as usize + 1;
     let times_s: Vec<f64> = (0..count).map(|i| i as f64 / moving.rate_hz).collect();
+    let mut worn =
+        setup.imperfections().map(|_| SimulatedBench::new_watched(setup, seed, watch)).transpose()?;
+    let repeated = setup.imperfections().map_or(0, |imperfections| imperfections.repeated_readings as usize);
+    let points_at = |time_s: f64| points_of(setup, &moving.contacts_at(time_s, force_n));
     let mut under = match moving.beam {
-        Some(beam) => Under::Swings(beam.at_rest(MODES, &moving.contacts_at(0.0, force_n))),
+        Some(beam) => Under::Swings(beam.at_rest(MODES, &points_at(0.0))),
         None => Under::Balances(CleanSensors::new_watched(surface, layout, watch)?),
     };
-    let (mut rows, mut second) = (Vec::with_capacity(count), Vec::new());
+    let (mut rows, mut second) = (Vec::<Row>::with_capacity(count), Vec::new());
     for (i, time_s) in times_s.iter().enumerate() {
         if i.is_multiple_of(READINGS_EACH) {
             watch.counted(STAGE, "readings", i, count)?;
         }
         let contacts = moving.contacts_at(*time_s, force_n);
         if let (Under::Swings(response), Some(before)) = (&mut under, i.checked_sub(1)) {
-            advance(response, moving, force_n, (times_s[before], *time_s));
+            advance(response, moving, &points_at, (times_s[before], *time_s));
         }
-        let clean = under.reading(layout, &contacts);
-        let reading = measure(layout, &clean, &errors, &mut rng);
+        let clean = under.reading(layout, &points_at(*time_s));
+        let reading = match &mut worn {
+            None => measure(layout, &clean, &errors, &mut rng),
+            Some(bench) => {
+                let values = bench.advance(&clean, if i == 0 { 0.0 } else { 1.0 / moving.rate_hz });
+                let last = rows.last().filter(|_| !i.is_multiple_of(1 + repeated));
+                last.map_or_else(|| bench.measure(&values), |row| row.reading.clone())
+            }
+        };
         let Contact { position, force_n } = contacts[0];
         rows.push(Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading });
         second.extend(contacts.get(1));
     }
     let recording = Recording::new(layout, "simulation", rows).seeded(seed);
     Ok(TimedRecording { recording, times_s, second })
+}
+
+/// The contacts, each spread where the setup has a soft layer.
+fn points_of(setup: &Setup, contacts: &[Contact]) -> Vec<Contact> {
+    let width_m = setup.imperfections().map_or(0.0, |imperfections| imperfections.touch_width_m);
+    let spread = |contact: &Contact| spread_contact(*contact, width_m, setup.surface().extent());
+    contacts.iter().flat_map(spread).collect()
 }
 
 /// The surface under the contacts.
@@ -157,10 +176,15 @@ impl Under<'_> {
 }
 
 /// Moves the contacts from one instant to another along their paths, however far apart readings are.
-fn advance(response: &mut ModalResponse, moving: &MovingContacts, force_n: f64, (from_s, to_s): (f64, f64)) {
+fn advance(
+    response: &mut ModalResponse,
+    moving: &MovingContacts,
+    points_at: &dyn Fn(f64) -> Vec<Contact>,
+    (from_s, to_s): (f64, f64),
+) {
     let mut now_s = from_s;
     for end_s in moving.pieces_s(from_s, to_s) {
-        response.advance(&moving.contacts_at(end_s, force_n), end_s - now_s);
+        response.advance(&points_at(end_s), end_s - now_s);
         now_s = end_s;
     }
 }

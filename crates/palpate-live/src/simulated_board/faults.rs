@@ -1,5 +1,7 @@
 //! Faults of a simulated board: the configuration of all of them, and frames that are lost or torn.
 
+use palpate_estimators::imperfections::Imperfections;
+use palpate_estimators::setup::Setup;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::Range;
@@ -11,24 +13,18 @@ pub struct FaultConfig {
     pub dropped: f64,
     /// Share of frames of which a part is missing, 0 to 1.
     pub torn: f64,
-    /// Drift of each channel in a second, in its SI unit or raw: that of a line, upward and downward channels in turn.
-    pub drift_per_s: f64,
-    /// Standard deviation of a random walk of each channel after a second, in its SI unit or raw.
-    pub walk_per_root_s: f64,
-    /// Share of a reading that follows the contact slowly, 0 to 1: the creep of a soft surface.
-    pub creep: f64,
-    /// Time constant of the creep, in s, greater than 0 where there is some.
-    pub creep_s: f64,
-    /// Width of each channel's hysteresis as a share of its range under the finger, 0 to 1: a play operator.
-    pub hysteresis: f64,
-    /// Share of the largest reading of a touch that remains after it, 0 to 1.
-    pub residue: f64,
-    /// Time constant in which the residue fades, in s, greater than 0 where there is some.
-    pub residue_s: f64,
-    /// Step of the channels' converters, in their SI unit or raw; 0 for continuous values.
-    pub converter_step: f64,
-    /// Frames that repeat each reading after the first, as of a logger that is faster than its sensors.
-    pub repeats: u32,
+    /// Step of the channels' converters, in their SI unit or raw, in the place of the resolution of the sensors.
+    pub converter_step: Option<f64>,
+    /// Imperfections of the bench. Their schedule has no meaning for a board, which sends all the time.
+    pub imperfections: Imperfections,
+}
+
+impl FaultConfig {
+    /// Imperfections of a setup, and no faults of the way from the board.
+    pub fn of_setup(setup: &Setup) -> Self {
+        let imperfections = setup.imperfections().copied().unwrap_or_default();
+        Self { imperfections, ..Self::default() }
+    }
 }
 
 /// Fate of a frame.

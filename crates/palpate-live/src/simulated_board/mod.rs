@@ -1,6 +1,5 @@
 //! A board without hardware: sensors under a surface that a finger touches, and the frames that firmware would send.
 
-mod distortion;
 mod faults;
 mod finger;
 mod hand;
@@ -12,12 +11,11 @@ pub use hand::{Hand, HandStyle, Instruction};
 pub use link::{Link, LinkError, LinkUrl, LinkUrlError};
 
 use crate::frame::{self, Channel};
-use distortion::{Distortion, convert};
 use faults::{Fate, Faults};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::{SimulateError, SimulatedBench};
-use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::surface::Extent;
+use palpate_mechanics::contact::{Contact, Extent};
+use palpate_numerics::watch::Watch;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -67,10 +65,10 @@ impl Default for BoardConfig {
 /// A simulated board: time in, bytes out.
 pub struct SimulatedBoard<'a> {
     bench: SimulatedBench<'a>,
+    extent: Extent,
     channels: Vec<Channel>,
     finger: Finger,
     faults: Faults,
-    distortion: Distortion,
     rate_hz: f64,
     load_cell: Option<(LoadCell, Xoshiro256PlusPlus)>,
     frames: FrameForm,
@@ -93,19 +91,19 @@ pub struct Sent {
 }
 
 impl<'a> SimulatedBoard<'a> {
-    /// A board on the bench of a setup, touched by a finger.
+    /// A board on the bench of a setup, with the imperfections of the setup, touched by a finger.
     ///
     /// # Errors
     /// [`SimulateError`] for a surface without a model, or one whose equations are not solved.
     pub fn new(setup: &'a Setup, config: &BoardConfig, finger: Finger) -> Result<Self, SimulateError> {
-        let bench = SimulatedBench::new(setup, config.seed)?;
-        let untouched = bench.clean(&[]);
-        let ranges = ranges(&bench, &untouched, setup.surface().extent(), finger.typical_n());
+        let faults = FaultConfig::of_setup(setup);
+        let bench = SimulatedBench::perfect_watched(setup, config.seed, Watch::NONE)?;
+        let bench = bench.with_imperfections(faults.imperfections, finger.typical_n());
         let channels = Channel::all_of(setup);
-        let faults = Faults::new(FaultConfig::default(), config.seed);
+        let faults = Faults::new(faults, config.seed);
         Ok(Self {
             bench,
-            distortion: Distortion::new(&untouched, &ranges, config.seed),
+            extent: setup.surface().extent(),
             channels,
             finger,
             faults,
@@ -122,10 +120,18 @@ impl<'a> SimulatedBoard<'a> {
         })
     }
 
-    /// The same board with these faults.
-    pub fn with_faults(mut self, config: FaultConfig, seed: u64) -> Self {
+    /// The same board with these faults, in the place of those of its setup; the seed draws lost and torn frames.
+    ///
+    /// # Errors
+    /// [`SimulateError`] for a number out of its range.
+    pub fn with_faults(mut self, config: FaultConfig, seed: u64) -> Result<Self, SimulateError> {
+        config.imperfections.check(self.extent)?;
+        if let Some(step) = config.converter_step {
+            self.bench = self.bench.with_resolution(step)?;
+        }
+        self.bench = self.bench.with_imperfections(config.imperfections, self.finger.typical_n());
         self.faults = Faults::new(config, seed);
-        self
+        Ok(self)
     }
 
     /// Time of the next frame since the start.
@@ -156,10 +162,10 @@ impl<'a> SimulatedBoard<'a> {
     pub fn next_frame(&mut self) -> Option<Vec<u8>> {
         let time_s = self.next_at().as_secs_f64();
         let contact = self.finger.contact_at(time_s);
-        let mut clean = self.bench.clean(contact.as_slice());
-        self.distortion.act(&mut clean, &self.faults.config, 1.0 / self.rate_hz);
-        if self.count.is_multiple_of(1 + u64::from(self.faults.config.repeats)) {
-            self.measured = self.measure(&clean, contact);
+        let clean = self.bench.clean_through_layer(contact.as_slice());
+        let values = self.bench.advance(&clean, 1.0 / self.rate_hz);
+        if self.count.is_multiple_of(1 + u64::from(self.faults.config.imperfections.repeated_readings)) {
+            self.measured = self.measure(&values, contact);
         }
         let mut frame = self.frame(time_s);
         self.count += 1;
@@ -178,9 +184,8 @@ impl<'a> SimulatedBoard<'a> {
     }
 
     /// A reading with the noise of the sensors and the load cell.
-    fn measure(&mut self, clean: &[f64], contact: Option<Contact>) -> (Vec<f64>, f64) {
-        let mut reading = self.bench.measure(clean);
-        convert(&mut reading, &self.faults.config);
+    fn measure(&mut self, values: &[f64], contact: Option<Contact>) -> (Vec<f64>, f64) {
+        let reading = self.bench.measure(values);
         let noise_n = self.load_cell.as_mut().map_or(0.0, |(cell, rng)| {
             let noise: f64 = StandardNormal.sample(rng);
             cell.noise_n * noise
@@ -216,24 +221,4 @@ impl<'a> SimulatedBoard<'a> {
         };
         (cells.join(",") + "\n").into_bytes()
     }
-}
-
-/// Positions along each side at which the range of a channel is sought.
-const RANGE_POSITIONS: u32 = 20;
-
-/// Largest deviation of each channel from its untouched reading, under a force on a grid of positions.
-fn ranges(bench: &SimulatedBench, untouched: &[f64], extent: Extent, force_n: f64) -> Vec<f64> {
-    let along =
-        |side_m: f64| (1..RANGE_POSITIONS).map(move |i| side_m * f64::from(i) / f64::from(RANGE_POSITIONS));
-    let across: Vec<f64> = extent.width_m().map_or_else(|| vec![0.0], |width_m| along(width_m).collect());
-    let mut ranges = vec![0.0_f64; untouched.len()];
-    for x_m in along(extent.length_m()) {
-        for y_m in &across {
-            let contact = Contact { position: Position { x_m, y_m: *y_m }, force_n };
-            for ((range, value), untouched) in ranges.iter_mut().zip(bench.clean(&[contact])).zip(untouched) {
-                *range = range.max((value - untouched).abs());
-            }
-        }
-    }
-    ranges
 }

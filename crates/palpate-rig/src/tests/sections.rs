@@ -31,7 +31,7 @@ fn sections_read_by_themselves_build_what_the_whole_rig_builds() {
     for text in texts {
         let rig = Rig::from_toml(&text).unwrap();
         let read = |wanted: &[&str]| RigSections::from_toml(&only(&text, wanted)).unwrap();
-        let bench = read(&["surface", "sensors", "contact", "recording"]);
+        let bench = read(&["surface", "sensors", "contact", "recording", "imperfections"]);
         let setup = bench.setup().unwrap();
         assert_eq!(&setup, &rig.setup);
         assert_eq!(&read(&["surface"]).surface().unwrap(), rig.setup.surface());

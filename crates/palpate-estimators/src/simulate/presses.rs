@@ -1,0 +1,157 @@
+//! Presses of a bench with imperfections, in the course of time.
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::{STAGE, SimulateError, SimulatedBench};
+use crate::imperfections::{BenchState, Imperfections};
+use crate::recording::{Recording, Row};
+use crate::setup::Setup;
+use palpate_mechanics::contact::{Contact, Extent, Position};
+use palpate_numerics::watch::Watch;
+
+/// One press: a contact, and the rows that record it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Press {
+    pub contact: Contact,
+    pub rows: usize,
+}
+
+/// A bench that is pressed by the schedule of its imperfections.
+pub(crate) struct PressedBench<'a> {
+    setup: &'a Setup,
+    imperfections: Imperfections,
+    bench: SimulatedBench<'a>,
+    /// Stream of the places of presses, beside that of the noise.
+    places: Xoshiro256PlusPlus,
+    seed: u64,
+}
+
+/// Tells the stream of places from those of noise, walks, finger and lost frames, which have the same seed.
+const PLACES: u64 = 0x91_ACE5;
+
+impl Press {
+    /// Presses of contacts that are listed as often as they are read: equal contacts in a row are one press.
+    pub fn from_rows(contacts: &[Contact]) -> Vec<Self> {
+        let equal = contacts.chunk_by(|one, next| one == next);
+        equal.filter_map(|rows| Some(Self { contact: *rows.first()?, rows: rows.len() })).collect()
+    }
+}
+
+impl<'a> PressedBench<'a> {
+    /// The bench of a setup as a seed has it, at rest. Where neither imperfections nor setup have a force, ranges of channels are taken under
+    /// the largest of these presses.
+    pub fn new(setup: &'a Setup, presses: &[Press], seed: u64, watch: Watch) -> Result<Self, SimulateError> {
+        let imperfections = setup.imperfections().copied().unwrap_or_default();
+        let largest_n = presses.iter().map(|press| press.contact.force_n.abs()).reduce(f64::max);
+        let force_n = setup.force_n().or(largest_n.filter(|force_n| *force_n > 0.0));
+        let force_n = imperfections.range_force_n.or(force_n).ok_or(SimulateError::NoForce)?;
+        Self::with_range_force(setup, force_n, seed, watch)
+    }
+
+    fn with_range_force(
+        setup: &'a Setup,
+        force_n: f64,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<Self, SimulateError> {
+        let imperfections = setup.imperfections().copied().unwrap_or_default();
+        let bench = SimulatedBench::perfect_watched(setup, seed, watch)?;
+        let bench = bench.with_imperfections(imperfections, force_n);
+        let places = Xoshiro256PlusPlus::seed_from_u64(seed ^ PLACES);
+        Ok(Self { setup, imperfections, bench, places, seed })
+    }
+
+    /// The same bench as an earlier recording left it.
+    pub fn resumed(
+        setup: &'a Setup,
+        state: &BenchState,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<Self, SimulateError> {
+        let pressed = Self::with_range_force(setup, state.range_force_n, state.seed, watch)?;
+        Ok(Self { bench: pressed.bench.resumed(state, seed), seed, ..pressed })
+    }
+
+    /// Lets the pause between calibration and use pass.
+    pub fn pause(&mut self) {
+        let untouched = self.bench.clean(&[]);
+        self.bench.advance(&untouched, self.imperfections.schedule.pause_s);
+    }
+
+    /// Records presses, each beside its place by this standard deviation, and the untouched surface before, between and after them.
+    pub fn record(
+        &mut self,
+        presses: &[Press],
+        placement_sd_m: Option<f64>,
+        watch: Watch,
+    ) -> Result<Recording, SimulateError> {
+        let extent = self.setup.surface().extent();
+        let mut rows = Vec::new();
+        for (i, Press { contact, rows: count }) in presses.iter().enumerate() {
+            watch.counted(STAGE, "presses", i, presses.len())?;
+            self.rest(contact.position, &mut rows);
+            let position = self.pressed_place(contact.position, placement_sd_m, extent);
+            let clean = self.bench.clean_through_layer(&[Contact { position, ..*contact }]);
+            let settle_s = self.imperfections.schedule.settle_s;
+            self.record_window(*contact, &clean, settle_s, *count, &mut rows);
+        }
+        if let Some(last) = presses.last() {
+            self.rest(last.contact.position, &mut rows);
+        }
+        let mut recording = Recording::new(self.setup.layout(), "simulation", rows).seeded(self.seed);
+        recording.provenance.placement_sd_m = placement_sd_m;
+        recording.provenance.bench = self.bench.state();
+        Ok(recording)
+    }
+
+    /// The untouched surface before a press at this position.
+    fn rest(&mut self, next: Position, rows: &mut Vec<Row>) {
+        let schedule = self.imperfections.schedule;
+        let count = schedule.untouched_rows as usize;
+        let recorded_s = count.saturating_sub(1) as f64 * schedule.row_s();
+        let untouched = self.bench.clean(&[]);
+        let nobody = Contact { position: next, force_n: 0.0 };
+        self.record_window(nobody, &untouched, (schedule.rest_s - recorded_s).max(0.0), count, rows);
+    }
+
+    /// Lets time pass under a contact with this faultless reading, and records `count` rows after that.
+    fn record_window(
+        &mut self,
+        contact: Contact,
+        clean: &[f64],
+        before_s: f64,
+        count: usize,
+        rows: &mut Vec<Row>,
+    ) {
+        let mut values = self.bench.advance(clean, before_s);
+        let mut reading = Vec::new();
+        for i in 0..count {
+            if i > 0 {
+                values = self.bench.advance(clean, self.imperfections.schedule.row_s());
+            }
+            if i.is_multiple_of(1 + self.imperfections.repeated_readings as usize) {
+                reading = self.bench.measure(&values);
+            }
+            rows.push(Row {
+                position: contact.position,
+                force_n: Some(contact.force_n),
+                nuisances: Vec::new(),
+                time_s: self.bench.time_s(),
+                reading: reading.clone(),
+            });
+        }
+    }
+
+    /// A place beside the asked one, within the surface.
+    fn pressed_place(&mut self, asked: Position, sd_m: Option<f64>, extent: Extent) -> Position {
+        let Some(sd_m) = sd_m else { return asked };
+        let mut beside = |at_m: f64, side_m: f64| {
+            let error: f64 = self.places.sample(StandardNormal);
+            (at_m + sd_m * error).clamp(0.0, side_m)
+        };
+        let x_m = beside(asked.x_m, extent.length_m());
+        Position { x_m, y_m: extent.width_m().map_or(asked.y_m, |side_m| beside(asked.y_m, side_m)) }
+    }
+}

@@ -1,0 +1,225 @@
+//! One experiment: a bench in a world is calibrated, and located afterwards.
+
+use crate::tally::Tally;
+use anyhow::{Context, Result, ensure};
+use palpate::estimators::arrangement::cells;
+use palpate::estimators::estimator::Locator;
+use palpate::estimators::imperfections::Imperfections;
+use palpate::estimators::simulate::{simulate_presses_watched, simulate_use_watched};
+use palpate::numerics::random_order;
+use palpate::prelude::{
+    Contact, Estimator, Evaluation, Extent, Fit, FitTask, Influence, Position, Recording, Rig, Row, Setup,
+    Watch,
+};
+
+/// World in which a bench is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum World {
+    /// Noise and resolution alone.
+    Clean,
+    /// The imperfections of the rig, and the gain, offset and place errors of its sensors.
+    Imperfect,
+}
+
+/// Knowledge that the locator has of the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Knowledge {
+    /// The model of the rig.
+    Model,
+    /// Readings of raw channels, pressed with several forces.
+    Measured,
+}
+
+/// Zero of the readings in use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Zero {
+    /// The untouched rows before the first contact.
+    Once,
+    /// The untouched rows before each contact.
+    Each,
+}
+
+/// A bench in a world, as a locator knows it.
+pub struct Bench<'a> {
+    pub rig: &'a Rig,
+    pub world: World,
+    pub knowledge: Knowledge,
+}
+
+/// Untouched rows of each rest in use: as many as a person tares with.
+const UNTOUCHED_ROWS: u32 = 10;
+/// Forces in turn, as multiples of that of the presses: of contacts in use, and of calibrations of raw channels.
+const FORCE_SHARES: [f64; 3] = [1.0, 0.5, 2.0];
+/// Multiple of the smallest detectable force that has to be found.
+const LIGHT: f64 = 5.0;
+/// Of the contacts in use each so many-th is repeated lightly.
+const LIGHT_EACH: usize = 4;
+
+/// Recordings of one bench.
+pub struct Recordings {
+    /// The setup as the locator knows it.
+    pub known: Setup,
+    pub calibration: Recording,
+    /// Contacts in use, with untouched rows between them.
+    pub touches: Recording,
+    /// Light touches, in the same way.
+    pub light: Recording,
+}
+
+impl Bench<'_> {
+    /// Calibrates the bench, and touches it at about `contacts` places.
+    pub fn record(&self, contacts: usize, seed: u64) -> Result<Recordings> {
+        let setup = self.setup()?;
+        let mut training = self.rig.training()?.clone();
+        if self.world == World::Clean {
+            training.placement_sd_m = None;
+        }
+        let force_n = training.force_n.or(setup.force_n()).context("the rig has no force of its presses")?;
+        let calibration = match self.knowledge {
+            Knowledge::Model => setup.simulate(&training, seed)?,
+            Knowledge::Measured => {
+                let places = training.positions(setup.surface().extent())?;
+                let (pressed, presses) = (setup.pressed_by(&training)?, in_turn(&places, force_n));
+                let (repeats, placement_sd_m) = (training.repeats, training.placement_sd_m);
+                simulate_presses_watched(&pressed, &presses, repeats, placement_sd_m, seed, Watch::NONE)?
+            }
+        };
+        let places = shuffled(&all_over(setup.surface().extent(), contacts), seed);
+        let touched = in_turn(&places, force_n);
+        let provenance = &calibration.provenance;
+        let used = setup.clone().with_imperfections(with_many_untouched_rows(&setup)?)?;
+        // Streams of noise of their own.
+        let touches = simulate_use_watched(&used, provenance, &touched, seed.wrapping_add(1), Watch::NONE)?;
+        let light = light_touches(&setup, &places)?;
+        let light = simulate_use_watched(&used, provenance, &light, seed.wrapping_add(2), Watch::NONE)?;
+        let known = self.known(&setup)?;
+        let known_by = |recording: Recording| Recording { kinds: known.layout().kinds(), ..recording };
+        Ok(Recordings {
+            calibration: known_by(calibration),
+            touches: known_by(touches),
+            light: known_by(light),
+            known,
+        })
+    }
+
+    /// The setup of the rig in the world.
+    fn setup(&self) -> Result<Setup> {
+        let mut setup = self.rig.setup.clone();
+        let of_rig = setup.imperfections().copied().context("the rig has no [imperfections]")?;
+        let imperfections = match self.world {
+            World::Imperfect => of_rig,
+            World::Clean => Imperfections { schedule: of_rig.schedule, ..Imperfections::default() },
+        };
+        if self.world == World::Clean {
+            setup.edit_sensors(|sensors| {
+                for channel in sensors.iter_mut().map(|sensor| &mut sensor.channel) {
+                    (channel.gain_error, channel.offset_error, channel.position_error_m) = (0.0, 0.0, 0.0);
+                }
+            })?;
+        }
+        Ok(setup.with_imperfections(imperfections)?)
+    }
+
+    /// The setup as the locator knows it.
+    fn known(&self, setup: &Setup) -> Result<Setup> {
+        if self.knowledge == Knowledge::Model {
+            return Ok(setup.clone());
+        }
+        let names = setup.layout().names();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let extent = setup.surface().extent();
+        Ok(match extent.width_m() {
+            None => Setup::measured(extent.length_m(), &names)?,
+            Some(width_m) => Setup::measured_plane(extent.length_m(), width_m, &names)?,
+        })
+    }
+}
+
+/// Imperfections of a setup with the untouched rows of use.
+fn with_many_untouched_rows(setup: &Setup) -> Result<Imperfections> {
+    let mut imperfections = setup.imperfections().copied().context("the setup has no imperfections")?;
+    imperfections.schedule.untouched_rows = UNTOUCHED_ROWS;
+    Ok(imperfections)
+}
+
+impl Recordings {
+    /// Fits an estimator, and locates by each zero; adds to as many tallies.
+    pub fn judge(
+        &self,
+        estimator: &Estimator,
+        seed: u64,
+        zeros: &[Zero],
+        tallies: &mut [Tally],
+    ) -> Result<()> {
+        let task = FitTask::new(&self.known, &self.calibration).seed(seed);
+        let locator = estimator.fit_task(task)?;
+        for (zero, tally) in zeros.iter().zip(tallies) {
+            let touches = tared(&locator, &self.touches, *zero)?;
+            tally.add_positions(&Evaluation::new(&locator, &touches)?);
+            let extent = locator.setup.surface().extent();
+            for row in &touches.rows {
+                let estimate = locator.locate(&row.reading)?;
+                match row.touches() {
+                    true => tally.add_touch(row, &estimate, extent),
+                    false => tally.add_untouched(&estimate),
+                }
+            }
+            for row in tared(&locator, &self.light, *zero)?.rows.iter().filter(|row| row.touches()) {
+                tally.add_light_touch(&locator.locate(&row.reading)?);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The rows after the first rest, tared. Untouched rows are tared by the rest before them.
+fn tared(locator: &Locator, recording: &Recording, zero: Zero) -> Result<Recording> {
+    let mut runs = recording.rows.chunk_by(|a, b| a.touches() == b.touches());
+    let rest = runs.next().filter(|rows| rows.iter().all(|row| !row.touches()));
+    let mut tare = locator.tare()?;
+    for row in rest.context("the recording does not begin untouched")? {
+        tare.add_untouched(&row.reading)?;
+    }
+    let mut rows: Vec<Row> = Vec::new();
+    for run in runs {
+        for row in run {
+            let mut reading = vec![0.0; row.reading.len()];
+            tare.apply(&row.reading, &mut reading)?;
+            rows.push(Row { reading, ..row.clone() });
+        }
+        if zero == Zero::Each && run.iter().all(|row| !row.touches()) {
+            tare = locator.tare()?;
+            run.iter().try_for_each(|row| tare.add_untouched(&row.reading))?;
+        }
+    }
+    ensure!(!rows.is_empty(), "the recording has no rows after its first rest");
+    Ok(Recording { rows, ..recording.clone() })
+}
+
+/// Contacts at places with [`FORCE_SHARES`] of a force in turn.
+fn in_turn(places: &[Position], force_n: f64) -> Vec<Contact> {
+    let shares = places.iter().zip(FORCE_SHARES.iter().cycle());
+    shares.map(|(position, share)| Contact { position: *position, force_n: share * force_n }).collect()
+}
+
+/// Contacts of five times the force that is found with a probability of 95 % by the noise of the channels, where one is.
+fn light_touches(setup: &Setup, places: &[Position]) -> Result<Vec<Contact>> {
+    let limit = setup.cramer_rao_bound()?;
+    let touch = Influence::default().lightest_touch(&limit);
+    let light = places.iter().step_by(LIGHT_EACH).filter_map(|position| {
+        let [_, surely_n] = touch.forces_at(*position);
+        Some(Contact { position: *position, force_n: LIGHT * surely_n? })
+    });
+    Ok(light.collect())
+}
+
+/// About so many positions in the middles of equal cells, as square as they can be on a plane.
+fn all_over(extent: Extent, count: usize) -> Vec<Position> {
+    let Some(width_m) = extent.width_m() else { return cells(extent, count, 1) };
+    let side = |ratio: f64| (count as f64 * ratio).sqrt().round().max(1.0) as usize;
+    cells(extent, side(extent.length_m() / width_m), side(width_m / extent.length_m()))
+}
+
+fn shuffled(positions: &[Position], seed: u64) -> Vec<Position> {
+    random_order(positions.len(), seed).into_iter().map(|i| positions[i]).collect()
+}
