@@ -35,6 +35,7 @@ pub mod features;
 pub mod fit;
 #[cfg(test)]
 mod fixtures;
+pub mod force_prior;
 pub mod gaussian_process;
 mod held_out;
 pub mod influence;

@@ -5,6 +5,7 @@ use std::io::Read;
 use serde::{Deserialize, Serialize};
 
 use crate::arrangement::inner_grid;
+use crate::force_prior::ForceRange;
 use crate::recording::{self, Columns, CsvError, Recording, Schema};
 use palpate_mechanics::contact::{OffSurface, Position};
 use palpate_mechanics::limit::{CramerRaoBound, Force, LimitError};
@@ -26,6 +27,8 @@ pub struct Setup {
     force_n: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     greatest_force_n: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    force_range: Option<ForceRange>,
     columns: Option<Columns>,
 }
 
@@ -38,6 +41,8 @@ struct Unchecked {
     force_n: Option<f64>,
     #[serde(default)]
     greatest_force_n: Option<f64>,
+    #[serde(default)]
+    force_range: Option<ForceRange>,
     columns: Option<Columns>,
 }
 
@@ -45,8 +50,8 @@ impl TryFrom<Unchecked> for Setup {
     type Error = SetupError;
 
     fn try_from(unchecked: Unchecked) -> Result<Self, SetupError> {
-        let Unchecked { surface, layout, force_n, greatest_force_n, columns } = unchecked;
-        let setup = Self { columns, ..Self::new(surface) };
+        let Unchecked { surface, layout, force_n, greatest_force_n, force_range, columns } = unchecked;
+        let setup = Self { columns, force_range, ..Self::new(surface) };
         Ok(setup.with_layout(layout)?.with_force(force_n)?.with_greatest_force(greatest_force_n)?)
     }
 }
@@ -169,6 +174,7 @@ impl Setup {
             layout: Layout::default(),
             force_n: None,
             greatest_force_n: None,
+            force_range: None,
             columns: None,
         }
     }
@@ -226,9 +232,14 @@ impl Setup {
         self.force_n
     }
 
-    /// The greatest force of contacts of unknown force in newtons, greater than 0, where it was said.
+    /// The greatest force of contacts of unknown force in newtons, greater than 0, where it is stated, by itself or as the end of a range.
     pub fn greatest_force_n(&self) -> Option<f64> {
-        self.greatest_force_n
+        self.force_range.map(|range| range.ends_n().1).or(self.greatest_force_n)
+    }
+
+    /// Range of the forces of contacts of unknown force, where it is stated.
+    pub fn force_range(&self) -> Option<ForceRange> {
+        self.force_range
     }
 
     /// Roles of a recording's columns; `None` for the columns that palpate itself writes.
@@ -344,6 +355,12 @@ impl Setup {
         let named = greatest_force_n.map(|force_n| ("the greatest force in newtons", force_n));
         OutOfRange::check_positive(named)?;
         Ok(Self { greatest_force_n, ..self })
+    }
+
+    /// The setup whose contacts of unknown force have forces in this range; `None` for what the calibration tells.
+    #[must_use]
+    pub fn with_force_range(self, force_range: Option<ForceRange>) -> Self {
+        Self { force_range, ..self }
     }
 
     /// Knowledge of the contact force.

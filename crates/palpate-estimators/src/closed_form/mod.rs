@@ -9,13 +9,14 @@ mod polynomial;
 use serde::{Deserialize, Serialize};
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
+use crate::force_prior::DECADE;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::spread::{About, spread_bound, spread_score};
 use crate::status::{
     FalseAlarmRate, LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, misfit_bound, unknowns,
 };
-use crate::trade_off::{Contacts, Force, PRIOR_FORCES, interval_on_line_95, is_near_end};
+use crate::trade_off::{Contacts, Force, interval_on_line_95, is_near_end};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
@@ -319,7 +320,7 @@ const NEGLIGIBLE: f64 = 24.0;
 /// The greatest force of contacts of unknown force: as it was said, or a multiple of a recording's hardest press; `None` where there is neither.
 fn greatest_force_n(setup: &Setup, recording: &Recording) -> Option<f64> {
     let hardest = recording.rows.iter().filter_map(|row| row.force_n).fold(0.0, f64::max);
-    setup.greatest_force_n().or((hardest > 0.0).then_some(PRIOR_FORCES * hardest))
+    setup.greatest_force_n().or((hardest > 0.0).then_some(DECADE * hardest))
 }
 
 /// Squared residuals that differ by less than this share of the reading are the same in double precision.

@@ -3,7 +3,7 @@
 use super::config::ForceBelief;
 use crate::fit::LocatorFault;
 use crate::status::FalseAlarmRate;
-use crate::trade_off::PRIOR_FORCES;
+use crate::force_prior::DECADE;
 use serde::{Deserialize, Serialize};
 
 /// Offsets, noise and reference force of the channels, learnt besides their influence functions, and how rarely their noise is to be
@@ -35,7 +35,7 @@ impl Channels {
 
     /// The greatest force of contacts of unknown force, in newtons: as it was said, or a multiple of the calibration's.
     pub fn greatest_force_n(&self) -> f64 {
-        self.greatest_force_n.unwrap_or(PRIOR_FORCES * self.reference_force_n)
+        self.greatest_force_n.unwrap_or(DECADE * self.reference_force_n)
     }
 
     /// The same without channel `channel` (from 0); `None` when no channel would be left.
