@@ -39,7 +39,7 @@ use crate::work;
 /// greatest_force : float or str, optional
 ///     The greatest that an unknown force can be, on a surface with a model; ten times that of the presses where nothing is said.
 /// force_range : pair of float or str, optional
-///     Least and greatest force of contacts of unknown force: 1 in 40 is lighter, none is harder. Without it a decade either side of the presses, where
+///     Least and greatest force of contacts of unknown force: 1 in 200 is lighter, none is harder. Without it a decade either side of the presses, where
 ///     readings are proportional to the force.
 /// columns : Columns or mapping, optional
 ///     Columns of recordings by their roles, where they are not as palpate writes them.

@@ -1,8 +1,8 @@
 //! An estimate as files and streams have it: in millimetres and newtons, without what was not estimated.
 
+use crate::force_prior::force_interval_95_n;
 use palpate_core::{ContactEstimate, Estimate, Mode};
 use palpate_mechanics::surface::Extent;
-use crate::force_prior::force_interval_95_n;
 use serde::Serialize;
 
 /// The word for an estimate near an end, of a force that is not known.

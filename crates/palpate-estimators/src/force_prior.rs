@@ -1,6 +1,6 @@
 //! Prior of the force of a contact whose force is not known: one for the estimators, the tracker and the status of readings.
 //!
-//! A [`ForceRange`] (W₁, W₂) is a log-normal distribution, ln W ~ N(μ, s²) with the quantiles W₁ at 2.5 % and W₂ at 97.5 %, cut off at W₂. Over
+//! A [`ForceRange`] (W₁, W₂) is a log-normal distribution, ln W ~ N(μ, s²) with the quantiles W₁ at 0.5 % and W₂ at 99.5 %, cut off at W₂. Over
 //! several decades it is nearly flat in ln W: a place where the surface is stiff, and a greater force has to explain the reading, is as probable as
 //! any other. A prior flat in W would prefer the stiff places beside supports, in proportion to the force that they need.
 //!
@@ -12,10 +12,10 @@
 //! - otherwise by the trapezoidal rule over t = ln W. For a density of standard deviation σ in t the rule with the step h errs by 2·e^(−2π²σ²/h²).
 //!   The likelihood has σ = 1/z ≥ min(1, s)/6 and the prior σ = s, so h = min(1, s)/8 errs by less than a thousandth, also where the cut is near.
 
-use palpate_numerics::{NORMAL_95, OutOfRange, normal_between, normal_interval_95};
+use palpate_numerics::{NORMAL_99, OutOfRange, normal_between, normal_interval_95};
 use serde::{Deserialize, Serialize};
 
-/// Range of the forces of contacts, in newtons: 2.5 % are less than its lower end, and none is greater than its upper end.
+/// Range of the forces of contacts, in newtons: 1 in 200 is less than its lower end, and none is greater than its upper end.
 ///
 /// ```
 /// use palpate_estimators::force_prior::ForceRange;
@@ -122,7 +122,7 @@ impl From<ForceRange> for ForcePrior {
 }
 
 impl ForcePrior {
-    /// The log-normal distribution with these quantiles at 2.5 % and 97.5 %, which is cut off at the upper one.
+    /// The log-normal distribution with these quantiles at 0.5 % and 99.5 %, which is cut off at the upper one.
     pub fn log_normal(least_n: f64, greatest_n: f64) -> Self {
         Self::LogNormal(LogNormal::new(least_n, greatest_n))
     }
@@ -200,8 +200,8 @@ impl LogNormal {
         // A power of a force may be beyond all numbers.
         let in_numbers = |force_n: f64| force_n.clamp(f64::MIN_POSITIVE, f64::MAX).ln();
         let (low, high) = (in_numbers(least_n), in_numbers(greatest_n));
-        let (log_median, log_sd) = (0.5 * (low + high), ((high - low) / (2.0 * NORMAL_95)).max(1e-6));
-        let step = (log_sd.min(1.0) / 8.0).max((Self::LOWEST + NORMAL_95) * log_sd / MOST_NODES);
+        let (log_median, log_sd) = (0.5 * (low + high), ((high - low) / (2.0 * NORMAL_99)).max(1e-6));
+        let step = (log_sd.min(1.0) / 8.0).max((Self::LOWEST + NORMAL_99) * log_sd / MOST_NODES);
         let from = (log_median - Self::LOWEST * log_sd).max(f64::MIN_POSITIVE.ln());
         let count = ((high - from) / step).ceil().max(1.0);
         let node = |i: usize| {
@@ -244,7 +244,13 @@ impl LogNormal {
     fn sum(&self, b: f64, a: f64) -> ForceIntegral {
         let exponent = |force_n: f64| force_n * (b - 0.5 * a * force_n);
         let (least_n, most_n) = (self.nodes[0][0], self.greatest_n);
-        let nearest_n = if a > 0.0 { (b / a).clamp(least_n, most_n) } else if b > 0.0 { most_n } else { least_n };
+        let nearest_n = if a > 0.0 {
+            (b / a).clamp(least_n, most_n)
+        } else if b > 0.0 {
+            most_n
+        } else {
+            least_n
+        };
         let reference = exponent(nearest_n);
         let mut sums = [0.0; 3];
         for [force_n, weight] in &self.nodes {
@@ -273,7 +279,11 @@ impl CutNormal {
     fn integrate(&self, cost: f64, greatest_n: f64) -> ForceIntegral {
         let Self { mean_n, precision } = *self;
         if precision.is_nan() || precision <= 0.0 {
-            return ForceIntegral { cost: f64::INFINITY, mean_n: mean_n.clamp(0.0, greatest_n), variance_n2: 0.0 };
+            return ForceIntegral {
+                cost: f64::INFINITY,
+                mean_n: mean_n.clamp(0.0, greatest_n),
+                variance_n2: 0.0,
+            };
         }
         let sd_n = precision.sqrt().recip();
         let part = normal_between(-mean_n / sd_n, (greatest_n - mean_n) / sd_n);

@@ -116,7 +116,10 @@ impl RigSections {
         let columns = recording.as_ref().map(|keys| keys.build(&layout, surface.extent())).transpose()?;
         let setup = Setup::new(surface).with_layout(layout).map_err(SetupError::from).and_then(|setup| {
             let force_n = force.map(|force| force.si);
-            Ok(setup.with_force(force_n)?.with_greatest_force(greatest_force_n)?.with_force_range(force_range))
+            Ok(setup
+                .with_force(force_n)?
+                .with_greatest_force(greatest_force_n)?
+                .with_force_range(force_range))
         });
         let setup = setup.map_err(|error| RigProblem::Setup(error).without_place())?;
         Ok(match columns {

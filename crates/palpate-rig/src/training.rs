@@ -22,7 +22,7 @@ pub(crate) struct ContactKeys {
     pub force: Option<At<Positive<Force>>>,
     /// The greatest that an unknown force can be, on a surface with a model; ten times that of the presses unless said otherwise.
     pub greatest_force: Option<At<Positive<Force>>>,
-    /// Least and greatest force of contacts of unknown force: 1 in 40 is lighter, none is harder; a decade either side of the presses unless said otherwise.
+    /// Least and greatest force of contacts of unknown force: 1 in 200 is lighter, none is harder; a decade either side of the presses unless said otherwise.
     pub force_range: Option<At<ForceRangeKeys>>,
 }
 
@@ -43,10 +43,11 @@ impl ContactKeys {
         }
         let ForceRangeKeys(least, greatest) = **range;
         let built = ForceRange::new(least.si, greatest.si);
-        built.map(Some).map_err(|_| range.place.refuse_as(
-            format!("{} N to {} N", least.si, greatest.si),
-            "from a lesser to a greater force",
-        ))
+        built.map(Some).map_err(|_| {
+            range
+                .place
+                .refuse_as(format!("{} N to {} N", least.si, greatest.si), "from a lesser to a greater force")
+        })
     }
 
     /// The greatest force in newtons, where it is said.

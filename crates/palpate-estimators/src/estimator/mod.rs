@@ -764,14 +764,16 @@ impl Locator {
         if config.swing.is_some() && !matches!(self.setup.surface(), SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);
         }
-        let scatter = self.untouched_scatter.clone();
+        let (scatter, drift) = (self.untouched_scatter.clone(), self.untouched_drift.clone());
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
-                let likelihood = BeamLikelihood::new(beam).with_untouched_scatter(scatter);
+                let likelihood =
+                    BeamLikelihood::new(beam).with_untouched_scatter(scatter).with_untouched_drift(drift);
                 Ok(Tracking { likelihood: Arc::new(likelihood) })
             }
             Method::Influence(InfluenceLocator::Plane(plane)) => {
-                let likelihood = PlateLikelihood::new(plane).with_untouched_scatter(scatter);
+                let likelihood =
+                    PlateLikelihood::new(plane).with_untouched_scatter(scatter).with_untouched_drift(drift);
                 Ok(Tracking { likelihood: Arc::new(likelihood) })
             }
             method => Err(NotTrackable::Kind {

@@ -4,7 +4,7 @@ use super::*;
 fn by_small_steps(range: (f64, f64), b: f64, a: f64) -> [f64; 3] {
     const STEPS: usize = 400_000;
     let (low, high) = (range.0.ln(), range.1.ln());
-    let (median, sd) = (0.5 * (low + high), (high - low) / (2.0 * NORMAL_95));
+    let (median, sd) = (0.5 * (low + high), (high - low) / (2.0 * NORMAL_99));
     let from = median - 9.0 * sd;
     let step = (high - from) / STEPS as f64;
     let exponent = |t: f64| {
@@ -39,7 +39,8 @@ fn integrals_are_those_of_small_steps() {
                 let a = (z / force_n).powi(2);
                 let [cost, mean_n, variance_n2] = by_small_steps(range, a * force_n, a);
                 let found = prior.integrate(a * force_n, a);
-                let context = format!("{range:?}, {force_n} N, z = {z}: {found:?}, {cost} {mean_n} {variance_n2}");
+                let context =
+                    format!("{range:?}, {force_n} N, z = {z}: {found:?}, {cost} {mean_n} {variance_n2}");
                 assert!((found.cost - constant - cost).abs() < 0.15, "{context}");
                 assert!((found.mean_n - mean_n).abs() < 0.05 * variance_n2.sqrt(), "{context}");
                 assert!((found.variance_n2 / variance_n2 - 1.0).abs() < 0.1, "{context}");
@@ -84,7 +85,8 @@ fn refuses_ranges_that_are_none() {
 
 #[test]
 fn the_range_of_presses_is_a_decade_either_side_of_their_mean() {
-    let range_of = |forces_n: &[f64]| ForceRange::of_presses(forces_n.iter().copied()).map(ForceRange::ends_n);
+    let range_of =
+        |forces_n: &[f64]| ForceRange::of_presses(forces_n.iter().copied()).map(ForceRange::ends_n);
     assert_eq!(range_of(&[100.0; 3]), Some((10.0, 1000.0)));
     assert_eq!(range_of(&[490.0, 510.0]), Some((50.0, 5000.0)));
     assert_eq!(range_of(&[0.01, 2.99]), Some((0.01, 15.0)));

@@ -73,6 +73,7 @@ pub(super) fn learn(
         dead: layout.sensors().iter().map(|sensor| sensor.channel.dead).collect(),
         reference_force_n: presses.mean_force_n(),
         greatest_force_n: task.setup.greatest_force_n(),
+        least_force_n: task.setup.force_range().map(|range| range.ends_n().0),
         false_alarm_rate,
     };
     let learning = Learning { source, surface, layout, presses: &presses, places };

@@ -32,6 +32,7 @@ mod tracker;
 pub use slow::{Creep, Drift};
 pub use tracker::{SmoothTracker, Tracker};
 
+use crate::force_prior::force_interval_95_n;
 use crate::likelihood::{CalibrationVariance, Likelihood};
 use belief::Moments;
 use palpate_core::{ContactEstimate, Estimate, Uncertainty};
@@ -58,7 +59,7 @@ pub struct TrackerConfig {
     pub jumps_per_s: f64,
     /// First mode of the surface, where that is known; else it is taken to be in balance.
     pub swing: Option<Swing>,
-    /// Drift of the channels, where it is followed; else there is none.
+    /// Drift of the channels; where none is stated, one is followed if the untouched rows of the calibration show it.
     pub drift: Option<Drift>,
     /// Creep of the surface, where that is known; else there is none.
     pub creep: Option<Creep>,
@@ -184,7 +185,7 @@ impl Tracked {
 
     /// The 95 % interval of the force, in newtons: [`force_95_n`](Self::force_95_n), or that of a normal distribution.
     pub fn force_interval_95_n(&self) -> (f64, f64) {
-        self.force_95_n.unwrap_or_else(|| normal_interval_95(self.force_n, self.sd[2]))
+        self.force_95_n.unwrap_or_else(|| force_interval_95_n(self.force_n, self.sd[2]))
     }
 
     /// The contacts of beliefs with as many of them, each with its weight, the most probable first.
@@ -213,6 +214,7 @@ impl Tracked {
         let contacts: Vec<_> = belief.iter().map(Moments::contact).collect();
         let left = likelihood.calibration_variance(&contacts);
         let extent = likelihood.extent();
+        let greatest_n = likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1);
         let tracked = |(moments, left): (&Moments, CalibrationVariance)| {
             let [xx, xy, yy] = left.position_m2;
             let [x_m, speed_m_per_s, force_n, y_m, speed_across] = moments.mean;
@@ -229,14 +231,18 @@ impl Tracked {
                 }
             };
             let x_95_m = clamped_interval(normal_interval_95(x_m, sd[0]), extent.length_m());
-            let force_95_n = (left.force_n2 > force && force_n > 0.0).then(|| {
-                let (low, high) = normal_interval_95(0.0, sd[2] / force_n);
-                (force_n * low.exp(), force_n * high.exp())
-            });
+            let force_95_n = (left.force_n2 > force && force_n > 0.0)
+                .then(|| log_interval_95_n(force_n, sd[2], greatest_n));
             Self { x_m, speed_m_per_s, force_n, sd, x_95_m, force_95_n, across: extent.width_m().map(across) }
         };
         belief.iter().zip(left).map(tracked).collect()
     }
+}
+
+/// The 95 % interval of a force whose logarithm is normal, no greater than the greatest force.
+fn log_interval_95_n(force_n: f64, sd_n: f64, greatest_n: f64) -> (f64, f64) {
+    let (low, high) = normal_interval_95(0.0, sd_n / force_n);
+    (force_n * low.exp(), (force_n * high.exp()).min(greatest_n.max(force_n)))
 }
 
 /// The most probable contact of a plane, with the covariance about it of all that are held possible.

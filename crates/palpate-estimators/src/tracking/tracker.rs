@@ -5,6 +5,7 @@ use super::belief::{Belief, Moments, Observation};
 use super::birth::BirthModel;
 use super::slow::SlowState;
 use super::{Track, TrackError, Tracked, TrackerConfig};
+use crate::force_prior::ForcePrior;
 use crate::likelihood::{Geometry, Likelihood};
 use palpate_core::{Estimate, Status};
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -43,6 +44,8 @@ const UNSEEN: f64 = 9.0;
 pub struct Tracker {
     likelihood: Arc<dyn Likelihood>,
     config: TrackerConfig,
+    /// Prior of the force of contacts; `None` where it is known.
+    force_prior: Option<ForcePrior>,
     hypotheses: Vec<Hypothesis>,
     time_s: Option<f64>,
     next_id: u64,
@@ -78,6 +81,7 @@ impl Tracker {
     /// A tracker that has seen nothing.
     pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
         Self {
+            force_prior: likelihood.force_range().map(ForcePrior::from),
             likelihood,
             config,
             hypotheses: Vec::new(),
@@ -147,7 +151,8 @@ impl Tracker {
     /// Drift and creep, where they are followed.
     fn slow(&mut self, channels: usize) -> Option<&mut SlowState> {
         let TrackerConfig { drift, creep, .. } = self.config;
-        if self.slow.is_none() && (drift.is_some() || creep.is_some()) {
+        let drifts = drift.is_some() || self.likelihood.untouched_drift().is_some();
+        if self.slow.is_none() && (drifts || creep.is_some()) {
             self.slow = Some(SlowState::new(&*self.likelihood, channels, drift, creep));
         }
         self.slow.as_mut()
@@ -245,13 +250,13 @@ impl Tracker {
         observation: Observation,
         single: &Estimate,
     ) -> Vec<(f64, Belief)> {
-        let config = &self.config;
+        let (config, force_prior) = (&self.config, self.force_prior.as_ref());
         let weighted = |(evidence, belief): (f64, Belief)| {
             (if belief.contacts() == 1 { log_births.one } else { log_births.two } + evidence, belief)
         };
         match self.likelihood.geometry() {
             Geometry::Line(likelihood) => {
-                let births = BirthModel { likelihood, observation, config, single };
+                let births = BirthModel { likelihood, observation, config, force_prior, single };
                 let mut born: Vec<_> = births.first_contacts().into_iter().map(weighted).collect();
                 for hypothesis in &self.hypotheses {
                     if let Belief::One(bank) = &hypothesis.belief {
@@ -264,7 +269,7 @@ impl Tracker {
                 born
             }
             Geometry::Plane(likelihood) => {
-                let births = BirthModel { likelihood, observation, config, single };
+                let births = BirthModel { likelihood, observation, config, force_prior, single };
                 births.first_contacts().into_iter().map(weighted).collect()
             }
         }

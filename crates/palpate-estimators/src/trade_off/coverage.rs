@@ -1,10 +1,10 @@
 //! Coverage of contacts by their distance from the end of the paper's beam.
 
-use crate::force_prior::DECADE;
 use crate::arrangement::Training;
 use crate::closed_form::ClosedForm;
 use crate::fit::{Fit, FitTask, Locate, NoCheck};
 use crate::fixtures::{Covered, Example, paper, readings};
+use crate::force_prior::DECADE;
 use crate::influence::{Influence, InfluenceSource};
 use crate::simulate::clean_reading;
 use palpate_core::Status;

@@ -409,7 +409,9 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
     if let Some(force) = force.as_ref().filter(|_| form.force_is_known) {
         line(format!("\n[contact]\nforce = {force}  # of every contact"));
     } else if let Some(range) = pressed_range(form) {
-        line(format!("\n# [contact]\n# force_range = {range}  # where forces in use are known better than this"));
+        line(format!(
+            "\n# [contact]\n# force_range = {range}  # where forces in use are known better than this"
+        ));
     }
     line("\n[training]".to_owned());
     match (form.width_mm, form.places.as_slice()) {
@@ -509,7 +511,8 @@ mod tests {
         assert_eq!(plan(&made.rig, made.statements.weights(None), &[], &[]).unwrap().len(), 20 + 10);
         // Forces in use are a decade either side of these, unless the comment is made a line.
         assert_eq!(made.rig.setup.force_range(), None);
-        let stated = made.record.text.replace("# [contact]", "[contact]").replace("# force_range", "force_range");
+        let stated =
+            made.record.text.replace("# [contact]", "[contact]").replace("# force_range", "force_range");
         let range = Rig::from_toml(&stated).unwrap().setup.force_range().unwrap();
         assert_eq!(range.ends_n(), (0.3, 30.0));
         let plane = RigForm {

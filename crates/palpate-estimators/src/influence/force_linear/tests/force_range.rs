@@ -50,7 +50,8 @@ fn walking_is_located_at_least_as_well_as_by_the_centre_of_pressure() {
         let locator = bench.fit(Structure::Auto).unwrap();
         let mut errors_mm = [0.0; 2];
         for _ in 0..STEPS {
-            let at = Position { x_m: bench.rng.random_range(0.1..1.1), y_m: bench.rng.random_range(0.1..0.7) };
+            let at =
+                Position { x_m: bench.rng.random_range(0.1..1.1), y_m: bench.rng.random_range(0.1..0.7) };
             let force_n = bench.rng.random_range(500.0..900.0);
             let reading = bench.counts(at, force_n);
             let estimate = locator.locate(&reading);
