@@ -79,9 +79,7 @@ impl UntouchedRows {
         let of_rest =
             |rest: &Rest| RowOffset { values: rest.mean.clone(), relative_variance: rest.count.recip() };
         match (after.checked_sub(1).and_then(|i| self.rests.get(i)), self.rests.get(after)) {
-            (None, None) => {
-                RowOffset { values: self.mean.clone(), relative_variance: self.count.recip() }
-            }
+            (None, None) => RowOffset { values: self.mean.clone(), relative_variance: self.count.recip() },
             (Some(only), None) | (None, Some(only)) => of_rest(only),
             (Some(before), Some(after)) => {
                 let b = (time - before.time) / (after.time - before.time);

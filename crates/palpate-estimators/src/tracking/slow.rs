@@ -19,14 +19,13 @@
 //! The size of the drift is learnt: nine filters, of three walks w and three rates r, run beside one another and are weighed by how probable they
 //! find the untouched readings (D. T. Magill, IEEE Trans. Autom. Control 10, 1965).
 
-use super::{Tracked, log_interval_95_n};
+use super::Tracked;
 use crate::likelihood::{Likelihood, Linearisation};
 use crate::untouched_drift::UntouchedDrift;
 use ndarray::{Array1, Array2, s};
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::{Ldl, Matrix, dot, form};
-use palpate_numerics::{Cholesky, NORMAL_95, clamped_interval, push_rest};
+use palpate_numerics::{Cholesky, push_rest};
 
 /// Drift that a tracker reckons with, in standard deviations of each channel's noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -213,16 +212,9 @@ impl SlowState {
         );
     }
 
-    /// Adds the doubt that the drift leaves to that of the contacts.
-    pub fn widen(&self, likelihood: &dyn Likelihood, tracked: &mut [Tracked]) {
-        let Some(drift) = &self.drift else { return };
-        let contacts: Vec<Contact> = tracked.iter().map(contact_of).collect();
-        let greatest_n = likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1);
-        let added = drift.covariance_of_contacts(&likelihood.linearised(&contacts));
-        for (k, one) in tracked.iter_mut().enumerate() {
-            let of = |i: usize, j: usize| added[3 * k + i][3 * k + j];
-            widen(one, [of(0, 0), of(0, 1), of(1, 1), of(2, 2)], likelihood.extent(), greatest_n);
-        }
+    /// Covariance of the drift, in the noise's; `None` where it is not followed.
+    pub fn drift_covariance(&self) -> Option<&Array2<f64>> {
+        self.drift.as_ref().map(|drift| &drift.covariance)
     }
 
     /// The baseline that readings are brought to has moved by so much in each channel.
@@ -267,25 +259,6 @@ fn noise(likelihood: &dyn Likelihood, channels: usize) -> Vec<(usize, f64)> {
 fn contact_of(tracked: &Tracked) -> Contact {
     let y_m = tracked.across.map_or(0.0, |across| across.y_m);
     Contact { position: Position { x_m: tracked.x_m, y_m }, force_n: tracked.force_n }
-}
-
-/// Adds variances xx, xy, yy of the place and of the force.
-fn widen(tracked: &mut Tracked, [xx, xy, yy, force]: [f64; 4], extent: Extent, greatest_n: f64) {
-    let wider = |at_m: f64, (low_m, high_m): (f64, f64), variance: f64, side_m: f64| {
-        let half = |own_m: f64| (own_m * own_m + NORMAL_95 * NORMAL_95 * variance).sqrt();
-        clamped_interval((at_m - half(at_m - low_m), at_m + half(high_m - at_m)), side_m)
-    };
-    tracked.x_95_m = wider(tracked.x_m, tracked.x_95_m, xx, extent.length_m());
-    tracked.sd[0] = (tracked.sd[0].powi(2) + xx).sqrt();
-    tracked.sd[2] = (tracked.sd[2].powi(2) + force).sqrt();
-    if tracked.force_95_n.is_some() && tracked.force_n > 0.0 {
-        tracked.force_95_n = Some(log_interval_95_n(tracked.force_n, tracked.sd[2], greatest_n));
-    }
-    if let (Some(across), Some(width_m)) = (&mut tracked.across, extent.width_m()) {
-        across.y_95_m = wider(across.y_m, across.y_95_m, yy, width_m);
-        across.sd[0] = (across.sd[0].powi(2) + yy).sqrt();
-        across.covariance_m2 += xy;
-    }
 }
 
 impl Block {
@@ -402,35 +375,45 @@ impl DriftFilter {
             self.covariance.scaled_add(share / sum, &own);
         }
     }
+}
 
-    /// A⁻¹·Jᵀ·P·J·A⁻¹ with A = JᵀJ, J the derivatives by the contacts' unknowns and P the covariance of d.
-    fn covariance_of_contacts(&self, at: &Linearisation) -> Matrix<6> {
-        let (mut a, mut b) = ([[0.0; 6]; 6], [[0.0; 6]; 6]);
-        let mut added = [[0.0; 6]; 6];
-        let columns: Vec<&[f64]> = at.derivatives.iter().map(Vec::as_slice).take(6).collect();
-        for (j, right) in columns.iter().enumerate() {
-            let spread: Vec<f64> = self
-                .covariance
-                .rows()
-                .into_iter()
-                .map(|row| row.iter().zip(*right).map(|(own, right)| own * right).sum())
-                .collect();
-            for (i, left) in columns.iter().enumerate() {
-                a[i][j] = dot(left, right);
-                b[i][j] = dot(left, &spread);
-            }
-        }
-        let free = std::array::from_fn(|i| i < columns.len() && a[i][i] > 0.0);
-        if let Some(factors) = Ldl::of_free(&a, free) {
-            let inverse = factors.inverse();
-            for i in 0..6 {
-                for j in 0..6 {
-                    added[i][j] = form(&inverse[i], &b, &inverse[j]);
-                }
-            }
-        }
-        added
+/// Adds the uncertainty that a drift of this covariance leaves to that of the contacts.
+pub(super) fn widen(covariance: &Array2<f64>, likelihood: &dyn Likelihood, tracked: &mut [Tracked]) {
+    let contacts: Vec<Contact> = tracked.iter().map(contact_of).collect();
+    let greatest_n = likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1);
+    let added = covariance_of_contacts(covariance, &likelihood.linearised(&contacts));
+    for (k, one) in tracked.iter_mut().enumerate() {
+        let of = |i: usize, j: usize| added[3 * k + i][3 * k + j];
+        one.widen([of(0, 0), of(0, 1), of(1, 1), of(2, 2)], likelihood.extent(), greatest_n);
     }
+}
+
+/// A⁻¹·Jᵀ·P·J·A⁻¹ with A = JᵀJ, J the derivatives by the contacts' unknowns and P the covariance of d.
+fn covariance_of_contacts(covariance: &Array2<f64>, at: &Linearisation) -> Matrix<6> {
+    let (mut a, mut b) = ([[0.0; 6]; 6], [[0.0; 6]; 6]);
+    let mut added = [[0.0; 6]; 6];
+    let columns: Vec<&[f64]> = at.derivatives.iter().map(Vec::as_slice).take(6).collect();
+    for (j, right) in columns.iter().enumerate() {
+        let spread: Vec<f64> = covariance
+            .rows()
+            .into_iter()
+            .map(|row| row.iter().zip(*right).map(|(own, right)| own * right).sum())
+            .collect();
+        for (i, left) in columns.iter().enumerate() {
+            a[i][j] = dot(left, right);
+            b[i][j] = dot(left, &spread);
+        }
+    }
+    let free = std::array::from_fn(|i| i < columns.len() && a[i][i] > 0.0);
+    if let Some(factors) = Ldl::of_free(&a, free) {
+        let inverse = factors.inverse();
+        for i in 0..6 {
+            for j in 0..6 {
+                added[i][j] = form(&inverse[i], &b, &inverse[j]);
+            }
+        }
+    }
+    added
 }
 
 impl Model {
@@ -493,6 +476,7 @@ impl Model {
 mod tests {
     use super::*;
     use crate::likelihood::CalibrationVariance;
+    use palpate_mechanics::surface::Extent;
 
     /// A channel by itself, without a rate: the steady variance of a random walk in noise is (√(q² + 4·q·r) − q)/2.
     #[test]

@@ -3,10 +3,11 @@
 use super::bank::Step;
 use super::belief::{Belief, Moments, Observation};
 use super::birth::BirthModel;
-use super::slow::SlowState;
+use super::slow::{SlowState, widen};
 use super::{Track, TrackError, Tracked, TrackerConfig};
 use crate::force_prior::ForcePrior;
 use crate::likelihood::{Geometry, Likelihood};
+use ndarray::Array2;
 use palpate_core::{Estimate, Status};
 use palpate_numerics::watch::{Cancelled, Watch};
 use std::sync::Arc;
@@ -133,7 +134,9 @@ impl Tracker {
             if self.config.swing.is_none() || track.contacts.is_empty() {
                 slow.learn(&*likelihood, &whitened, &track.contacts, probability);
             }
-            slow.widen(&*likelihood, &mut track.contacts);
+            if let Some(covariance) = slow.drift_covariance() {
+                widen(covariance, &*likelihood, &mut track.contacts);
+            }
         }
         self.whitened = whitened;
         self.time_s = Some(time_s);
@@ -346,12 +349,19 @@ pub struct SmoothTracker {
     tracks: Vec<Track>,
     /// The hypotheses with contacts at each reading, by their ids.
     past: Vec<Vec<(u64, Belief)>>,
+    /// Covariance of the drift after each reading; empty where none is followed.
+    drift_covariances: Vec<Array2<f64>>,
 }
 
 impl SmoothTracker {
     /// A tracker that has seen nothing.
     pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
-        Self { tracker: Tracker::new(likelihood, config), tracks: Vec::new(), past: Vec::new() }
+        Self {
+            tracker: Tracker::new(likelihood, config),
+            tracks: Vec::new(),
+            past: Vec::new(),
+            drift_covariances: Vec::new(),
+        }
     }
 
     /// Takes the next reading; see [`Tracker::follow`].
@@ -373,6 +383,8 @@ impl SmoothTracker {
         // The one that is shown comes first.
         remembered.sort_by_key(|(_, belief)| belief.contacts() != track.contacts.len());
         self.past.push(remembered);
+        self.drift_covariances
+            .extend(self.tracker.slow.as_ref().and_then(SlowState::drift_covariance).cloned());
         self.tracks.push(track);
         Ok(())
     }
@@ -403,8 +415,12 @@ impl SmoothTracker {
             let last = || self.past[k].first().cloned();
             later = if number > 0 { lasting.or_else(last) } else { None };
             let moments = later.as_ref().map(|(_, belief)| belief.moments());
-            smoothed[k].contacts = moments
-                .map_or_else(Vec::new, |moments| Tracked::from_belief(&moments, &*self.tracker.likelihood));
+            let likelihood = &*self.tracker.likelihood;
+            let contacts = &mut smoothed[k].contacts;
+            *contacts = moments.map_or_else(Vec::new, |moments| Tracked::from_belief(&moments, likelihood));
+            if let Some(covariance) = self.drift_covariances.get(k) {
+                widen(covariance, likelihood, contacts);
+            }
         }
         Ok(smoothed)
     }

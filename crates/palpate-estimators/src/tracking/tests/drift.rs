@@ -74,7 +74,7 @@ impl Bench {
             for force_n in [0.0, PRESSED_N] {
                 let contact = (force_n > 0.0).then_some(Contact { position, force_n });
                 let before = self.offsets.clone();
-                let mut reading = self.reading(contact, 2.0);
+                let mut reading = self.reading(contact, 5.0);
                 if contact.is_some() {
                     // Pressed at once after the untouched row, by which it is tared.
                     reading.iter_mut().zip(&self.offsets).zip(before).for_each(|((value, now), before)| {
@@ -104,7 +104,7 @@ fn contact_at(time_s: f64) -> Option<Contact> {
 
 #[test]
 fn a_drifting_finger_is_touched_only_when_something_touches() {
-    for (walk, seed) in [(0.5, 1), (1.0, 2), (4.0, 3)] {
+    for (walk, seed) in [(0.2, 1), (1.0, 2), (4.0, 3)] {
         let mut bench = Bench::new(walk, seed);
         let locator = bench.locator();
         assert!(locator.untouched_drift.is_some());
@@ -135,13 +135,33 @@ fn a_drifting_finger_is_touched_only_when_something_touches() {
                 for contact in &track.contacts {
                     let (least_n, most_n) = contact.force_interval_95_n();
                     assert!((0.0..=greatest_n).contains(&contact.force_n), "{contact:?}");
-                    assert!(0.0 <= least_n && least_n <= most_n && most_n < 3.0 * greatest_n, "{contact:?}");
+                    assert!(
+                        0.0 <= least_n && least_n <= most_n && most_n <= greatest_n * (1.0 + 1e-9),
+                        "{contact:?}"
+                    );
                 }
             }
-            let errors = TrackErrors::new(tracks, &truths, Extent::line(LENGTH_M).unwrap()).unwrap();
-            eprintln!("walk {walk}: {invented} of {rest} invented, {errors:?}");
+            assert!(invented * 100 <= rest, "walk {walk}: {invented} of {rest}");
         }
         let errors = TrackErrors::new(&smoothed, &truths, Extent::line(LENGTH_M).unwrap()).unwrap();
-        eprintln!("{}", errors.ratio());
+        assert!(errors.tracked * 100 >= errors.readings * 99, "walk {walk}: {errors:?}");
+        // A drift in the course of a touch passes for a motion, and no smoother takes it off.
+        let least_ratio = if walk < 0.5 { 2.0 } else { 1.2 };
+        eprintln!("walk {walk}: {errors:?}");
+        assert!(errors.ratio() > least_ratio, "walk {walk}: {errors:?}");
+        assert!(errors.track_covered > 0.85, "walk {walk}: {errors:?}");
     }
+}
+
+#[test]
+fn without_drift_in_the_state_a_drifting_finger_seems_touched() {
+    let mut bench = Bench::new(4.0, 3);
+    let blind = Locator { untouched_drift: None, untouched_scatter: None, ..bench.locator() };
+    let config = TrackerConfig::default();
+    let mut tracker = Tracker::new(blind.tracking(&config).unwrap().likelihood(), config);
+    let touched = (0..1000).filter(|_| {
+        let reading = bench.reading(None, EVERY_S);
+        !tracker.follow(bench.time_s, &reading).unwrap().contacts.is_empty()
+    });
+    assert!(touched.count() > 500);
 }
