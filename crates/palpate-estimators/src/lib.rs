@@ -44,6 +44,7 @@ pub mod lightest_touch;
 pub mod likelihood;
 pub mod load_profile;
 mod locator_fault;
+mod model_offsets;
 pub mod neighbours;
 pub mod network;
 pub mod offset_course;

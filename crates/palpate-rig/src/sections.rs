@@ -112,7 +112,7 @@ impl RigSections {
         check_force(force, &surface)?;
         let greatest_force_n =
             contact.as_ref().map_or(Ok(None), |contact| contact.greatest_force_n(&surface))?;
-        let force_range = contact.as_ref().map_or(Ok(None), ContactKeys::force_range)?;
+        let force_range = contact.as_ref().map_or(Ok(None), |contact| contact.force_range(&surface))?;
         let columns = recording.as_ref().map(|keys| keys.build(&layout, surface.extent())).transpose()?;
         let setup = Setup::new(surface).with_layout(layout).map_err(SetupError::from).and_then(|setup| {
             let force_n = force.map(|force| force.si);

@@ -33,10 +33,13 @@ pub(crate) struct ForceRangeKeys(Positive<Force>, Positive<Force>);
 
 impl ContactKeys {
     /// Range of unknown forces, where it is stated.
-    pub fn force_range(&self) -> Result<Option<ForceRange>, RigError> {
+    pub fn force_range(&self, surface: &SurfaceSpec) -> Result<Option<ForceRange>, RigError> {
         let Some(range) = &self.force_range else { return Ok(None) };
         if self.force.is_some() {
             return Err(range.place.unused("`force`, by which the force is known"));
+        }
+        if let SurfaceSpec::Digit(_) = surface {
+            return Err(range.place.unused("a digit, whose model bounds the force"));
         }
         if let Some(greatest) = &self.greatest_force {
             return Err(greatest.place.unused("`force_range`, whose upper end it is"));

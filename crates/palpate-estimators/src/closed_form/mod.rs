@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::force_prior::DECADE;
+use crate::model_offsets::{less_offsets, offsets_of};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::spread::{About, spread_bound, spread_score};
@@ -103,9 +104,11 @@ impl Fit for ClosedForm {
         if let Some(kind) = setup.layout().kinds().into_iter().find(|kind| *kind == SensorKind::Raw) {
             return Err(ClosedFormFitError::NotModelled { kind });
         }
+        let (offsets, layout) = offsets_of(recording, setup.layout());
         let locator = ClosedFormLocator {
             beam: *beam,
-            layout: setup.layout().clone(),
+            layout,
+            offsets,
             force_n: setup.force_n(),
             greatest_force_n: if setup.force_n().is_none() {
                 greatest_force_n(setup, recording)
@@ -135,6 +138,9 @@ pub struct ClosedFormLocator {
     /// Share of untouched readings that may be taken for a contact.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
+    /// Offset of each channel, in its SI unit; none where no untouched row told them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub offsets: Vec<f64>,
 }
 
 impl ClosedFormLocator {
@@ -256,7 +262,12 @@ impl Locate for ClosedFormLocator {
         self.knows_noise().then_some(self.false_alarm_rate)
     }
 
+    fn offsets(&self) -> Option<Vec<f64>> {
+        (!self.offsets.is_empty()).then(|| self.offsets.clone())
+    }
+
     fn locate(&self, reading: &[f64]) -> Estimate {
+        let reading = &*less_offsets(reading, &self.offsets);
         let channels = self.seeing();
         let (weights, noise) = self.weights(&channels);
         let whitened: Vec<f64> = channels.iter().zip(&weights).map(|(i, w)| w * reading[*i]).collect();
@@ -296,6 +307,10 @@ impl Locate for ClosedFormLocator {
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         LocatorFault::check_count("sensors", setup.layout().len(), self.layout.len())?;
+        if !self.offsets.is_empty() {
+            LocatorFault::check_count("offsets", self.layout.len(), self.offsets.len())?;
+        }
+        LocatorFault::check_numbers("offset", self.offsets.iter().copied(), |_| true, "a finite number")?;
         let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);
         let on_beam = |x: f64| self.beam.contains(Position::along(x));
         LocatorFault::check_numbers("sensor position", places, on_beam, "on the beam")?;

@@ -215,10 +215,12 @@ impl Method {
 }
 
 impl Estimator {
-    /// The rows that a method learns from: those without contact teach offset and noise, which only influence functions have.
+    /// The rows that a method learns from: those without contact teach offset and noise, which methods that go from a reading to a position do not have.
     fn learnt_from<'a>(&self, recording: &'a Recording) -> Cow<'a, Recording> {
         match self {
-            Self::Influence(_) | Self::Auto => Cow::Borrowed(recording),
+            Self::Influence(_) | Self::ClosedForm(_) | Self::Digit(_) | Self::Auto => {
+                Cow::Borrowed(recording)
+            }
             _ => recording.touched(),
         }
     }
@@ -412,7 +414,9 @@ impl Locator {
     pub fn untouched_reading(&self) -> Result<Vec<f64>, NoBaseline> {
         let offsets = match &self.method {
             Method::Influence(influence) => influence.offsets(),
-            Method::ClosedForm(_) | Method::Digit(_) => Some(vec![0.0; self.setup.layout().len()]),
+            Method::ClosedForm(_) | Method::Digit(_) => {
+                self.method.offsets().or_else(|| Some(vec![0.0; self.setup.layout().len()]))
+            }
             _ => None,
         };
         let of_model = || self.setup.surface().model().map(|_| vec![0.0; self.setup.layout().len()]);

@@ -315,7 +315,7 @@ impl FirstRig {
         if self.roles.force.is_none() {
             toml.line("# force = \"3 N\"", "where every contact, also in use, has one known force");
         }
-        let range = "where forces in use are known better than to a tenth and ten times the presses'";
+        let range = "forces in use, where not from a tenth to ten times those of the presses";
         toml.line("# force_range = [\"0.5 N\", \"10 N\"]", range);
     }
 
