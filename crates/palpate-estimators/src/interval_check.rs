@@ -25,6 +25,8 @@ use serde::{Deserialize, Serialize};
 pub struct IntervalCheck {
     /// Number of places.
     pub places: usize,
+    /// Share of the presses that are `outside_model`, in %. Their intervals count too: a press is one contact, also where the model does not explain it.
+    pub outside_model_percent: f64,
     /// Intervals of the position; on a plane, its ellipse.
     pub position: Coverage,
     /// Intervals of the force, where it is estimated and was recorded.
@@ -68,7 +70,9 @@ impl IntervalCheck {
         let positions = ratios(&|held_out| position_ratio(held_out, extent));
         let places = positions.groups.len();
         let position = positions.coverage()?;
-        Some(Self { places, position, force: ratios(&force_ratio).coverage() })
+        let outside = estimates.iter().filter(|held_out| held_out.estimate.status == Status::OutsideModel);
+        let outside_model_percent = 100.0 * outside.count() as f64 / estimates.len() as f64;
+        Some(Self { places, outside_model_percent, position, force: ratios(&force_ratio).coverage() })
     }
 
     /// The factors of its intervals.
@@ -90,6 +94,7 @@ impl IntervalCheck {
             "finite and at least 1",
         )?;
         let percents = coverages().flat_map(|coverage| [coverage.before_percent, coverage.after_percent]);
+        let percents = percents.chain([self.outside_model_percent]);
         let is_percent = |percent| (0.0..=100.0).contains(&percent);
         LocatorFault::check_numbers("coverage of intervals", percents, is_percent, "0 to 100 %")
     }
@@ -122,7 +127,8 @@ impl PlaceRatios {
     fn new(estimates: &[HeldOutEstimate], ratio: &dyn Fn(&HeldOutEstimate) -> Option<f64>) -> Self {
         let mut found: Vec<(Position, usize, f64)> = estimates
             .iter()
-            .filter(|held_out| gives_place(held_out.estimate.status))
+            // Such an estimate has no place.
+            .filter(|held_out| held_out.estimate.status != Status::NoContact)
             .filter_map(|held_out| Some((held_out.truth, held_out.fold, ratio(held_out)?)))
             .collect();
         found.sort_by(|a, b| a.0.cmp_by_x_then_y(&b.0));
@@ -158,11 +164,6 @@ impl PlaceRatios {
             factor,
         })
     }
-}
-
-/// True of an estimate that says a place: its interval is meant to hold the contact.
-fn gives_place(status: Status) -> bool {
-    matches!(status, Status::Located | Status::Ambiguous | Status::OutsideSurface)
 }
 
 /// Ratio of an error to the half-width of an interval toward the truth.

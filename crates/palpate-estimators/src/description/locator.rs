@@ -52,6 +52,9 @@ pub fn locator(locator: &Locator) -> Vec<String> {
     lines
 }
 
+/// Share of presses that are `outside_model` from which on it is said, in %: by noise alone it is below half a percent.
+const MUCH_OUTSIDE_MODEL_PERCENT: f64 = 2.0;
+
 /// The check of a locator's 95 % intervals at held-out places.
 pub fn interval_check(check: Option<&IntervalCheck>) -> Vec<String> {
     let Some(check) = check else {
@@ -70,7 +73,12 @@ pub fn interval_check(check: Option<&IntervalCheck>) -> Vec<String> {
         )
     };
     let position = line("position", check.position);
-    [position].into_iter().chain(check.force.map(|force| line("force", force))).collect()
+    let outside_percent = check.outside_model_percent;
+    let outside = (outside_percent > MUCH_OUTSIDE_MODEL_PERCENT).then(|| {
+        format!("presses held out that are `outside_model`: {outside_percent:.1} %; the estimator's model does not explain them within the noise")
+    });
+    let force = check.force.map(|force| line("force", force));
+    [Some(position), force, outside].into_iter().flatten().collect()
 }
 
 fn method(locator: &Locator) -> Vec<String> {

@@ -102,8 +102,10 @@ fn untouched_estimates_and_known_forces_are_left_out() {
         one.estimate.contact.uncertainty.as_mut().unwrap().covariance[5] = 0.0;
     }
     held_out[7].estimate.status = Status::NoContact;
+    held_out[8].estimate.status = Status::OutsideModel;
     let check = IntervalCheck::of_estimates(&held_out, line()).unwrap();
     assert_eq!((check.places, check.force), (29, None));
+    assert!((check.outside_model_percent - 100.0 / 30.0).abs() < 1e-12);
 }
 
 #[test]
