@@ -11,12 +11,11 @@
 //!
 //! Intervals are widened, and never narrowed: the factor of few places scatters, and intervals of a method that is right are right without it.
 
-use crate::force_prior::force_interval_95_n;
 use crate::locator_fault::LocatorFault;
 use palpate_core::{ContactEstimate, Estimate, Position, Status, Uncertainty};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::Ldl;
-use palpate_numerics::{ELLIPSE_95, conformal_95_of_groups};
+use palpate_numerics::{ELLIPSE_95, conformal_95_of_groups, normal_interval_95};
 use serde::{Deserialize, Serialize};
 
 /// Check of a locator's 95 % intervals at held-out places; see [the module](self).
@@ -201,7 +200,7 @@ fn force_ratio(held_out: &HeldOutEstimate) -> Option<f64> {
 pub(crate) fn force_interval_n(contact: &ContactEstimate) -> Option<(f64, f64)> {
     let (uncertainty, force_n) = (contact.uncertainty?, contact.force_n?);
     let sd_n = uncertainty.covariance[5].sqrt();
-    uncertainty.force_95_n.or_else(|| (sd_n > 0.0).then(|| force_interval_95_n(force_n, sd_n)))
+    uncertainty.force_95_n.or_else(|| (sd_n > 0.0).then(|| normal_interval_95(force_n, sd_n)))
 }
 
 impl Widening {

@@ -7,7 +7,6 @@ use crate::setup::Setup;
 use palpate_mechanics::sensing::SensorKind::Deflection;
 use palpate_mechanics::surface::Beam;
 use palpate_mechanics::units::{gpa, mm, newtons, um};
-use palpate_numerics::normal_interval_95;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -3,11 +3,9 @@
 use super::bank::Step;
 use super::belief::{Belief, Moments, Observation};
 use super::birth::BirthModel;
-use super::slow::{SlowState, widen};
+use super::slow::SlowState;
 use super::{Track, TrackError, Tracked, TrackerConfig};
-use crate::force_prior::ForcePrior;
 use crate::likelihood::{Geometry, Likelihood};
-use ndarray::Array2;
 use palpate_core::{Estimate, Status};
 use palpate_numerics::watch::{Cancelled, Watch};
 use std::sync::Arc;
@@ -45,8 +43,6 @@ const UNSEEN: f64 = 9.0;
 pub struct Tracker {
     likelihood: Arc<dyn Likelihood>,
     config: TrackerConfig,
-    /// Prior of the force of contacts; `None` where it is known.
-    force_prior: Option<ForcePrior>,
     hypotheses: Vec<Hypothesis>,
     time_s: Option<f64>,
     next_id: u64,
@@ -82,7 +78,6 @@ impl Tracker {
     /// A tracker that has seen nothing.
     pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
         Self {
-            force_prior: likelihood.force_range().map(ForcePrior::from),
             likelihood,
             config,
             hypotheses: Vec::new(),
@@ -134,9 +129,7 @@ impl Tracker {
             if self.config.swing.is_none() || track.contacts.is_empty() {
                 slow.learn(&*likelihood, &whitened, &track.contacts, probability);
             }
-            if let Some(covariance) = slow.drift_covariance() {
-                widen(covariance, &*likelihood, &mut track.contacts);
-            }
+            slow.widen(&*likelihood, &mut track.contacts);
         }
         self.whitened = whitened;
         self.time_s = Some(time_s);
@@ -154,8 +147,7 @@ impl Tracker {
     /// Drift and creep, where they are followed.
     fn slow(&mut self, channels: usize) -> Option<&mut SlowState> {
         let TrackerConfig { drift, creep, .. } = self.config;
-        let drifts = drift.is_some() || self.likelihood.untouched_drift().is_some();
-        if self.slow.is_none() && (drifts || creep.is_some()) {
+        if self.slow.is_none() && (drift.is_some() || creep.is_some()) {
             self.slow = Some(SlowState::new(&*self.likelihood, channels, drift, creep));
         }
         self.slow.as_mut()
@@ -253,13 +245,13 @@ impl Tracker {
         observation: Observation,
         single: &Estimate,
     ) -> Vec<(f64, Belief)> {
-        let (config, force_prior) = (&self.config, self.force_prior.as_ref());
+        let config = &self.config;
         let weighted = |(evidence, belief): (f64, Belief)| {
             (if belief.contacts() == 1 { log_births.one } else { log_births.two } + evidence, belief)
         };
         match self.likelihood.geometry() {
             Geometry::Line(likelihood) => {
-                let births = BirthModel { likelihood, observation, config, force_prior, single };
+                let births = BirthModel { likelihood, observation, config, single };
                 let mut born: Vec<_> = births.first_contacts().into_iter().map(weighted).collect();
                 for hypothesis in &self.hypotheses {
                     if let Belief::One(bank) = &hypothesis.belief {
@@ -272,7 +264,7 @@ impl Tracker {
                 born
             }
             Geometry::Plane(likelihood) => {
-                let births = BirthModel { likelihood, observation, config, force_prior, single };
+                let births = BirthModel { likelihood, observation, config, single };
                 births.first_contacts().into_iter().map(weighted).collect()
             }
         }
@@ -349,19 +341,12 @@ pub struct SmoothTracker {
     tracks: Vec<Track>,
     /// The hypotheses with contacts at each reading, by their ids.
     past: Vec<Vec<(u64, Belief)>>,
-    /// Covariance of the drift after each reading; empty where none is followed.
-    drift_covariances: Vec<Array2<f64>>,
 }
 
 impl SmoothTracker {
     /// A tracker that has seen nothing.
     pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
-        Self {
-            tracker: Tracker::new(likelihood, config),
-            tracks: Vec::new(),
-            past: Vec::new(),
-            drift_covariances: Vec::new(),
-        }
+        Self { tracker: Tracker::new(likelihood, config), tracks: Vec::new(), past: Vec::new() }
     }
 
     /// Takes the next reading; see [`Tracker::follow`].
@@ -383,8 +368,6 @@ impl SmoothTracker {
         // The one that is shown comes first.
         remembered.sort_by_key(|(_, belief)| belief.contacts() != track.contacts.len());
         self.past.push(remembered);
-        self.drift_covariances
-            .extend(self.tracker.slow.as_ref().and_then(SlowState::drift_covariance).cloned());
         self.tracks.push(track);
         Ok(())
     }
@@ -415,12 +398,8 @@ impl SmoothTracker {
             let last = || self.past[k].first().cloned();
             later = if number > 0 { lasting.or_else(last) } else { None };
             let moments = later.as_ref().map(|(_, belief)| belief.moments());
-            let likelihood = &*self.tracker.likelihood;
-            let contacts = &mut smoothed[k].contacts;
-            *contacts = moments.map_or_else(Vec::new, |moments| Tracked::from_belief(&moments, likelihood));
-            if let Some(covariance) = self.drift_covariances.get(k) {
-                widen(covariance, likelihood, contacts);
-            }
+            smoothed[k].contacts = moments
+                .map_or_else(Vec::new, |moments| Tracked::from_belief(&moments, &*self.tracker.likelihood));
         }
         Ok(smoothed)
     }

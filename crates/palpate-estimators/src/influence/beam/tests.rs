@@ -1,5 +1,4 @@
 mod batch;
-mod offsets;
 mod reference;
 
 use super::*;

@@ -32,7 +32,6 @@ mod drift;
 mod edges;
 mod ends;
 mod few;
-mod force_range;
 mod noise;
 mod one_weight;
 mod scatter;
