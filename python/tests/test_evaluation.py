@@ -151,7 +151,7 @@ def test_an_evaluation_is_kept_and_shown(beam, tmp_path):
     assert repr(evaluation).startswith("<Evaluation: influence, 399 contacts of simulation, located: mean error ")
     assert "<table>" in evaluation._repr_html_()
     frame = evaluation.to_frame()
-    assert list(frame.columns) == ["x [mm]", "force [N]", "estimated x [mm]", "error [mm]", "covered"]
+    assert list(frame.columns) == ["x [mm]", "force [N]", "estimated x [mm]", "error [mm]", "covered", "estimated force [N]"]
     assert evaluation.to_numpy()["error"][7] == evaluation.error[7]
     evaluation.to_csv(tmp_path / "evaluation.csv")
     assert len((tmp_path / "evaluation.csv").read_text().splitlines()) == 401

@@ -143,8 +143,9 @@ macro_rules! estimators {
                     return choose(task, None)?.best.fit_without_interval_check(task);
                 }
                 task.check_channels()?;
+                let method = self.fit_method(task)?;
                 let check = if is_learnt(self.kind()) { ReadingCheck::fit(task)? } else { None };
-                self.fit_beside_check(task, check)
+                Ok(method.beside_check(task, check)?)
             }
 
             fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Locator>) -> Result<(), FitError> {
@@ -207,23 +208,19 @@ pub(crate) fn is_learnt(kind: &str) -> bool {
     matches!(kind, "network" | "network-lm" | "gaussian-process" | "neighbours" | "centroid")
 }
 
-impl Estimator {
-    /// Fits the method beside a reading check that was fitted to the same recording; none for one that needs none.
-    fn fit_beside_check(&self, task: FitTask, check: Option<ReadingCheck>) -> Result<Locator, FitError> {
-        task.check_channels()?;
-        let method = self.fit_method(task)?;
+impl Method {
+    /// The locator of a method that was fitted to a task, beside a reading check of the same recording; none for one that needs none.
+    fn beside_check(self, task: FitTask, check: Option<ReadingCheck>) -> Result<Locator, Cancelled> {
         let check = match check {
-            Some(by) if method.knows_its_errors() => {
-                Some(by.keeping_intervals(task, |reading| method.locate(reading))?)
+            Some(by) if self.knows_its_errors() => {
+                Some(by.keeping_intervals(task, |reading| self.locate(reading))?)
             }
             check => check,
         };
-        let locator = Fitted { check: check.map(Box::new), ..Fitted::new(task, method) };
+        let locator = Fitted { check: check.map(Box::new), ..Fitted::new(task, self) };
         Ok(locator.with_scatter_of(task.recording))
     }
-}
 
-impl Method {
     /// True of a method whose intervals come from errors at positions that were held out, reading by reading.
     fn knows_its_errors(&self) -> bool {
         matches!(self, Self::GaussianProcess(locator) if locator.widths.is_some())

@@ -2,7 +2,7 @@
 
 use super::{Estimator, FitError, Locator, is_learnt};
 use crate::evaluation::{EvaluationError, Split, TimedEvaluation, evaluate_splits_by};
-use crate::fit::FitTask;
+use crate::fit::{Fit, FitTask};
 use crate::reading_check::ReadingCheck;
 use crate::setup::Setup;
 use palpate_numerics::watch::Watch;
@@ -40,20 +40,19 @@ impl<'a> TrialSplits<'a> {
 
     /// The locator of a split, and the seconds that its check took before.
     fn fit(&self, estimator: &Estimator, split: usize, task: FitTask) -> Result<(Locator, f64), FitError> {
+        task.check_channels()?;
+        let method = estimator.fit_method(task)?;
         if !is_learnt(estimator.kind()) {
-            return Ok((estimator.fit_beside_check(task, None)?, 0.0));
+            return Ok((method.beside_check(task, None)?, 0.0));
         }
         let cell = &self.checks[split];
-        let known_s = cell.get().map_or(0.0, |known| known.seconds);
-        let TimedCheck { check, .. } = match cell.get() {
-            Some(known) => known,
-            None => {
-                task.check_channels()?;
-                let start = (self.clock)();
-                let check = ReadingCheck::fit(task)?;
-                cell.get_or_init(|| TimedCheck { check, seconds: (self.clock)() - start })
-            }
-        };
-        Ok((estimator.fit_beside_check(task, check.clone())?, known_s))
+        if let Some(TimedCheck { check, seconds }) = cell.get() {
+            return Ok((method.beside_check(task, check.clone())?, *seconds));
+        }
+        let start = (self.clock)();
+        let check = ReadingCheck::fit(task)?;
+        let TimedCheck { check, .. } =
+            cell.get_or_init(|| TimedCheck { check, seconds: (self.clock)() - start });
+        Ok((method.beside_check(task, check.clone())?, 0.0))
     }
 }
