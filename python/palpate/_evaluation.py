@@ -90,7 +90,7 @@ class Comparison(Result):
     interval_score : ndarray of float64
         Mean interval score of the 95 % intervals, in metres.
     force_mean, force_coverage : ndarray of float64
-        Mean error of the estimated forces in newtons, and share of their 95 % intervals that hold the force; NaN where no force is estimated.
+        Mean error of the estimated forces in newtons, and share of their 95 % intervals that contain the force; NaN where no force is estimated.
     limit_ratio : ndarray of float64
         Mean error over that of an estimator at the limit, NaN where the bench has none.
     fit_seconds, locate_seconds : ndarray of float64

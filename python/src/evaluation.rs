@@ -184,8 +184,8 @@ impl Evaluation {
     /// Returns
     /// -------
     /// dict
-    ///     "count"; "mean", "median", "p95" and "max" of the absolute errors in newtons; "coverage", the share of the 95 % intervals that hold
-    ///     the force.
+    ///     "count"; "mean", "median", "p95" and "max" of the absolute errors in newtons; "coverage", the share of the 95 % intervals that
+    ///     contain the force.
     fn force_summary<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(forces) = self.inner.force_summary() else { return Ok(None) };
         let fields = Fields::new(py);

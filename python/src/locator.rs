@@ -345,7 +345,7 @@ impl Locator {
 
     /// Check of its 95 % intervals at held-out places; None where they were not checked, which takes 19 places.
     ///
-    /// "places" is their number, "outside_model_percent" the share of the presses there that are `outside_model`. "position" and "force" (where it is estimated and was recorded) have the coverage "before_percent" and
+    /// "places" is their number, "presses" that of the presses there, and "outside_model" the number of those that are `outside_model`. "position" and "force" (where it is estimated and was recorded) have the coverage "before_percent" and
     /// "after_percent", and the "factor" of at least 1 by which the intervals are widened.
     #[getter]
     fn interval_check<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {

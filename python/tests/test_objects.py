@@ -36,7 +36,7 @@ def test_values_survive_pickling_and_copying(beam, presses, locator):
     assert pickle.loads(pickle.dumps(pp.Influence().of(beam))).kind == "influence"
 
 
-def test_an_imperfect_setup_records_rests_and_survives_pickling(beam):
+def test_an_imperfect_setup_records_rests_and_survives_pickling(beam, examples):
     creep = [pp.Relaxation("2 %", "5 s"), pp.Relaxation(0.01, 60)]
     imperfections = pp.Imperfections(hysteresis="2 %", creep=creep, drift_per_hour="10 um", noise_freedom=5, rest=3, untouched_rows=2)
     worn = beam.with_imperfections(imperfections)
@@ -44,18 +44,10 @@ def test_an_imperfect_setup_records_rests_and_survives_pickling(beam):
     assert pickle.loads(pickle.dumps(worn)) == worn != beam
     presses = worn.simulate(pp.even(10), force="3 N", seed=3)
     assert len(presses) == 10 + 2 * 11 and (presses.force == 0).sum() == 22
+    text = (examples / "noisy-beam.toml").read_text(encoding="utf-8")
     same = pp.Setup.from_toml(
-        """
-        [surface]
-        kind = "beam"
-        length = "400 mm"
-        width = "40 mm"
-        thickness = "1.2 mm"
-        youngs_modulus = "200 GPa"
-        [sensors]
-        measure = "deflection"
-        count = 8
-        noise = "5 um"
+        text[: text.index("[training]")]
+        + """
         [imperfections]
         hysteresis = "2 %"
         creep = [{ share = "2 %", time = "5 s" }, { share = "1 %", time = "60 s" }]

@@ -55,7 +55,7 @@ pub fn position_cells(position: Position, extent: Extent) -> Vec<String> {
     extent.coordinates_m(position).map(|at_m| cell(Some(at_m * 1e3))).collect()
 }
 
-/// Columns of errors in millimetres and newtons, and of the shares of the 95 % regions and of the force's 95 % intervals that hold their contact.
+/// Columns of errors in millimetres and newtons, and of the shares of the 95 % regions and of the force's 95 % intervals that contain their contact.
 pub const ERROR_COLUMNS: [&str; 9] = [
     "readings",
     "mean_error_mm",

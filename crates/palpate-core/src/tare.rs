@@ -54,7 +54,7 @@ pub struct Tare<B> {
 struct CalibrationDrift<B> {
     /// Last untouched reading of each channel.
     last: B,
-    /// Largest change of each channel since then that is taken for more drift.
+    /// Largest change of each channel since then that counts as more drift.
     reach: B,
 }
 
@@ -141,7 +141,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     }
 
     /// The same, of a calibration in whose course the untouched reading drifted. `last` is its last untouched reading, and `reach` the change of each
-    /// channel that is taken for more drift. The first readings after it are untouched where they are within this reach.
+    /// channel that counts as more drift. The first readings after it are untouched where they are within this reach.
     ///
     /// # Errors
     /// [`TareError`] for another number of channels, or a value of `last` that is not finite.

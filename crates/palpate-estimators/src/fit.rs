@@ -8,15 +8,16 @@ use std::fmt::Debug;
 use palpate_core::{ContactEstimate, Estimate, Position, Status, Uncertainty};
 use palpate_mechanics::sensing::{Layout, Sensor};
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::FEWEST_FOR_95;
 use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_numerics::{FEWEST_FOR_95, binomial_tail};
 
 use crate::interval_check::{HeldOutEstimate, IntervalCheck};
 pub use crate::locator_fault::LocatorFault;
 use crate::offset_course::OffsetCourse;
 use crate::recording::{Provenance, Recording};
 use crate::setup::Setup;
-use crate::status::{FalseAlarmRate, unless_left_open};
+use crate::split::Split;
+use crate::status::{FalseAlarmRate, SIGNIFICANCE, unless_left_open};
 use crate::thinning::thinned;
 use crate::untouched_drift::UntouchedDrift;
 use crate::untouched_scatter::{Rests, UntouchedScatter};
@@ -165,7 +166,7 @@ pub trait Fit {
         self.fit_task(FitTask::new(setup, recording))
     }
 
-    /// Fits with a seed, watched. From 19 places on the 95 % intervals are checked at held-out places, and widened where they hold too few presses: see
+    /// Fits with a seed, watched. From 19 places on the 95 % intervals are checked at held-out places, and widened where they contain too few presses: see
     /// [`crate::interval_check`].
     ///
     /// # Errors
@@ -245,7 +246,7 @@ pub(crate) fn fit_with_interval_check<E: Fit + ?Sized>(
 }
 
 /// Checks the intervals of an estimator's locators at held-out places; `None` of fewer than [`FEWEST_FOR_95`] places, of a method without intervals, and
-/// where the folds cannot be fitted. A drift that the presses show is taken off the held-out readings, as a tare does in use.
+/// where the folds cannot be fitted. A drift that the presses show is subtracted from the held-out readings, as a tare does in use.
 fn check_intervals<E: Fit + ?Sized>(
     estimator: &E,
     task: FitTask,
@@ -254,28 +255,65 @@ fn check_intervals<E: Fit + ?Sized>(
         return Ok(None);
     }
     let recording = &task.recording.clone().in_order();
-    let Ok(folds) = recording.folds(CHECK_FOLDS) else { return Ok(None) };
+    let Ok(mut splits) = Split::by_folds(recording, CHECK_FOLDS) else { return Ok(None) };
     let drifts = estimator.drift_course(FitTask { recording, ..task }, recording).is_some();
-    let mut estimates = Vec::new();
-    for (fold, rows) in folds.iter().enumerate() {
-        task.watch.counted("checking intervals", "folds", fold, folds.len())?;
-        let training = recording.subset(&rows.training);
-        let task = FitTask { recording: &training, ..task };
-        let judged: Vec<usize> =
-            thinned(rows.held_out.len(), MOST_PRESSES_CHECKED).map(|i| rows.held_out[i]).collect();
-        let judged = recording.subset(&judged);
-        let locator = match estimator.fit_without_interval_check(task) {
-            Ok(locator) => locator,
-            Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
-            Err(_) => return Ok(None),
-        };
-        let course = if drifts { estimator.drift_course(task, &judged) } else { None };
-        let tared = course.map(|course| course.tared(&judged, locator.method.offsets().as_deref()));
-        // A reading that no channel can have is no press.
-        let found = locator.estimates_of(tared.as_ref().unwrap_or(&judged), fold);
-        estimates.extend(found.flatten());
+    for Split { training, judged, offsets, .. } in &mut splits {
+        let kept: Vec<usize> = thinned(judged.rows.len(), MOST_PRESSES_CHECKED).collect();
+        *judged = judged.subset(&kept);
+        *offsets =
+            drifts.then(|| estimator.drift_course(FitTask { recording: training, ..task }, judged)).flatten();
     }
-    Ok(IntervalCheck::of_estimates(&estimates, task.setup.surface().extent()))
+    let fit = |fold: usize, task: FitTask<'_>| {
+        task.watch.counted("checking intervals", "folds", fold, CHECK_FOLDS)?;
+        Ok((estimator.fit_without_interval_check(task)?, 0.0))
+    };
+    match hold_out(task.setup, &splits, task.seed, &|| 0.0, task.watch, fit) {
+        Ok(held_out) => Ok(IntervalCheck::of_estimates(&held_out.estimates, task.setup.surface().extent())),
+        Err(HoldOutError::<E::Error>::Fit(error)) if Cancelled::caused(&error) => Err(Cancelled),
+        Err(_) => Ok(None),
+    }
+}
+
+/// Estimates of held-out presses, and the seconds that fits and estimates took.
+pub(crate) struct HeldOut {
+    pub estimates: Vec<HeldOutEstimate>,
+    pub fitting_s: f64,
+    pub locating_s: f64,
+}
+
+/// Splits whose presses cannot be located.
+pub(crate) enum HoldOutError<E> {
+    Fit(E),
+    Reading(ReadingError),
+}
+
+/// Locates what each split judges by, with the locator that `fit` gives for its training part. `fit` takes the number of a split, and gives the
+/// seconds that the fit would have taken longer by itself. `clock` tells seconds since any fixed moment.
+pub(crate) fn hold_out<M: Locate, E>(
+    setup: &Setup,
+    splits: &[Split],
+    seed: u64,
+    clock: &dyn Fn() -> f64,
+    watch: Watch,
+    fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
+) -> Result<HeldOut, HoldOutError<E>> {
+    let mut held_out = HeldOut { estimates: Vec::new(), fitting_s: 0.0, locating_s: 0.0 };
+    for (fold, Split { training, judged, offsets, .. }) in splits.iter().enumerate() {
+        let start = clock();
+        let task = FitTask { setup, recording: training, seed, watch };
+        let (locator, shared_s) = fit(fold, task).map_err(HoldOutError::Fit)?;
+        let fitted = clock();
+        let tared = offsets.as_ref().map(|course| course.tared(judged, locator.method.offsets().as_deref()));
+        let presses = tared.as_ref().unwrap_or(judged).rows.iter().filter(|row| row.touches());
+        for row in presses {
+            let estimate = locator.locate(&row.reading).map_err(HoldOutError::Reading)?;
+            let (truth, force_n) = (row.position, row.force_n);
+            held_out.estimates.push(HeldOutEstimate { truth, force_n, estimate, fold });
+        }
+        held_out.fitting_s += fitted - start + shared_s;
+        held_out.locating_s += clock() - fitted;
+    }
+    Ok(held_out)
 }
 
 /// A fitted method.
@@ -446,25 +484,13 @@ impl<M: Locate> Fitted<M> {
         Ok(self.finished(estimate, reading))
     }
 
-    /// The estimates of the presses of a recording, which a fold has held out.
-    pub(crate) fn estimates_of(
-        &self,
-        presses: &Recording,
-        fold: usize,
-    ) -> impl Iterator<Item = Result<HeldOutEstimate, ReadingError>> {
-        presses.rows.iter().filter(|row| row.touches()).map(move |row| {
-            let estimate = self.locate(&row.reading)?;
-            Ok(HeldOutEstimate { truth: row.position, force_n: row.force_n, estimate, fold })
-        })
-    }
-
     /// The estimate of the method, after its check, as the locator gives it.
     pub(crate) fn finished(&self, estimate: Estimate, reading: &[f64]) -> Estimate {
         let estimate = match &self.interval_check {
             Some(check) => check.widening().widened(estimate, self.setup.surface().extent()),
             None => estimate,
         };
-        self.by_scatter(told(estimate, reading, &self.setup), reading)
+        self.by_scatter(limited(estimate, reading, &self.setup), reading)
     }
 
     /// The estimate of a reading that no contact explains.
@@ -490,8 +516,6 @@ impl<M: Locate> Fitted<M> {
         /// Rows that are located, at most.
         const MOST: usize = 400;
         const MOST_HIDDEN: f64 = 0.5;
-        /// Of the test that noise does not explain the untouched rows.
-        const SIGNIFICANCE: f64 = 0.05;
         let of_check = || self.check.as_ref()?.false_alarm_rate();
         let Some(rate) = self.method.false_alarm_rate().or_else(of_check) else { return self };
         let Some(centre) = self.method.offsets().or_else(|| self.untouched.clone()) else { return self };
@@ -541,22 +565,11 @@ impl<M: Locate> Fitted<M> {
     }
 }
 
-/// Probability of at least `least` events in so many trials, each of probability `share`.
-fn binomial_tail(trials: usize, least: usize, share: f64) -> f64 {
-    let mut term = (trials as f64 * (-share).ln_1p()).exp();
-    let mut fewer = 0.0;
-    for k in 0..least {
-        fewer += term;
-        term *= (trials - k) as f64 / (k + 1) as f64 * share / (1.0 - share);
-    }
-    (1.0 - fewer).max(0.0)
-}
-
 /// Largest size of a number of a locator, as of a reading.
 pub(crate) const LARGEST: f64 = palpate_core::LARGEST_READING;
 
 /// An estimate of a reading as locators give it: in numbers, and `located` only where the reading tells something of the place.
-fn told(estimate: Estimate, reading: &[f64], setup: &Setup) -> Estimate {
+fn limited(estimate: Estimate, reading: &[f64], setup: &Setup) -> Estimate {
     let extent = setup.surface().extent();
     let is_absurd = |(value, sensor): (&f64, &Sensor)| value.abs() > LARGEST && !sensor.channel.dead;
     if reading.iter().zip(setup.layout().sensors()).any(is_absurd) {

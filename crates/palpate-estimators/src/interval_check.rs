@@ -1,21 +1,23 @@
 //! Check of 95 % intervals at places that a locator was not fitted to, and their widening.
 //!
-//! An interval is right where the world is as its method supposes. Whether it is, presses at held-out places show: a locator of the same estimator, fitted to the
+//! An interval is right where the bench is as its method assumes. Presses at held-out places test this: a locator of the same estimator, fitted to the
 //! other folds, locates them. The ratio of a press is its error over the half-width of its interval toward it; on a plane, the square root of
-//! (e − t)ᵀ·C⁻¹·(e − t) over that of [`ELLIPSE_95`]. Intervals that are multiplied by a factor hold the presses whose ratio is at most this factor.
+//! (e − t)ᵀ·C⁻¹·(e − t) over that of [`ELLIPSE_95`]. Intervals that are multiplied by a factor contain the presses whose ratio is at most this factor.
 //!
-//! The factor is the 95 % quantile of the ratios, with the correction for their number by which it holds a press at a further place with a probability of 0.95
+//! The factor is the 95 % quantile of the ratios, with the correction for their number by which it covers a press at a further place with a probability of 0.95
 //! (cross-conformal prediction: Vovk, *Annals of Mathematics and Artificial Intelligence* 74, 2015; the jackknife+ and CV+: Barber and others, *Annals of
 //! Statistics* 49, 2021). Presses of one place may share an error, so places are what is counted: see [`conformal_95_of_groups`]. Fewer than
 //! [`FEWEST_FOR_95`](palpate_numerics::FEWEST_FOR_95) of them bound nothing.
 //!
 //! Intervals are widened, and never narrowed: the factor of few places scatters, and intervals of a method that is right are right without it.
 
+use crate::estimate_record::ContactRecord;
 use crate::locator_fault::LocatorFault;
+use crate::status::{OUTSIDE_MODEL_RATE, SIGNIFICANCE, SPREAD_RATE};
 use palpate_core::{ContactEstimate, Estimate, Position, Status, Uncertainty};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::Ldl;
-use palpate_numerics::{ELLIPSE_95, conformal_95_of_groups, normal_interval_95};
+use palpate_numerics::{ELLIPSE_95, binomial_tail, conformal_95_of_groups};
 use serde::{Deserialize, Serialize};
 
 /// Check of a locator's 95 % intervals at held-out places; see [the module](self).
@@ -24,8 +26,10 @@ use serde::{Deserialize, Serialize};
 pub struct IntervalCheck {
     /// Number of places.
     pub places: usize,
-    /// Share of the presses that are `outside_model`, in %. Their intervals count too: a press is one contact, also where the model does not explain it.
-    pub outside_model_percent: f64,
+    /// Number of presses at these places.
+    pub presses: usize,
+    /// Number of them that are `outside_model`. Their intervals count too: a press is one contact, also where the model does not explain it.
+    pub outside_model: usize,
     /// Intervals of the position; on a plane, its ellipse.
     pub position: Coverage,
     /// Intervals of the force, where it is estimated and was recorded.
@@ -37,7 +41,7 @@ pub struct IntervalCheck {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Coverage {
-    /// Share of the presses that their intervals hold, in %, as the method gives them. Every place counts alike.
+    /// Share of the presses that the method's intervals contain, in %. Every place has the same weight.
     pub before_percent: f64,
     /// The same by intervals that are widened by the factor of the other folds, in %.
     pub after_percent: f64,
@@ -58,7 +62,7 @@ pub(crate) struct HeldOutEstimate {
     pub truth: Position,
     pub force_n: Option<f64>,
     pub estimate: Estimate,
-    /// Fold that held it out.
+    /// Number of its fold.
     pub fold: usize,
 }
 
@@ -70,8 +74,20 @@ impl IntervalCheck {
         let places = positions.groups.len();
         let position = positions.coverage()?;
         let outside = estimates.iter().filter(|held_out| held_out.estimate.status == Status::OutsideModel);
-        let outside_model_percent = 100.0 * outside.count() as f64 / estimates.len() as f64;
-        Some(Self { places, outside_model_percent, position, force: ratios(&force_ratio).coverage() })
+        Some(Self {
+            places,
+            presses: estimates.len(),
+            outside_model: outside.count(),
+            position,
+            force: ratios(&|held_out| force_ratio(held_out, extent)).coverage(),
+        })
+    }
+
+    /// Share of the presses that are `outside_model`, in %, where these are more than noise makes so; `None` elsewhere.
+    pub fn outside_model_percent(&self) -> Option<f64> {
+        let Self { presses, outside_model, .. } = *self;
+        let by_noise = binomial_tail(presses, outside_model, OUTSIDE_MODEL_RATE + SPREAD_RATE);
+        (by_noise < SIGNIFICANCE).then(|| 100.0 * outside_model as f64 / presses as f64)
     }
 
     /// The factors of its intervals.
@@ -92,8 +108,10 @@ impl IntervalCheck {
             |factor| factor >= 1.0,
             "finite and at least 1",
         )?;
+        let outside = [self.outside_model as f64 / self.presses as f64];
+        let is_share = |share| (0.0..=1.0).contains(&share);
+        LocatorFault::check_numbers("share of presses that are outside_model", outside, is_share, "0 to 1")?;
         let percents = coverages().flat_map(|coverage| [coverage.before_percent, coverage.after_percent]);
-        let percents = percents.chain([self.outside_model_percent]);
         let is_percent = |percent| (0.0..=100.0).contains(&percent);
         LocatorFault::check_numbers("coverage of intervals", percents, is_percent, "0 to 100 %")
     }
@@ -116,7 +134,7 @@ pub(crate) fn widen_by_other_folds(estimates: &mut [HeldOutEstimate], extent: Ex
     }
 }
 
-/// Ratios of the presses of each place, with the fold that held it out.
+/// Ratios of the presses of each place, with the fold of the place.
 struct PlaceRatios {
     groups: Vec<(usize, Vec<f64>)>,
 }
@@ -191,16 +209,10 @@ fn position_ratio(held_out: &HeldOutEstimate, extent: Extent) -> Option<f64> {
     Some(squared.filter(|squared| squared.is_finite()).map_or(f64::MAX, f64::sqrt))
 }
 
-fn force_ratio(held_out: &HeldOutEstimate) -> Option<f64> {
+fn force_ratio(held_out: &HeldOutEstimate, extent: Extent) -> Option<f64> {
     let contact = &held_out.estimate.contact;
-    Some(ratio_of(force_interval_n(contact)?, contact.force_n?, held_out.force_n?))
-}
-
-/// The 95 % interval of an estimated force, in newtons; `None` of a force that is known, and of none.
-pub(crate) fn force_interval_n(contact: &ContactEstimate) -> Option<(f64, f64)> {
-    let (uncertainty, force_n) = (contact.uncertainty?, contact.force_n?);
-    let sd_n = uncertainty.covariance[5].sqrt();
-    uncertainty.force_95_n.or_else(|| (sd_n > 0.0).then(|| normal_interval_95(force_n, sd_n)))
+    let interval_n = ContactRecord::new(contact, extent).force_interval_95_n()?;
+    Some(ratio_of(interval_n.into(), contact.force_n?, held_out.force_n?))
 }
 
 impl Widening {

@@ -52,6 +52,7 @@ pub mod recording;
 pub mod recording_check;
 pub mod setup;
 pub mod simulate;
+mod split;
 mod spread;
 pub mod status;
 mod thinning;

@@ -1,6 +1,7 @@
 //! Recordings made by the model of a surface instead of its bench.
 
 mod bench;
+mod faulty_channels;
 mod moving;
 mod presses;
 
@@ -10,10 +11,11 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::arrangement::{ArrangementError, Training};
+use crate::imperfections::Schedule;
 use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Setup;
 use palpate_mechanics::contact::{Contact, OffSurface, Position};
-use palpate_mechanics::sensing::{ChannelErrors, Layout, LayoutError, Sensor, measure};
+use palpate_mechanics::sensing::{ChannelErrors, Layout, LayoutError, Sensor};
 use palpate_mechanics::surface::{Extent, ResponseFunction, Surface, UniformLoad, Unsolvable};
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -288,7 +290,7 @@ pub fn simulate_loads_watched(
 ) -> Result<Vec<Vec<f64>>, SimulateError> {
     let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
     surface.check_solution_watched(watch)?;
-    let (placed, errors, mut rng) = draw_faults(setup, seed);
+    let (placed, ..) = draw_faults(setup, seed);
     // By superposition.
     let mut clean = Vec::with_capacity(placed.len());
     for sensor in placed.sensors() {
@@ -296,29 +298,18 @@ pub fn simulate_loads_watched(
             clean.push(loads.iter().map(|load| load.force_n() * load.mean(&*function)).sum());
         }
     }
-    let mut worn = match setup.imperfections() {
-        Some(imperfections) => {
-            let largest_n = loads.iter().map(|load| load.force_n().abs()).fold(0.0, f64::max);
-            let bench = SimulatedBench::perfect_watched(setup, seed, watch)?;
-            Some((
-                bench.with_imperfections(*imperfections, setup.force_n().unwrap_or(largest_n)),
-                imperfections.schedule,
-            ))
-        }
-        None => None,
-    };
+    let largest_n = loads.iter().map(|load| load.force_n().abs()).fold(0.0, f64::max);
+    let force_n = setup.force_n().unwrap_or(largest_n);
+    let mut channels = SimulatedBench::channels_watched(setup, force_n, seed, watch)?;
+    let schedule =
+        setup.imperfections().map_or_else(Schedule::default, |imperfections| imperfections.schedule);
     let mut readings = Vec::new();
     for i in 0..repeats {
         if i.is_multiple_of(READINGS_EACH) {
             watch.counted(STAGE, "readings", i, repeats)?;
         }
-        readings.push(match &mut worn {
-            Some((bench, schedule)) => {
-                let values = bench.advance(&clean, if i == 0 { schedule.settle_s } else { schedule.row_s() });
-                bench.measure(&values)
-            }
-            None => measure(setup.layout(), &clean, &errors, &mut rng),
-        });
+        let values = channels.advance(&clean, if i == 0 { schedule.settle_s } else { schedule.row_s() });
+        readings.push(channels.measure(&values));
     }
     Ok(readings)
 }

@@ -100,6 +100,10 @@ pub const OUTSIDE_MODEL_RATE: f64 = 1e-3;
 /// Share of the readings of contacts at a point that are `outside_model` as those of a contact spread out, of two close by or of a patch.
 pub const SPREAD_RATE: f64 = 2e-3;
 
+/// Level of tests whether noise explains what a recording shows: untouched rows that are contacts, their drift, presses that are `outside_model`. The usual
+/// one of statistics: one recording in twenty whose noise explains it fails.
+pub(crate) const SIGNIFICANCE: f64 = 0.05;
+
 /// The least share of the posterior probability for another place to make an estimate `ambiguous`: of the readings that are `located`,
 /// fewer than one in a hundred comes from another place than the one that is said.
 pub const OTHER_PLACE: f64 = 0.01;

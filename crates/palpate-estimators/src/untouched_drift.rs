@@ -2,6 +2,8 @@
 
 use crate::locator_fault::LocatorFault;
 use crate::recording::Recording;
+use crate::status::SIGNIFICANCE;
+use crate::untouched_scatter::FEWEST_RESTS;
 use palpate_mechanics::sensing::Layout;
 use palpate_numerics::{mean, normal_quantile};
 use serde::{Deserialize, Serialize};
@@ -17,38 +19,28 @@ pub struct UntouchedDrift {
 }
 
 impl UntouchedDrift {
-    /// Fewer rests show no drift.
-    const FEWEST_RESTS: usize = 5;
-    /// Of the test that noise does not explain the course of the rests.
-    const SIGNIFICANCE: f64 = 0.05;
-
     /// The drift between the rests of a recording; `None` where noise explains their course, or the rests are too few.
     pub fn of_recording(recording: &Recording) -> Option<Self> {
         let rests = recording.rests();
-        if rests.len() < Self::FEWEST_RESTS {
+        if rests.len() < FEWEST_RESTS {
             return None;
         }
         let channels = recording.channels.len();
-        let value = |row: &usize, channel: usize| recording.rows[*row].reading[channel];
-        let level = |rest: &Vec<usize>, channel: usize| mean(rest.iter().map(|row| value(row, channel)));
-        let levels = |channel| rests.iter().map(|rest| level(rest, channel)).collect::<Vec<f64>>();
+        let levels: Vec<Vec<f64>> = rests.iter().map(|rest| recording.mean_reading(rest)).collect();
+        let course = |channel: usize| levels.iter().map(|level| level[channel]).collect::<Vec<f64>>();
         // Of each channel, so that all together err at this level.
-        let share = Self::SIGNIFICANCE / channels as f64;
-        if !(0..channels).any(|channel| is_drifting(&levels(channel), share)) {
+        let share = SIGNIFICANCE / channels as f64;
+        if !(0..channels).any(|channel| is_drifting(&course(channel), share)) {
             return None;
         }
         let range = |channel: usize| {
-            let values = || rests.iter().flatten().map(|row| value(row, channel));
+            let values = || rests.iter().flatten().map(|row| recording.rows[*row].reading[channel]);
             values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
         };
-        let last = rests.last()?;
-        Some(Self {
-            last: (0..channels).map(|channel| level(last, channel)).collect(),
-            range: (0..channels).map(range).collect(),
-        })
+        Some(Self { last: levels.last()?.clone(), range: (0..channels).map(range).collect() })
     }
 
-    /// Largest change of each channel after the last rest that is taken for more drift: that of the recording again. Disabled channels may change by any
+    /// Largest change of each channel after the last rest that counts as more drift: the range of the recording. Disabled channels may change by any
     /// amount.
     pub fn reach(&self, layout: &Layout) -> Vec<f64> {
         let reach = |(range, dead): (&f64, bool)| if dead { f64::INFINITY } else { *range };

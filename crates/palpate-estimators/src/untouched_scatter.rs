@@ -31,6 +31,9 @@ pub struct UntouchedScatter {
     pub bound: f64,
 }
 
+/// Rests by which the untouched surface is known, at least: with fewer the critical value would be that of a t with hardly any degrees of freedom.
+pub(crate) const FEWEST_RESTS: usize = 5;
+
 /// Rests of a recording about their slow course.
 pub(crate) struct Rests {
     /// Deviation of each untouched row from the course, with the share that the row has of its rest.
@@ -40,8 +43,6 @@ pub(crate) struct Rests {
 }
 
 impl Rests {
-    /// Fewer rests do not tell a scatter: the bound would be that of a t with hardly any freedom.
-    const LEAST: usize = 5;
     /// Parameters of a line.
     const OF_LINE: usize = 2;
 
@@ -50,18 +51,15 @@ impl Rests {
         let by_row = || (0..recording.rows.len()).map(|row| row as f64).collect();
         let times_s: Vec<f64> = recording.times_s().unwrap_or_else(by_row);
         let rests = recording.rests();
-        if rests.len() < Self::LEAST {
+        if rests.len() < FEWEST_RESTS {
             return None;
         }
-        let channels = recording.channels.len();
-        let time_of = |rest: &[usize]| mean(rest.iter().map(|row| times_s[*row]));
-        let rest_times_s: Vec<f64> = rests.iter().map(|rest| time_of(rest)).collect();
-        let lines: Vec<[f64; 2]> = (0..channels)
-            .map(|c| {
-                let value = |rest: &Vec<usize>| mean(rest.iter().map(|row| recording.rows[*row].reading[c]));
-                line(&rest_times_s, &rests.iter().map(value).collect::<Vec<f64>>())
-            })
-            .collect();
+        let time_of = |rest: &Vec<usize>| mean(rest.iter().map(|row| times_s[*row]));
+        let rest_times_s: Vec<f64> = rests.iter().map(time_of).collect();
+        let levels: Vec<Vec<f64>> = rests.iter().map(|rest| recording.mean_reading(rest)).collect();
+        let of_channel = |c: usize| levels.iter().map(|level| level[c]).collect::<Vec<f64>>();
+        let lines: Vec<[f64; 2]> =
+            (0..recording.channels.len()).map(|c| line(&rest_times_s, &of_channel(c))).collect();
         let deviations = rests.iter().flat_map(|rest| rest.iter().map(|row| (*row, 1.0 / rest.len() as f64)));
         let deviations = deviations.map(|(row, share)| {
             let values = recording.rows[row].reading.iter().zip(&lines);

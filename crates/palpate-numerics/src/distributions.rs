@@ -179,6 +179,17 @@ pub fn chi_squared_critical_value(tail: f64, freedom: usize) -> f64 {
     bisect((low, high), 60, |value| chi_squared_survival(value, freedom) > tail)
 }
 
+/// Probability of at least `least` of so many independent events, each of probability `share`.
+pub fn binomial_tail(trials: usize, least: usize, share: f64) -> f64 {
+    let mut term = (trials as f64 * (-share).ln_1p()).exp();
+    let mut fewer = 0.0;
+    for k in 0..least.min(trials + 1) {
+        fewer += term;
+        term *= (trials - k) as f64 / (k + 1) as f64 * share / (1.0 - share);
+    }
+    (1.0 - fewer).max(0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -215,6 +226,15 @@ mod tests {
         }
         let mean = sums[1] / sums[0];
         [sums[0].ln() - 0.5 * peak * peak - ROOT_TWO_PI.ln(), peak + mean, sums[2] / sums[0] - mean * mean]
+    }
+
+    #[test]
+    fn the_tail_of_a_binomial_distribution_is_that_of_its_terms() {
+        // 1 − 0.9⁵, C(5, 4)·0.1⁴·0.9 + 0.1⁵, and the ends.
+        assert!((binomial_tail(5, 1, 0.1) - 0.40951).abs() < 1e-12);
+        assert!((binomial_tail(5, 4, 0.1) - 46e-5).abs() < 1e-12);
+        assert_eq!((binomial_tail(5, 0, 0.1), binomial_tail(0, 0, 0.1)), (1.0, 1.0));
+        assert!(binomial_tail(5, 6, 0.1) < 1e-12 && binomial_tail(5, 60, 0.1) < 1e-12);
     }
 
     #[test]

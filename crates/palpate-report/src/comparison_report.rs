@@ -79,8 +79,8 @@ impl ComparisonReport<'_> {
         };
         let caption = html! {
             "Location errors in mm, best mean first; 95th percentile and root mean square (RMS). Effective: share of the readings within "
-            (number(self.tolerance_m * 1e3)) " mm. Covered: share of the 95 % intervals that hold the contact. Score: mean interval score, \
-             small where narrow intervals hold the contact. Force: mean error of the force. × limit: mean \
+            (number(self.tolerance_m * 1e3)) " mm. Covered: share of the 95 % intervals that contain the contact. Score: mean interval score, \
+             small where narrow intervals contain the contact. Force: mean error of the force. × limit: mean \
              error over what physics allows, where the limit is at most " (small)
             " of the length, 1/80 of it away from the ends. A dash: the estimator or the bench has none."
         };

@@ -39,7 +39,7 @@ pub enum Zero {
     Each,
 }
 
-/// A bench in a world, as a locator knows it.
+/// A bench in a world, with what a locator is given of it.
 pub struct Bench<'a> {
     pub rig: &'a Rig,
     pub world: World,
@@ -57,7 +57,7 @@ const LIGHT_EACH: usize = 4;
 
 /// Recordings of one bench.
 pub struct Recordings {
-    /// The setup as the locator knows it.
+    /// The setup that the locator is given.
     pub known: Setup,
     pub calibration: Recording,
     /// Contacts in use, with untouched rows between them.
@@ -120,7 +120,7 @@ impl Bench<'_> {
         Ok(setup.with_imperfections(imperfections)?)
     }
 
-    /// The setup as the locator knows it.
+    /// The setup that the locator is given.
     fn known(&self, setup: &Setup) -> Result<Setup> {
         if self.knowledge == Knowledge::Model {
             return Ok(setup.clone());
@@ -155,15 +155,10 @@ impl Recordings {
         let locator = estimator.fit_task(task)?;
         for (zero, tally) in zeros.iter().zip(tallies) {
             let touches = tared(&locator, &self.touches, *zero)?;
-            tally.add_positions(&Evaluation::new(&locator, &touches)?);
-            let extent = locator.setup.surface().extent();
-            for row in &touches.rows {
-                let estimate = locator.locate(&row.reading)?;
-                match row.touches() {
-                    true => tally.add_touch(row, &estimate, extent),
-                    false => tally.add_untouched(&estimate),
-                }
+            for row in touches.rows.iter().filter(|row| !row.touches()) {
+                tally.add_untouched(&locator.locate(&row.reading)?);
             }
+            tally.add_touches(Evaluation::new(&locator, &touches)?);
             for row in tared(&locator, &self.light, *zero)?.rows.iter().filter(|row| row.touches()) {
                 tally.add_light_touch(&locator.locate(&row.reading)?);
             }

@@ -88,7 +88,7 @@ const WORLDS: [(World, &str); 2] = [(World::Clean, "clean"), (World::Imperfect, 
 const KNOWLEDGE: [(Knowledge, &str); 2] = [(Knowledge::Model, "model"), (Knowledge::Measured, "measured")];
 const ZEROS: [(Zero, &str); 2] = [(Zero::Once, "once"), (Zero::Each, "each")];
 
-/// Runs the experiment, several cases at a time; `progress` is told what ends, and how much is done of how much.
+/// Runs the experiment, several cases at a time; `progress` gets the name of a finished case, the number of finished cases and of all.
 ///
 /// # Errors
 /// A bench that is not known, or cannot be simulated.
@@ -105,11 +105,13 @@ fn run_on(
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let judged = Mutex::new(Vec::new());
     let work = || {
-        while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let Some(case) = cases.get(number) else { return };
             let rows = case.rows(options);
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             progress(&format!("{}, {}, {}", case.name, case.knowledge.1, case.world.1), done, cases.len());
-            judged.lock().unwrap_or_else(PoisonError::into_inner).push((case.number, rows));
+            judged.lock().unwrap_or_else(PoisonError::into_inner).push((number, rows));
         }
     };
     let threads = std::thread::available_parallelism().map_or(1, usize::from).min(cases.len());
@@ -138,9 +140,8 @@ fn chosen(names: &[String]) -> Result<Vec<(&'static str, &'static str)>> {
     names.iter().map(find).collect()
 }
 
-/// A bench in a world, as a locator knows it.
+/// A bench in a world, with what a locator is given of it.
 struct Case {
-    number: usize,
     name: &'static str,
     rig: Rig,
     knowledge: (Knowledge, &'static str),
@@ -152,10 +153,9 @@ fn cases(benches: &[(&'static str, &'static str)]) -> Result<Vec<Case>> {
     for (name, toml) in benches {
         let rig = Rig::from_toml(toml).with_context(|| format!("examples/{name}.toml"))?;
         for knowledge in KNOWLEDGE {
-            cases.extend(WORLDS.map(|world| Case { number: 0, name, rig: rig.clone(), knowledge, world }));
+            cases.extend(WORLDS.map(|world| Case { name, rig: rig.clone(), knowledge, world }));
         }
     }
-    cases.iter_mut().enumerate().for_each(|(number, case)| case.number = number);
     Ok(cases)
 }
 
@@ -200,7 +200,8 @@ fn judged(bench: &Bench, options: &Options) -> Result<Vec<Judged>> {
         options.estimators.is_empty() || options.estimators.iter().any(|kind| kind == estimator.kind())
     });
     let zeros = ZEROS.map(|(zero, _)| zero);
-    let mut tallies = vec![(vec![Tally::default(); zeros.len()], None); estimators.len()];
+    let extent = bench.rig.setup.surface().extent();
+    let mut tallies = vec![(vec![Tally::new(extent); zeros.len()], None); estimators.len()];
     for seed in 0..options.seeds {
         let recordings = bench.record(options.contacts, seed)?;
         for (estimator, (tallies, failure)) in estimators.iter().zip(&mut tallies) {

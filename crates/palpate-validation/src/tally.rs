@@ -1,29 +1,21 @@
 //! Estimates beside the truth, summed into figures.
 
-use palpate::estimators::estimate_record::ContactRecord;
-use palpate::estimators::evaluation::Evaluation;
-use palpate::numerics::{mean, percentile};
-use palpate::prelude::{Estimate, Row, Status};
+use palpate::prelude::{Estimate, Evaluation, Extent, Status};
 use serde::Serialize;
 
-/// Sums over the estimates of some readings.
-#[derive(Clone, Debug, Default)]
+/// Estimates of some readings.
+#[derive(Clone, Debug)]
 pub struct Tally {
-    errors_m: Vec<f64>,
-    position_intervals: Count,
-    force_intervals: Count,
-    outside_model: Count,
-    ambiguous: Count,
-    missed: Count,
+    touches: Evaluation,
     untouched: Count,
     light: Count,
 }
 
-/// Number of cases, and of those that hold.
+/// Number of cases, and of those that are so.
 #[derive(Clone, Copy, Debug, Default)]
 struct Count {
     of: usize,
-    holds: usize,
+    so: usize,
 }
 
 /// Figures of an estimator on a bench; shares in %.
@@ -52,36 +44,26 @@ pub struct Figures {
 }
 
 impl Count {
-    fn add(&mut self, holds: bool) {
+    fn add(&mut self, is_so: bool) {
         self.of += 1;
-        self.holds += usize::from(holds);
+        self.so += usize::from(is_so);
     }
 
     fn percent(self) -> Option<f64> {
-        (self.of > 0).then(|| 100.0 * self.holds as f64 / self.of as f64)
+        (self.of > 0).then(|| 100.0 * self.so as f64 / self.of as f64)
     }
 }
 
 impl Tally {
-    /// Adds positions and their regions.
-    pub fn add_positions(&mut self, evaluation: &Evaluation) {
-        for located in &evaluation.located {
-            self.errors_m.push(located.error_m());
-            if let Some(covered) = located.covered {
-                self.position_intervals.add(covered);
-            }
-        }
+    /// A tally without estimates, on a surface of this extent.
+    pub fn new(extent: Extent) -> Self {
+        let touches = Evaluation { extent, located: Vec::new() };
+        Self { touches, untouched: Count::default(), light: Count::default() }
     }
 
-    /// Adds status and force of a touch.
-    pub fn add_touch(&mut self, row: &Row, estimate: &Estimate, extent: palpate::prelude::Extent) {
-        self.outside_model.add(estimate.status == Status::OutsideModel);
-        self.ambiguous.add(estimate.status == Status::Ambiguous);
-        self.missed.add(estimate.status == Status::NoContact);
-        let interval_n = ContactRecord::new(&estimate.contact, extent).force_interval_95_n();
-        if let (Some([low_n, high_n]), Some(force_n)) = (interval_n, row.force_n) {
-            self.force_intervals.add((low_n..=high_n).contains(&force_n));
-        }
+    /// Adds estimates of touches.
+    pub fn add_touches(&mut self, evaluation: Evaluation) {
+        self.touches.located.extend(evaluation.located);
     }
 
     /// Adds an untouched reading.
@@ -96,18 +78,20 @@ impl Tally {
 
     /// The figures of all that was added.
     pub fn figures(&self) -> Figures {
-        let mut sorted_m = self.errors_m.clone();
-        sorted_m.sort_by(f64::total_cmp);
-        let mm = |length_m: f64| 1e3 * length_m;
+        let touches = &self.touches;
+        let errors = touches.summary(None);
+        let statuses = touches.status_percents();
+        let percent =
+            |status| statuses.as_ref()?.iter().find(|(of, _)| *of == status).map(|(_, share)| *share);
         Figures {
-            touches: sorted_m.len(),
-            median_error_mm: percentile(&sorted_m, 50.0).map(mm),
-            mean_error_mm: (!sorted_m.is_empty()).then(|| mm(mean(sorted_m.iter().copied()))),
-            position_coverage: self.position_intervals.percent(),
-            force_coverage: self.force_intervals.percent(),
-            outside_model: self.outside_model.percent(),
-            ambiguous: self.ambiguous.percent(),
-            missed: self.missed.percent(),
+            touches: touches.located.len(),
+            median_error_mm: errors.map(|errors| 1e3 * errors.median_m),
+            mean_error_mm: errors.map(|errors| 1e3 * errors.average_m),
+            position_coverage: touches.coverage_percent(),
+            force_coverage: touches.force_summary().map(|forces| forces.coverage_percent),
+            outside_model: percent(Status::OutsideModel),
+            ambiguous: percent(Status::Ambiguous),
+            missed: percent(Status::NoContact),
             untouched_no_contact: self.untouched.percent(),
             light_found: self.light.percent(),
         }

@@ -52,9 +52,6 @@ pub fn locator(locator: &Locator) -> Vec<String> {
     lines
 }
 
-/// Share of presses that are `outside_model` from which on it is said, in %: by noise alone it is below half a percent.
-const MUCH_OUTSIDE_MODEL_PERCENT: f64 = 2.0;
-
 /// The check of a locator's 95 % intervals at held-out places.
 pub fn interval_check(check: Option<&IntervalCheck>) -> Vec<String> {
     let Some(check) = check else {
@@ -68,14 +65,15 @@ pub fn interval_check(check: Option<&IntervalCheck>) -> Vec<String> {
             false => String::new(),
         };
         format!(
-            "95 % intervals at {} places held out: {before_percent:.1} % hold the {what}{widened}",
+            "95 % intervals at {} places held out: {before_percent:.1} % contain the {what}{widened}",
             check.places
         )
     };
     let position = line("position", check.position);
-    let outside_percent = check.outside_model_percent;
-    let outside = (outside_percent > MUCH_OUTSIDE_MODEL_PERCENT).then(|| {
-        format!("presses held out that are `outside_model`: {outside_percent:.1} %; the estimator's model does not explain them within the noise")
+    let outside = check.outside_model_percent().map(|percent| {
+        format!(
+            "presses held out that the estimator's model does not explain (`outside_model`): {percent:.1} %"
+        )
     });
     let force = check.force.map(|force| line("force", force));
     [Some(position), force, outside].into_iter().flatten().collect()

@@ -142,10 +142,7 @@ macro_rules! estimators {
                 if let Self::Auto = self {
                     return choose(task, None)?.best.fit_without_interval_check(task);
                 }
-                task.check_channels()?;
-                let method = self.fit_method(task)?;
-                let check = if is_learnt(self.kind()) { ReadingCheck::fit(task)? } else { None };
-                Ok(method.beside_check(task, check)?)
+                self.fit_beside(task, || ReadingCheck::fit(task))
             }
 
             fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Locator>) -> Result<(), FitError> {
@@ -208,19 +205,27 @@ pub(crate) fn is_learnt(kind: &str) -> bool {
     matches!(kind, "network" | "network-lm" | "gaussian-process" | "neighbours" | "centroid")
 }
 
-impl Method {
-    /// The locator of a method that was fitted to a task, beside a reading check of the same recording; none for one that needs none.
-    fn beside_check(self, task: FitTask, check: Option<ReadingCheck>) -> Result<Locator, Cancelled> {
-        let check = match check {
-            Some(by) if self.knows_its_errors() => {
-                Some(by.keeping_intervals(task, |reading| self.locate(reading))?)
-            }
-            check => check,
-        };
-        let locator = Fitted { check: check.map(Box::new), ..Fitted::new(task, self) };
+impl Estimator {
+    /// Fits the method, and beside it, where it is learnt, the reading check that `check` gives of the same recording.
+    fn fit_beside(
+        &self,
+        task: FitTask,
+        check: impl FnOnce() -> Result<Option<ReadingCheck>, Cancelled>,
+    ) -> Result<Locator, FitError> {
+        task.check_channels()?;
+        let method = self.fit_method(task)?;
+        let mut check = if is_learnt(self.kind()) { check()? } else { None };
+        if method.knows_its_errors()
+            && let Some(by) = check
+        {
+            check = Some(by.keeping_intervals(task, |reading| method.locate(reading))?);
+        }
+        let locator = Fitted { check: check.map(Box::new), ..Fitted::new(task, method) };
         Ok(locator.with_scatter_of(task.recording))
     }
+}
 
+impl Method {
     /// True of a method whose intervals come from errors at positions that were held out, reading by reading.
     fn knows_its_errors(&self) -> bool {
         matches!(self, Self::GaussianProcess(locator) if locator.widths.is_some())

@@ -2,7 +2,7 @@
 
 use super::{Estimator, FitError, Locator, is_learnt};
 use crate::evaluation::{EvaluationError, Split, TimedEvaluation, evaluate_splits_by};
-use crate::fit::{Fit, FitTask};
+use crate::fit::FitTask;
 use crate::reading_check::ReadingCheck;
 use crate::setup::Setup;
 use palpate_numerics::watch::Watch;
@@ -40,19 +40,17 @@ impl<'a> TrialSplits<'a> {
 
     /// The locator of a split, and the seconds that its check took before.
     fn fit(&self, estimator: &Estimator, split: usize, task: FitTask) -> Result<(Locator, f64), FitError> {
-        task.check_channels()?;
-        let method = estimator.fit_method(task)?;
-        if !is_learnt(estimator.kind()) {
-            return Ok((method.beside_check(task, None)?, 0.0));
-        }
-        let cell = &self.checks[split];
-        if let Some(TimedCheck { check, seconds }) = cell.get() {
-            return Ok((method.beside_check(task, check.clone())?, *seconds));
-        }
-        let start = (self.clock)();
-        let check = ReadingCheck::fit(task)?;
-        let TimedCheck { check, .. } =
-            cell.get_or_init(|| TimedCheck { check, seconds: (self.clock)() - start });
-        Ok((method.beside_check(task, check.clone())?, 0.0))
+        let known = self.checks[split].get().filter(|_| is_learnt(estimator.kind()));
+        let known_s = known.map_or(0.0, |known| known.seconds);
+        let locator = estimator.fit_beside(task, || match known {
+            Some(known) => Ok(known.check.clone()),
+            None => {
+                let start = (self.clock)();
+                let check = ReadingCheck::fit(task)?;
+                let seconds = (self.clock)() - start;
+                Ok(self.checks[split].get_or_init(|| TimedCheck { check, seconds }).check.clone())
+            }
+        })?;
+        Ok((locator, known_s))
     }
 }

@@ -4,7 +4,9 @@ use super::{Evaluation, EvaluationError, Split, SplitOrigin};
 use crate::arrangement::{Training, all_over};
 use crate::fit::{Fit, FitTask, Fitted, Locate, SeedList};
 use crate::setup::Setup;
-use crate::simulate::{Press, PressedBench, SimulateError, simulate_at_watched, simulate_contacts_watched};
+use crate::simulate::{
+    Press, PressedBench, SimulateError, contacts_at, simulate_at_watched, simulate_contacts_watched,
+};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::ChannelModel;
 use palpate_numerics::OutOfRange;
@@ -172,10 +174,7 @@ impl Calibration {
 
     /// Recordings of a bench with imperfections.
     fn simulate_in_time(&self, seed: u64, watch: Watch) -> Result<Split, SimulateError> {
-        let force_n = self.pressed.force_n().ok_or(SimulateError::NoForce)?;
-        let pressed: Vec<Contact> =
-            self.presses.iter().map(|position| Contact { position: *position, force_n }).collect();
-        let presses = Press::from_rows(&pressed);
+        let presses = Press::from_rows(&contacts_at(&self.pressed, &self.presses)?);
         let mut bench = PressedBench::new(&self.pressed, &presses, seed, watch)?;
         let training = bench.record(&presses, self.placement_sd_m, watch)?;
         bench.pause();

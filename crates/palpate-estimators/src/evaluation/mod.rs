@@ -2,15 +2,16 @@
 
 mod calibration;
 
+pub use crate::split::{Split, SplitOrigin};
 pub use calibration::{Calibrated, Calibration};
 pub use palpate_numerics::{median, percentile};
 
 use crate::batch::{BatchError, BatchOptions};
-use crate::fit::{Fit, FitTask, Fitted, Locate, ReadingError};
-use crate::interval_check::{HeldOutEstimate, force_interval_n, widen_by_other_folds};
+use crate::estimate_record::ContactRecord;
+use crate::fit::{Fit, FitTask, Fitted, HeldOut, HoldOutError, Locate, ReadingError, hold_out};
+use crate::interval_check::{HeldOutEstimate, widen_by_other_folds};
 use crate::load_profile::Cells;
-use crate::offset_course::OffsetCourse;
-use crate::recording::{Fold, Recording, Row, TooFewPositions};
+use crate::recording::{Recording, Row, TooFewPositions};
 use crate::setup::Setup;
 use crate::simulate::SimulateError;
 use palpate_core::{ContactEstimate, Estimate, Status};
@@ -45,7 +46,7 @@ pub struct Located {
 pub struct LocatedForce {
     /// Force that the locator gave, in newtons.
     pub estimate_n: f64,
-    /// Whether its 95 % interval holds the contact's force.
+    /// Whether its 95 % interval contains the contact's force.
     pub covered: bool,
 }
 
@@ -62,7 +63,7 @@ pub struct ForceSummary {
     pub p95_n: f64,
     /// The largest, in newtons.
     pub largest_n: f64,
-    /// Share of the 95 % intervals that hold the force, in %.
+    /// Share of the 95 % intervals that contain the force, in %.
     pub coverage_percent: f64,
 }
 
@@ -75,8 +76,8 @@ impl Located {
     fn of_contact(truth: Position, force_n: Option<f64>, estimate: &Estimate, extent: Extent) -> Self {
         let contact = &estimate.contact;
         let force = || {
-            let (low, high) = force_interval_n(contact)?;
-            Some(LocatedForce { estimate_n: contact.force_n?, covered: (low..=high).contains(&force_n?) })
+            let [low_n, high_n] = ContactRecord::new(contact, extent).force_interval_95_n()?;
+            Some(LocatedForce { estimate_n: contact.force_n?, covered: (low_n..=high_n).contains(&force_n?) })
         };
         Self {
             truth,
@@ -412,28 +413,6 @@ impl Quantiles {
     }
 }
 
-/// A recording to fit, and one to judge by, whose contacts the fit has not seen.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Split {
-    /// Recording to fit.
-    pub training: Recording,
-    /// Recording to judge by.
-    pub judged: Recording,
-    /// Offsets at the rows to judge by, to be brought to those that a locator learns; `None` to judge by the readings as they are.
-    pub offsets: Option<OffsetCourse>,
-    /// Its origin.
-    pub origin: SplitOrigin,
-}
-
-/// Origin of a split.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SplitOrigin {
-    /// A fold of a recording: intervals are widened as those of a locator that is fitted to all of it, by the factor of the other folds.
-    Fold,
-    /// A calibration of its own: intervals are those of the method.
-    Calibration,
-}
-
 /// An evaluation over some splits together, and the time it took.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedEvaluation {
@@ -443,23 +422,6 @@ pub struct TimedEvaluation {
     pub fit_seconds: f64,
     /// Mean time of an estimate in nanoseconds, by the caller's clock.
     pub locate_ns: f64,
-}
-
-impl Split {
-    /// A split for each fold of a recording, by position.
-    ///
-    /// # Errors
-    /// [`TooFewPositions`] as for [`Recording::folds`].
-    pub fn by_folds(recording: &Recording, folds: usize) -> Result<Vec<Self>, TooFewPositions> {
-        let folds = recording.folds(folds)?;
-        let split = |fold: &Fold| Self {
-            training: recording.subset(&fold.training),
-            judged: recording.subset(&fold.held_out),
-            offsets: None,
-            origin: SplitOrigin::Fold,
-        };
-        Ok(folds.iter().map(split).collect())
-    }
 }
 
 /// Fits an estimator to the training part of each split and locates what it judges by. `clock` tells seconds since any fixed moment.
@@ -488,22 +450,11 @@ pub(crate) fn evaluate_splits_by<M: Locate, E: std::error::Error>(
     fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
 ) -> Result<TimedEvaluation, EvaluationError<E>> {
     let extent = setup.surface().extent();
-    let mut estimates: Vec<HeldOutEstimate> = Vec::new();
-    let (mut fitting_s, mut locating_s) = (0.0, 0.0);
-    for (fold, split) in splits.iter().enumerate() {
-        let start = clock();
-        let task = FitTask { setup, recording: &split.training, seed, watch };
-        let (locator, shared_s) = fit(fold, task).map_err(EvaluationError::Fit)?;
-        let fitted = clock();
-        let tared = split
-            .offsets
-            .as_ref()
-            .map(|course| course.tared(&split.judged, locator.method.offsets().as_deref()));
-        let judged = tared.as_ref().unwrap_or(&split.judged);
-        let found: Vec<HeldOutEstimate> = locator.estimates_of(judged, fold).collect::<Result<_, _>>()?;
-        (fitting_s, locating_s) = (fitting_s + (fitted - start) + shared_s, locating_s + (clock() - fitted));
-        estimates.extend(found);
-    }
+    let held_out = hold_out(setup, splits, seed, clock, watch, fit).map_err(|error| match error {
+        HoldOutError::Fit(error) => EvaluationError::Fit(error),
+        HoldOutError::Reading(error) => error.into(),
+    })?;
+    let HeldOut { mut estimates, fitting_s, locating_s } = held_out;
     if splits.iter().all(|split| split.origin == SplitOrigin::Fold) {
         widen_by_other_folds(&mut estimates, extent);
     }

@@ -258,12 +258,17 @@ impl Recording {
 
     /// Mean reading of the rows in which nothing touched; `None` where there are none.
     pub fn untouched_mean(&self) -> Option<Vec<f64>> {
-        let untouched: Vec<&Row> = self.rows.iter().filter(|row| !row.touches()).collect();
-        let channel = |c: usize| mean(untouched.iter().map(|row| row.reading[c]));
-        (!untouched.is_empty()).then(|| (0..self.channels.len()).map(channel).collect())
+        let untouched: Vec<usize> = (0..self.rows.len()).filter(|row| !self.rows[*row].touches()).collect();
+        (!untouched.is_empty()).then(|| self.mean_reading(&untouched))
     }
 
-    /// Runs of rows in a row in which nothing touched, by their indices.
+    /// Mean reading of some rows, by their indices.
+    pub fn mean_reading(&self, rows: &[usize]) -> Vec<f64> {
+        let channel = |c: usize| mean(rows.iter().map(|row| self.rows[*row].reading[c]));
+        (0..self.channels.len()).map(channel).collect()
+    }
+
+    /// Rests: consecutive rows in which nothing touched, by their indices.
     pub fn rests(&self) -> Vec<Vec<usize>> {
         let indices: Vec<usize> = (0..self.rows.len()).collect();
         let touches = |row: &usize| self.rows[*row].touches();

@@ -3,11 +3,11 @@
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{CleanSensors, SimulateError, draw_faults};
+use super::faulty_channels::FaultyChannels;
+use super::{CleanSensors, SimulateError};
 use crate::imperfections::{BenchState, ImperfectChannels, Imperfections, StandardNoise, spread_contact};
 use crate::setup::Setup;
 use palpate_mechanics::contact::{Contact, Extent, Position};
-use palpate_mechanics::sensing::{ChannelErrors, Layout, measure_with_noise};
 use palpate_numerics::watch::Watch;
 
 /// A simulated bench that is read again and again: gains, offsets and places of its sensors are drawn once, noise for each reading.
@@ -29,12 +29,8 @@ use palpate_numerics::watch::Watch;
 /// ```
 pub struct SimulatedBench<'a> {
     extent: Extent,
-    layout: Layout,
     sensors: CleanSensors<'a>,
-    errors: ChannelErrors,
-    rng: Xoshiro256PlusPlus,
-    noise: StandardNoise,
-    channels: Option<ImperfectChannels>,
+    channels: FaultyChannels,
     range_force_n: f64,
     seed: u64,
 }
@@ -70,19 +66,9 @@ impl<'a> SimulatedBench<'a> {
     pub fn perfect_watched(setup: &'a Setup, seed: u64, watch: Watch) -> Result<Self, SimulateError> {
         let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
         surface.check_solution_watched(watch)?;
-        let (placed, errors, rng) = draw_faults(setup, seed);
+        let (placed, channels) = FaultyChannels::draw(setup, seed);
         let sensors = CleanSensors::new_watched(surface, &placed, watch)?;
-        Ok(Self {
-            extent: setup.surface().extent(),
-            layout: setup.layout().clone(),
-            sensors,
-            errors,
-            rng,
-            noise: StandardNoise::new(None),
-            channels: None,
-            range_force_n: 0.0,
-            seed,
-        })
+        Ok(Self { extent: setup.surface().extent(), sensors, channels, range_force_n: 0.0, seed })
     }
 
     /// The same with these imperfections, at rest at time 0. Ranges of channels are taken under their force, or else under this one, in newtons.
@@ -91,8 +77,8 @@ impl<'a> SimulatedBench<'a> {
         let untouched = self.clean(&[]);
         self.range_force_n = imperfections.range_force_n.unwrap_or(range_force_n);
         let ranges = self.ranges(&untouched, self.range_force_n);
-        self.noise = StandardNoise::new(Some(&imperfections));
-        self.channels = Some(ImperfectChannels::new(imperfections, &untouched, &ranges, self.seed));
+        self.channels.noise = StandardNoise::new(Some(&imperfections));
+        self.channels.imperfect = Some(ImperfectChannels::new(imperfections, &untouched, &ranges, self.seed));
         self
     }
 
@@ -101,7 +87,8 @@ impl<'a> SimulatedBench<'a> {
     /// # Errors
     /// [`SimulateError::Layout`] for a step that is less than 0 or not finite.
     pub fn with_resolution(mut self, step: f64) -> Result<Self, SimulateError> {
-        self.layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = step))?;
+        let layout = &mut self.channels.layout;
+        layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = step))?;
         Ok(self)
     }
 
@@ -109,15 +96,15 @@ impl<'a> SimulatedBench<'a> {
     #[must_use]
     pub fn resumed(mut self, state: &BenchState, seed: u64) -> Self {
         // A stream that no bench of this seed has begun with.
-        self.rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        self.rng.long_jump();
-        self.channels = self.channels.map(|channels| channels.resumed(state));
+        self.channels.rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        self.channels.rng.long_jump();
+        self.channels.imperfect = self.channels.imperfect.map(|channels| channels.resumed(state));
         self
     }
 
     /// Faultless reading under contacts on the surface, in the SI unit of each sensor: the sum of what each contact alone makes, and 0 under none.
     pub fn clean(&self, contacts: &[Contact]) -> Vec<f64> {
-        let mut sum = vec![0.0; self.layout.len()];
+        let mut sum = vec![0.0; self.channels.layout.len()];
         for contact in contacts {
             let reading = self.sensors.reading(*contact);
             sum.iter_mut().zip(reading).for_each(|(sum, value)| *sum += value);
@@ -127,7 +114,7 @@ impl<'a> SimulatedBench<'a> {
 
     /// Faultless reading under contacts, each spread by the soft layer where the bench has one.
     pub fn clean_through_layer(&self, contacts: &[Contact]) -> Vec<f64> {
-        let width_m = self.channels.as_ref().map_or(0.0, |channels| channels.imperfections().touch_width_m);
+        let width_m = self.imperfections().map_or(0.0, |imperfections| imperfections.touch_width_m);
         let points = contacts.iter().flat_map(|contact| spread_contact(*contact, width_m, self.extent));
         self.clean(&points.collect::<Vec<_>>())
     }
@@ -135,26 +122,42 @@ impl<'a> SimulatedBench<'a> {
     /// Lets a step of time pass under constant contacts, whose faultless reading this is, and gives the reading at its end as the imperfections
     /// change it, without noise.
     pub fn advance(&mut self, clean: &[f64], step_s: f64) -> Vec<f64> {
-        match &mut self.channels {
-            Some(channels) => channels.advance(clean, step_s),
-            None => clean.to_vec(),
-        }
+        self.channels.advance(clean, step_s)
     }
 
     /// A reading of the faulty channels, with fresh noise, of what faultless ones read.
     pub fn measure(&mut self, clean: &[f64]) -> Vec<f64> {
-        let noise = self.noise.draw(self.layout.len(), &mut self.rng);
-        measure_with_noise(&self.layout, clean, &self.errors, &noise)
+        self.channels.measure(clean)
+    }
+
+    /// The channels of a bench, with the imperfections of the setup; ranges are taken under their force, or else under this one, in newtons.
+    ///
+    /// # Errors
+    /// Those of [`SimulatedBench::perfect_watched`] where the setup has imperfections.
+    pub(super) fn channels_watched(
+        setup: &'a Setup,
+        force_n: f64,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<FaultyChannels, SimulateError> {
+        let Some(imperfections) = setup.imperfections() else {
+            return Ok(FaultyChannels::draw(setup, seed).1);
+        };
+        Ok(Self::perfect_watched(setup, seed, watch)?.with_imperfections(*imperfections, force_n).channels)
+    }
+
+    fn imperfections(&self) -> Option<&Imperfections> {
+        self.channels.imperfect.as_ref().map(ImperfectChannels::imperfections)
     }
 
     /// Time since the start in seconds, where the bench has imperfections.
     pub fn time_s(&self) -> Option<f64> {
-        self.channels.as_ref().map(ImperfectChannels::time_s)
+        self.channels.imperfect.as_ref().map(ImperfectChannels::time_s)
     }
 
     /// State of the imperfections, from which [`SimulatedBench::resumed`] goes on; `None` without imperfections.
     pub fn state(&self) -> Option<BenchState> {
-        let channels = self.channels.as_ref()?;
+        let channels = self.channels.imperfect.as_ref()?;
         Some(BenchState {
             seed: self.seed,
             range_force_n: self.range_force_n,

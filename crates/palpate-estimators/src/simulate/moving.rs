@@ -1,14 +1,11 @@
 //! A moving contact, on a beam that swings or on a plate in balance.
 
-use rand::SeedableRng;
-use rand_xoshiro::Xoshiro256PlusPlus;
-
 use super::{CleanSensors, READINGS_EACH, STAGE, SimulateError, SimulatedBench};
 use crate::imperfections::spread_contact;
 use crate::recording::{Recording, Row, TimedRecording};
 use crate::setup::Setup;
 use palpate_mechanics::contact::Contact;
-use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
+use palpate_mechanics::sensing::{Layout, Sensor};
 use palpate_mechanics::surface::Motion;
 use palpate_mechanics::surface::modal::{ModalBeam, ModalResponse};
 use palpate_numerics::OutOfRange;
@@ -107,13 +104,10 @@ pub fn simulate_moving_watched(
     let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
     surface.check_solution_watched(watch)?;
     let layout = setup.layout();
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let errors = ChannelErrors::draw(layout, &mut rng);
+    let mut channels = SimulatedBench::channels_watched(setup, force_n, seed, watch)?;
     let count = (moving.duration_s() * moving.rate_hz).floor() as usize + 1;
     let times_s: Vec<f64> = (0..count).map(|i| i as f64 / moving.rate_hz).collect();
-    let mut worn =
-        setup.imperfections().map(|_| SimulatedBench::new_watched(setup, seed, watch)).transpose()?;
-    let repeated = setup.imperfections().map_or(0, |imperfections| imperfections.repeated_readings as usize);
+    let repeats = setup.imperfections().map_or(0, |imperfections| imperfections.repeated_readings as usize);
     let points_at = |time_s: f64| points_of(setup, &moving.contacts_at(time_s, force_n));
     let mut under = match moving.beam {
         Some(beam) => Under::Swings(beam.at_rest(MODES, &points_at(0.0))),
@@ -129,14 +123,9 @@ pub fn simulate_moving_watched(
             advance(response, moving, &points_at, (times_s[before], *time_s));
         }
         let clean = under.reading(layout, &points_at(*time_s));
-        let reading = match &mut worn {
-            None => measure(layout, &clean, &errors, &mut rng),
-            Some(bench) => {
-                let values = bench.advance(&clean, if i == 0 { 0.0 } else { 1.0 / moving.rate_hz });
-                let last = rows.last().filter(|_| !i.is_multiple_of(1 + repeated));
-                last.map_or_else(|| bench.measure(&values), |row| row.reading.clone())
-            }
-        };
+        let values = channels.advance(&clean, if i == 0 { 0.0 } else { 1.0 / moving.rate_hz });
+        let repeated = rows.last().filter(|_| !i.is_multiple_of(1 + repeats));
+        let reading = repeated.map_or_else(|| channels.measure(&values), |row| row.reading.clone());
         let Contact { position, force_n } = contacts[0];
         rows.push(Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading });
         second.extend(contacts.get(1));

@@ -112,8 +112,8 @@ impl<'a> PressedBench<'a> {
         let count = schedule.untouched_rows as usize;
         let recorded_s = count.saturating_sub(1) as f64 * schedule.row_s();
         let untouched = self.bench.clean(&[]);
-        let nobody = Contact { position: next, force_n: 0.0 };
-        self.record_window(nobody, &untouched, (schedule.rest_s - recorded_s).max(0.0), count, rows);
+        let no_contact = Contact { position: next, force_n: 0.0 };
+        self.record_window(no_contact, &untouched, (schedule.rest_s - recorded_s).max(0.0), count, rows);
     }
 
     /// Lets time pass under a contact with this faultless reading, and records `count` rows after that.

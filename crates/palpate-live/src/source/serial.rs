@@ -39,6 +39,10 @@ impl Port for SerialStream {
             bytes.resize(start + waiting, 0);
             let count = port.read(&mut bytes[start..])?;
             bytes.truncate(start + count);
+            if count == 0 {
+                // A driver may count bytes that it does not give.
+                return Ok(bytes);
+            }
         }
     }
 
