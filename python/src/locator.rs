@@ -4,12 +4,10 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use palpate::estimators::arrangement::all_over;
 use palpate::estimators::batch::{BLOCK, BatchError, BatchOptions};
 use palpate::estimators::estimator;
 use palpate::estimators::evaluation;
 use palpate::estimators::setup;
-use palpate::estimators::simulate::{contacts_at, simulate_use_watched};
 use palpate::numerics::watch::Watch;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -153,7 +151,6 @@ impl Locator {
         tare: Option<&Bound<'_, PyAny>>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Evaluation> {
-        let extent = self.setup.surface().extent();
         let made;
         let judged = match recording {
             Some(recording) => {
@@ -174,15 +171,9 @@ impl Locator {
                 return Err(refused("`tare` needs a recording: simulated readings do not drift"));
             }
             None => {
+                let calibration = &self.inner.provenance.recording;
                 let simulated = work::run_quietly_with(py, |watch| {
-                    let contacts = contacts_at(&self.setup, &all_over(extent))?;
-                    simulate_use_watched(
-                        &self.setup,
-                        &self.inner.provenance.recording,
-                        &contacts,
-                        seed,
-                        watch,
-                    )
+                    evaluation::simulate_use_all_over_watched(&self.setup, calibration, seed, watch)
                 })?;
                 let simulated =
                     simulated.map_err(|error| refused(format!("{error}; give a recording to judge by")))?;

@@ -134,7 +134,7 @@ impl Setup {
 /// faulty channels report. Gains, offsets and the places of sensors are drawn once for the recording, noise for each reading.
 ///
 /// A setup with imperfections has a course in time: each press is read `repeats` times, untouched rows (force 0) stand before, between and
-/// after the presses, and every row has its time; see [`Schedule`](crate::imperfections::Schedule).
+/// after the presses, and every row has its time; see [`Schedule`].
 ///
 /// The same seed gives the same recording.
 ///

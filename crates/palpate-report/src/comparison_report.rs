@@ -7,8 +7,8 @@ use super::maps::error_map;
 use super::numbers::{counted, number};
 use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, Series};
-use palpate_estimators::estimator::Comparison;
-use palpate_estimators::evaluation::{Evaluation, limit_ratio, percentage_error};
+use palpate_estimators::estimator::{Comparison, Status};
+use palpate_estimators::evaluation::{ErrorSummary, Evaluation, limit_ratio, percentage_error};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::surface::Extent;
 
@@ -43,7 +43,10 @@ pub fn comparison_report(report: &ComparisonReport) -> Vec<ReportFile> {
         Extent::Plane { .. } => ("Errors over the surface", report.errors_map()),
     };
     let sections = vec![
-        Section::new("table", "The estimators").table(report.table()).text(report.left_out_in_words()),
+        Section::new("table", "The estimators")
+            .table(report.errors_table())
+            .table(report.intervals_table())
+            .text(report.left_out_in_words()),
         Section::new("along", heading).figure(errors),
         Section::new("share", "How many readings are how good").figure(report.share_figure()),
     ];
@@ -72,24 +75,25 @@ impl ComparisonReport<'_> {
         }
     }
 
-    fn table(&self) -> Table {
+    /// The estimators that have an evaluation, with its summary.
+    fn tried(&self) -> impl Iterator<Item = (&Comparison, &Evaluation, ErrorSummary)> {
+        self.comparisons.iter().filter_map(|comparison| {
+            let evaluation = &comparison.tried.evaluation;
+            Some((comparison, evaluation, evaluation.summary(None)?))
+        })
+    }
+
+    fn errors_table(&self) -> Table {
         let small = match self.extent() {
             Extent::Line { .. } => "1/200",
             Extent::Plane { .. } => "1/20",
         };
         let caption = html! {
-            "Location errors in mm, best mean first; 95th percentile and root mean square (RMS). Effective: share of the readings within "
-            (number(self.tolerance_m * 1e3)) " mm. Covered: share of the 95 % intervals that contain the contact. Score: mean interval score, \
-             small where narrow intervals contain the contact. Force: mean error of the force. × limit: mean \
-             error over what physics allows, where the limit is at most " (small)
-            " of the length, 1/80 of it away from the ends. A dash: the estimator or the bench has none."
+            "Location errors in mm, best mean first, and times; 95th percentile and root mean square (RMS). Effective: share of the readings within "
+            (number(self.tolerance_m * 1e3)) " mm. × limit: mean error over what physics allows, where the limit is at most " (small)
+            " of the length, 1/80 of it away from the ends. A dash: the bench has no limit."
         };
-        let tried = self.comparisons.iter().filter_map(|comparison| {
-            let evaluation = &comparison.tried.evaluation;
-            Some((comparison, evaluation, evaluation.summary(None)?))
-        });
-        let has_forces = self.comparisons.iter().any(|of| of.tried.evaluation.force_summary().is_some());
-        let table = Table::from_rows(tried)
+        Table::from_rows(self.tried())
             .short("estimator", |(comparison, ..)| comparison.estimator.kind())
             .mm("mean", |(.., summary)| summary.average_m)
             .number("% of length", |(_, of, summary)| {
@@ -99,21 +103,32 @@ impl ComparisonReport<'_> {
             .mm("95th", |(.., summary)| summary.p95_m)
             .mm("RMS", |(.., summary)| summary.rmse_m)
             .number("effective, %", |(_, evaluation, _)| evaluation.effective_percent(self.tolerance_m))
-            .number("covered, %", |(_, evaluation, _)| evaluation.coverage_percent())
-            .mm("score", |(_, evaluation, _)| evaluation.interval_score_m());
-        let table = if has_forces {
-            table
-                .number("force, N", |(_, of, _)| of.force_summary().map(|forces| forces.average_n))
-                .number("force covered, %", |(_, of, _)| {
-                    of.force_summary().map(|forces| forces.coverage_percent)
-                })
-        } else {
-            table
-        };
-        table
             .number("× limit", |(_, evaluation, _)| limit_ratio(self.setup, evaluation))
             .number("fit, ms", |(comparison, ..)| comparison.tried.fit_seconds * 1e3)
             .number("a reading, µs", |(comparison, ..)| comparison.tried.locate_ns * 1e-3)
+            .caption(caption)
+    }
+
+    fn intervals_table(&self) -> Table {
+        let caption = html! {
+            "Intervals and statuses. Covered: share of the 95 % intervals that contain the contact, and its force. Score: mean interval score, \
+             small where narrow intervals contain the contact. Force: mean error of the force. A dash: the estimator has none."
+        };
+        let status = |evaluation: &Evaluation, status: Status| {
+            evaluation
+                .status_percents()?
+                .into_iter()
+                .find(|(of, _)| *of == status)
+                .map(|(_, percent)| percent)
+        };
+        Table::from_rows(self.tried())
+            .short("estimator", |(comparison, ..)| comparison.estimator.kind())
+            .number("covered, %", |(_, evaluation, _)| evaluation.coverage_percent())
+            .mm("score, mm", |(_, evaluation, _)| evaluation.interval_score_m())
+            .number("force, N", |(_, of, _)| of.force_summary().map(|forces| forces.average_n))
+            .number("force covered, %", |(_, of, _)| of.force_summary().map(|forces| forces.coverage_percent))
+            .number("located, %", |(_, evaluation, _)| status(evaluation, Status::Located))
+            .number("outside model, %", |(_, evaluation, _)| status(evaluation, Status::OutsideModel))
             .caption(caption)
     }
 

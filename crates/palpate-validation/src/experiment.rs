@@ -4,6 +4,7 @@ use crate::tally::Tally;
 use anyhow::{Context, Result, ensure};
 use palpate::estimators::arrangement::cells;
 use palpate::estimators::estimator::Locator;
+use palpate::estimators::evaluation::Calibration;
 use palpate::estimators::imperfections::Imperfections;
 use palpate::estimators::simulate::{simulate_presses_watched, simulate_use_watched};
 use palpate::numerics::random_order;
@@ -48,8 +49,6 @@ pub struct Bench<'a> {
 
 /// Untouched rows of each rest in use: as many as a person tares with.
 const UNTOUCHED_ROWS: u32 = 10;
-/// Forces in turn, as multiples of that of the presses: of contacts in use, and of calibrations of raw channels.
-const FORCE_SHARES: [f64; 3] = [1.0, 0.5, 2.0];
 /// Multiple of the smallest detectable force that has to be found.
 const LIGHT: f64 = 5.0;
 /// Of the contacts in use each so many-th is repeated lightly.
@@ -191,9 +190,9 @@ fn tared(locator: &Locator, recording: &Recording, zero: Zero) -> Result<Recordi
     Ok(Recording { rows, ..recording.clone() })
 }
 
-/// Contacts at places with [`FORCE_SHARES`] of a force in turn.
+/// Contacts at places with [`Calibration::UNKNOWN_FORCES`] times a force in turn: in use, and in calibrations of raw channels.
 fn in_turn(places: &[Position], force_n: f64) -> Vec<Contact> {
-    let shares = places.iter().zip(FORCE_SHARES.iter().cycle());
+    let shares = places.iter().zip(Calibration::UNKNOWN_FORCES.iter().cycle());
     shares.map(|(position, share)| Contact { position: *position, force_n: share * force_n }).collect()
 }
 

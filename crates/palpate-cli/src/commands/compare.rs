@@ -275,7 +275,7 @@ fn table(rig: &Rig, comparisons: &[Comparison], arguments: &Arguments) -> String
             or_dash(evaluation.interval_score_m().map(|score_m| format!("{:.3}", score_m * 1e3)))
         });
     let table = if has_forces {
-        table.column("force: mean, N (95 % covers, %)", |(_, evaluation, _)| {
+        table.column("force, N (95 % covers, %)", |(_, evaluation, _)| {
             let in_words =
                 |forces: ForceSummary| format!("{:.3} ({:.1})", forces.average_n, forces.coverage_percent);
             or_dash(evaluation.force_summary().map(in_words))

@@ -11,16 +11,14 @@ use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
 use crate::tare::{TareOption, tare_splits, tared_recording};
 use crate::target::{Inputs, TargetFolder};
 use crate::{input, output, tables};
-use palpate_estimators::arrangement::all_over;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{
     ErrorSummary, Evaluation, ForceSummary, Portion, Split, evaluate_splits, percentage_error,
+    simulate_use_all_over_watched,
 };
 use palpate_estimators::recording::{Provenance, Recording};
-use palpate_estimators::simulate::{contacts_at, simulate_use_watched};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_length_mm};
-use palpate_numerics::watch::Watch;
 use palpate_report::{EvaluationReport, Judged, evaluation_report};
 use palpate_rig::Rig;
 use std::path::PathBuf;
@@ -204,15 +202,12 @@ fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
     Complaint::new(error).help("--data names a recording to judge by")
 }
 
-/// The bench pressed all over after its calibration: for the paper's beam at every millimetre, on a plane in the middles of about 400 cells.
+/// The bench touched all over after its calibration.
 fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
     let calibration = &locator.provenance.recording;
-    let positions = all_over(locator.setup.surface().extent());
-    let simulate = |watch: Watch| {
-        let contacts = contacts_at(&locator.setup, &positions)?;
-        simulate_use_watched(&locator.setup, calibration, &contacts, seed, watch)
-    };
-    Observer::of_stages().watch(simulate).map_err(|error| Failure::of_work(error, simulation_complaint))
+    Observer::of_stages()
+        .watch(|watch| simulate_use_all_over_watched(&locator.setup, calibration, seed, watch))
+        .map_err(|error| Failure::of_work(error, simulation_complaint))
 }
 
 fn warn_of_training_data(locator: &Locator, recording: &Recording) {

@@ -153,8 +153,9 @@ fn what_came_before_a_signal_is_smoothed_and_reported() {
     let mut child = begin(folder, &["track", "locator.json", "--smooth", "--report", "report"]);
     let mut stdin = child.stdin.take().unwrap();
     writeln!(stdin, "{}", csv.lines().take(42).collect::<Vec<_>>().join("\n")).unwrap();
-    // A pipe holds 64 KiB: once twice as many bytes of comments are written, the lines before them are read.
-    stdin.write_all("# no reading\n".repeat((128 << 10) / 13).as_bytes()).unwrap();
+    // A pipe contains 64 KiB, and the command reads up to six chunks of as many bytes before it parses them. Once more comments than these are written, the
+    // lines before them are parsed.
+    stdin.write_all("# no reading\n".repeat((10 << 16) / 13).as_bytes()).unwrap();
     child.stdin = Some(stdin);
     let stopped = end(child, "-INT", COMPUTING);
     let told = String::from_utf8(stopped.stdout).unwrap();

@@ -3,9 +3,11 @@
 use super::{Evaluation, EvaluationError, Split, SplitOrigin};
 use crate::arrangement::{Training, all_over};
 use crate::fit::{Fit, FitTask, Fitted, Locate, SeedList};
+use crate::recording::{Provenance, Recording};
 use crate::setup::Setup;
 use crate::simulate::{
     Press, PressedBench, SimulateError, contacts_at, simulate_at_watched, simulate_contacts_watched,
+    simulate_use_watched,
 };
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::ChannelModel;
@@ -60,6 +62,29 @@ pub struct Calibrated<M: Locate> {
     pub locator: Fitted<M>,
     /// Its answers to the contacts.
     pub evaluation: Evaluation,
+}
+
+/// Touches a calibrated bench in use all over its surface, and records it, watched: for the paper's beam at every millimetre, on a plane in the middles of
+/// about 400 cells. Contacts have the force of the setup. Where that is unknown, a bench with imperfections is touched by the force of its ranges times
+/// [`Calibration::UNKNOWN_FORCES`] in turn. See [`simulate_use_watched`].
+///
+/// # Errors
+/// [`SimulateError`] when the bench lacks a model or a force, or the watch stopped it.
+pub fn simulate_use_all_over_watched(
+    setup: &Setup,
+    calibration: &Provenance,
+    seed: u64,
+    watch: Watch,
+) -> Result<Recording, SimulateError> {
+    setup.surface().model().ok_or(SimulateError::NoModel)?;
+    let of_ranges = || calibration.bench.as_ref().map(|bench| bench.range_force_n);
+    let force_n = setup.force_n().or_else(of_ranges).ok_or(SimulateError::NoForce)?;
+    let shares: &[f64] = if setup.force_n().is_some() { &[1.0] } else { &Calibration::UNKNOWN_FORCES };
+    let positions = all_over(setup.surface().extent());
+    let with_share =
+        |(position, share): (&Position, &f64)| Contact { position: *position, force_n: share * force_n };
+    let contacts: Vec<Contact> = positions.iter().zip(shares.iter().cycle()).map(with_share).collect();
+    simulate_use_watched(setup, calibration, &contacts, seed, watch)
 }
 
 impl Calibration {

@@ -3,7 +3,7 @@
 mod calibration;
 
 pub use crate::split::{Split, SplitOrigin};
-pub use calibration::{Calibrated, Calibration};
+pub use calibration::{Calibrated, Calibration, simulate_use_all_over_watched};
 pub use palpate_numerics::{median, percentile};
 
 use crate::batch::{BatchError, BatchOptions};
