@@ -12,11 +12,13 @@ use std::time::{Duration, Instant};
 static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 /// Work that has not ended by itself so long after a signal is ended with the process.
 const PATIENCE: Duration = Duration::from_millis(700);
+/// True for a command that finishes its work after a signal.
+static FINISHES: AtomicBool = AtomicBool::new(false);
 /// SIGINT, which Ctrl-C sends.
 const INTERRUPT: usize = 2;
 
-/// Makes Ctrl-C (and a polite kill, or a terminal that is closed) ask long work to stop. What has not ended soon is ended with the process:
-/// everything that palpate writes is whole at any time.
+/// Makes Ctrl-C (and SIGTERM, or a closed terminal) ask long work to stop. What has not ended soon is ended with the process: everything that palpate
+/// writes is whole at any time. See [`finish_after_signal`] for work that must not be cut off.
 pub fn install_signal_handler() {
     if let Err(error) = begin_to_listen() {
         remark!("Ctrl-C will end palpate at once: {error}");
@@ -53,7 +55,13 @@ fn begin_to_listen() -> Result<(), Box<dyn Error>> {
     }
     let mut signals = signal_hook::iterator::Signals::new(ends)?;
     std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
-        if signals.forever().next().is_some() {
+        let mut signals = signals.forever();
+        if signals.next().is_some() {
+            std::thread::sleep(PATIENCE);
+            if FINISHES.load(Ordering::Relaxed) {
+                remark!("palpate: finishing; press Ctrl-C again to end at once");
+                signals.next();
+            }
             end();
         }
     })?;
@@ -63,7 +71,11 @@ fn begin_to_listen() -> Result<(), Box<dyn Error>> {
 #[cfg(not(unix))]
 fn begin_to_listen() -> Result<(), Box<dyn Error>> {
     Ok(ctrlc::set_handler(|| {
-        SIGNAL.store(INTERRUPT, Ordering::Relaxed);
+        let is_first = SIGNAL.swap(INTERRUPT, Ordering::Relaxed) == 0;
+        std::thread::sleep(PATIENCE);
+        if is_first && FINISHES.load(Ordering::Relaxed) {
+            return remark!("palpate: finishing; press Ctrl-C again to end at once");
+        }
         end();
     })?)
 }
@@ -83,9 +95,13 @@ pub fn set_at_signal(_: &Arc<AtomicBool>) -> std::io::Result<()> {
     Ok(())
 }
 
+/// Lets the command finish its work after a first signal: close a recording, lift a machine. A second signal ends the process.
+pub fn finish_after_signal() {
+    FINISHES.store(true, Ordering::Relaxed);
+}
+
 /// Ends the process where the work does not.
 fn end() {
-    std::thread::sleep(PATIENCE);
     remark!("palpate: stopped");
     std::process::exit(interrupted_code().into());
 }

@@ -358,8 +358,9 @@ impl Bench<'_> {
         let mut ended = false;
         while calibration.guide().waiting() != Waiting::Nothing && !ended {
             if progress::interrupted() {
-                // The machine is stopped as it is dropped.
-                drop(machine);
+                if let Some(machine) = &mut machine {
+                    machine.stop_by_hand().map_err(|error| machine_ended(arguments, &calibration, &error))?;
+                }
                 return Err(stopped(arguments, &calibration));
             }
             let mut notes = Vec::new();
@@ -420,6 +421,8 @@ fn machine(
 /// Connects to a machine, which a signal stops at once; nothing moves yet.
 fn open_stage(url: &StageUrl, stage: Stage, clock: HostClock) -> Result<StageThread, Failure> {
     let stop = Arc::default();
+    // A machine that was stopped is lifted.
+    progress::finish_after_signal();
     progress::set_at_signal(&stop).map_err(Complaint::new)?;
     let thread = StageThread::open(url, stage, stop, clock).map_err(|error| {
         if progress::interrupted() {

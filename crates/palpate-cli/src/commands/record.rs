@@ -120,6 +120,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let stop = Stop::after(arguments.seconds, to)?;
     let fault = pipeline::run(&mut session, clock, &from, &mut sinks);
     drop((source, stop, sinks));
+    progress::finish_after_signal();
     let status = recording.end().unwrap_or_default();
     if let Some((url, lost)) = unpublished {
         match lost.load(Ordering::Relaxed) {

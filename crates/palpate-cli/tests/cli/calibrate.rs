@@ -270,7 +270,7 @@ fn stopped_by(signal: &str, code: i32, firmware: &str) -> Duration {
     assert!(line.contains("the machine was stopped"), "{line}");
     assert_eq!(child.wait().unwrap().code(), Some(code), "{signal}");
     let rest: Vec<String> = lines.collect();
-    assert!(rest.iter().any(|line| line.contains("stopped")), "{rest:?}");
+    assert!(rest.iter().any(|line| line.contains("reset it, as by its button")), "{rest:?}");
     at - asked
 }
 
