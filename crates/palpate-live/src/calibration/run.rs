@@ -76,6 +76,8 @@ pub enum Note {
 struct LoadCell {
     name: String,
     limit_n: Option<f64>,
+    /// Its first reading, before the machine moves.
+    first_n: Option<f64>,
     /// Its last reading.
     now_n: Option<f64>,
 }
@@ -118,7 +120,7 @@ impl Calibration {
         let mut channels = Channel::all_of(setup);
         let load_cell = stage.and_then(|stage| {
             let name = stage.load_cell.clone()?;
-            Some(LoadCell { name, limit_n: stage.force_limit_n, now_n: None })
+            Some(LoadCell { name, limit_n: stage.force_limit_n, first_n: None, now_n: None })
         });
         if let Some(LoadCell { name, .. }) = &load_cell {
             channels.push(Channel {
@@ -183,11 +185,12 @@ impl Calibration {
         Some(cell.now_n? - self.cell_untouched_n())
     }
 
-    /// Untouched reading of the load cell, in newtons; 0 before it is learnt.
+    /// Untouched reading of the load cell, in newtons: its first reading until one is learnt at rest, as a cell that is not tared has an offset.
     fn cell_untouched_n(&self) -> f64 {
         let of_guide = self.guide.untouched_reading().and_then(|reading| reading.last().copied());
         let of_detector = || self.touch_detector.as_ref().and_then(TouchDetector::untouched_last);
-        of_guide.or_else(of_detector).unwrap_or(0.0)
+        let first = || self.load_cell.as_ref()?.first_n;
+        of_guide.or_else(of_detector).or_else(first).unwrap_or(0.0)
     }
 
     /// Takes what a source brought; what follows is added to `notes`.
@@ -236,6 +239,9 @@ impl Calibration {
                 notes.push(Note::Saturated(name));
             }
         });
+        if let Some(cell) = &mut self.load_cell {
+            cell.first_n.get_or_insert(reading[channels]);
+        }
         let untouched_n = self.cell_untouched_n();
         if let Some(cell) = &mut self.load_cell {
             cell.now_n = Some(reading[channels]);

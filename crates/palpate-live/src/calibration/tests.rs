@@ -89,6 +89,43 @@ fn repeated_readings_count_once_for_the_noise() {
     }
 }
 
+/// A load cell that nobody tared stops the machine by its change, before and after its untouched reading is learnt.
+#[test]
+fn the_limit_of_a_load_cell_counts_from_its_untouched_reading() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let channels = rig.setup.layout().len();
+    for learnt_after in [1, 500] {
+        let folder = tempfile::tempdir().unwrap();
+        let journal = Journal::new(
+            &rig.setup,
+            &folder.path().join("presses.csv"),
+            String::new(),
+            Vec::new(),
+            DepthKnowledge::Unknown,
+        );
+        let to_come = plan(&rig, Weights::default(), &[], &[]).unwrap();
+        let mut calibration =
+            Calibration::new(&rig.setup, rig.stage.as_ref(), &[], to_come, journal.unwrap()).unwrap();
+        let mut overload_n = |cells_n: &[f64]| {
+            let mut notes = Vec::new();
+            for (i, cell_n) in cells_n.iter().enumerate() {
+                let line = "0,".repeat(channels) + &format!("{cell_n}\n");
+                let at = Stamp { elapsed: EVERY * (i as u32 + 1), unix_ns: 0 };
+                let arrival = Arrival::Bytes(line.into_bytes());
+                calibration.receive(&Arrived { at, arrival }, &mut notes).unwrap();
+            }
+            let overload = |note| match note {
+                Note::Overload(force_n) => Some(force_n),
+                _ => None,
+            };
+            notes.into_iter().find_map(overload)
+        };
+        assert_eq!(overload_n(&vec![-20.0; learnt_after]), None);
+        let over_n = overload_n(&[-23.5]).unwrap();
+        assert!((over_n + 3.5).abs() < 1e-9, "{over_n}");
+    }
+}
+
 #[test]
 fn presses_are_struck_out_redone_fitted_and_checked() {
     let rig = Rig::from_toml(&RIG.replace("count = 9\nrepeats = 3", "count = 7\nrepeats = 2")).unwrap();
