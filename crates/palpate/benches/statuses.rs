@@ -166,7 +166,7 @@ fn cases(bench: &Bench, count: usize, seed: u64) -> Vec<Case> {
         case("noise: `no_contact`", is_no_contact, &mut |_, rng| {
             (None, with_noise(vec![0.0; channels], rng))
         }),
-        case("contact: told", is_told, &mut |i, rng| (None, contact(forces[i % 3], rng).1)),
+        case("contact: detected", is_told, &mut |i, rng| (None, contact(forces[i % 3], rng).1)),
         case("contact: `outside_model`", is_outside_model, &mut |i, rng| {
             (None, contact(forces[i % 3], rng).1)
         }),
@@ -174,7 +174,7 @@ fn cases(bench: &Bench, count: usize, seed: u64) -> Vec<Case> {
             let contacts = two_contacts(extent, forces[i % 3], rng);
             (None, with_noise(sum(contacts.map(|contact| sensors.reading(contact))), rng))
         }),
-        case("… or centre held", is_doubted_or_held, &mut |i, rng| {
+        case("… or centre covered", is_doubted_or_held, &mut |i, rng| {
             let contacts = two_contacts(extent, forces[i % 3], rng);
             let centre = Position {
                 x_m: 0.5 * (contacts[0].position.x_m + contacts[1].position.x_m),
@@ -198,8 +198,8 @@ fn cases(bench: &Bench, count: usize, seed: u64) -> Vec<Case> {
         }),
     ];
     let shares: &[(&str, f64)] = match bench.setup.force_n() {
-        Some(_) => &[("95 % hold", 1.0), ("… or doubted, at ½ force", 0.5), ("… at 2 × force", 2.0)],
-        None => &[("95 % hold", 1.0), ("… at ½ force", 0.5), ("… at 2 × force", 2.0)],
+        Some(_) => &[("95 % cover", 1.0), ("… or doubted, at ½ force", 0.5), ("… at 2 × force", 2.0)],
+        None => &[("95 % cover", 1.0), ("… at ½ force", 0.5), ("… at 2 × force", 2.0)],
     };
     for (name, share) in shares.iter().copied() {
         let is_right =

@@ -13,8 +13,8 @@ use crate::target::{Inputs, TargetFolder};
 use crate::{input, output, tables};
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{
-    ErrorSummary, Evaluation, ForceSummary, Portion, Split, evaluate_splits, percentage_error,
-    simulate_use_all_over_watched,
+    ErrorSummary, Evaluation, ForceSummary, MappedPositions, Portion, Split, evaluate_splits,
+    percentage_error, simulate_use_all_over_watched,
 };
 use palpate_estimators::recording::{Provenance, Recording};
 use palpate_mechanics::surface::Extent;
@@ -195,6 +195,15 @@ fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Fail
     let evaluation = Observer::of_stages()
         .watch(|watch| Evaluation::new_watched(&locator, &recording, watch))
         .map_err(|error| Failure::from_error(&error))?;
+    if let Some(MappedPositions { map, recorded_m, mapped_m }) = evaluation.mapped_positions() {
+        remark!(
+            "warning: the mean error is {}, and {} with {}: correct the positions of {}, or the order of its channels",
+            format_length_mm(recorded_m),
+            format_length_mm(mapped_m),
+            map.formula(),
+            recording.provenance.source
+        );
+    }
     Ok(Answers { evaluation, recording: recording.provenance, subject: RigOrLocator::Locator(locator) })
 }
 

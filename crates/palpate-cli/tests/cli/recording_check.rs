@@ -1,6 +1,7 @@
 //! Recordings with repeated readings, and those that contradict their rig.
 
-use crate::support::command::{run, said};
+use crate::support::command::{folder, run, said};
+use crate::support::examples::NOISY_BEAM;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -84,4 +85,27 @@ fn positions_in_metres_under_a_rig_in_millimetres_are_warned_of_once() {
     let expected = "warning: beam-posm.csv: the positions cover 0.36 mm of the surface's length of 400 mm (0.09 %): are they in m? \
                     Set `position_unit = \"m\"` in [recording]";
     assert_eq!(warnings, [expected]);
+}
+
+#[test]
+fn positions_measured_from_the_other_end_are_recognised_by_a_locator() {
+    let folder = folder(NOISY_BEAM);
+    let path = folder.path();
+    said(&run(path, &["fit", "rig.toml", "-o", "locator.json"]));
+    said(&run(path, &["simulate", "rig.toml", "--every", "20 mm", "--seed", "1", "-o", "touches.csv"]));
+    let evaluate = ["evaluate", "locator.json", "--data", "touches.csv"];
+    assert!(!warned(path, &evaluate).contains("length − x"));
+    let mirrored = |line: &str| match line.split_once(',').map(|(x_mm, rest)| (x_mm.parse::<f64>(), rest)) {
+        Some((Ok(x_mm), rest)) => format!("{},{rest}\n", 400.0 - x_mm),
+        _ => format!("{line}\n"),
+    };
+    let touches = fs::read_to_string(path.join("touches.csv")).unwrap();
+    fs::write(path.join("touches.csv"), touches.lines().map(mirrored).collect::<String>()).unwrap();
+    let warning = warned(path, &evaluate);
+    assert!(
+        warning.contains(
+            " mm with x → length − x: correct the positions of touches.csv, or the order of its channels"
+        ),
+        "{warning}"
+    );
 }

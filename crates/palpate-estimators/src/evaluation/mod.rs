@@ -1,9 +1,11 @@
 //! Evaluation of a locator: errors by position and by portion of the surface, and the effective length.
 
 mod calibration;
+mod mapped_positions;
 
 pub use crate::split::{Split, SplitOrigin};
 pub use calibration::{Calibrated, Calibration, simulate_use_all_over_watched};
+pub use mapped_positions::{MappedPositions, SurfaceMap};
 pub use palpate_numerics::{median, percentile};
 
 use crate::batch::{BatchError, BatchOptions};

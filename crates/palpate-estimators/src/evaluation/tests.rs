@@ -122,3 +122,30 @@ fn a_watched_evaluation_is_the_same_and_can_be_stopped() {
     let error = Evaluation::new_watched(&locator, &presses, Watch::NONE).unwrap_err();
     assert_eq!(error.to_string(), "reading 4: the reading has 7 channels; the locator has 8");
 }
+
+#[test]
+fn positions_that_count_from_the_other_end_or_along_other_axes_are_recognised() {
+    let mapped = |extent: Extent, recorded: &dyn Fn(Position) -> Position| {
+        let places = (0..5).flat_map(|x| (0..3).map(move |y| (x, y)));
+        let located = places.map(|(x, y)| {
+            let y_m = if extent.width_m().is_some() { 0.005 + 0.02 * f64::from(y) } else { 0.0 };
+            let estimate = Position { x_m: 0.02 * f64::from(x) + 0.004 * f64::from(y) + 0.001, y_m };
+            Located { truth: recorded(estimate), estimate, ..evaluation().located[0] }
+        });
+        let evaluation = Evaluation { extent, located: located.collect() };
+        evaluation.mapped_positions().map(|found| (found.map, found.mapped_m < 1e-12))
+    };
+    let (line, plane) = (Extent::line(0.1).unwrap(), Extent::plane(0.1, 0.06).unwrap());
+    let other_end = |at: Position| Position { x_m: 0.1 - at.x_m, ..at };
+    let other_side = |at: Position| Position { y_m: 0.06 - at.y_m, ..at };
+    assert_eq!(mapped(line, &|at| at), None);
+    assert_eq!(mapped(plane, &|at| at), None);
+    // Errors at random are no map.
+    assert_eq!(mapped(line, &|at| Position::along((at.x_m * 7.0) % 0.1)), None);
+    assert_eq!(mapped(line, &other_end), Some((SurfaceMap::MirroredX, true)));
+    assert_eq!(mapped(plane, &other_end), Some((SurfaceMap::MirroredX, true)));
+    assert_eq!(mapped(plane, &other_side), Some((SurfaceMap::MirroredY, true)));
+    assert_eq!(mapped(plane, &|at| other_side(other_end(at))), Some((SurfaceMap::Turned, true)));
+    let exchanged = |at: Position| Position { x_m: at.y_m, y_m: at.x_m };
+    assert_eq!(mapped(plane, &exchanged), Some((SurfaceMap::Exchanged, true)));
+}
