@@ -24,23 +24,23 @@ const MOST_CONTACTS: f64 = 10_000.0;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DesignKeys {
-    /// Sensors to place; as many as the rig has unless said otherwise.
+    /// Sensors to place; as many as the rig has by default.
     pub count: Option<Count<1, 1000>>,
     /// Sites for sensors.
     pub sites: Option<At<SitesKeys>>,
-    /// The kinds to choose from; those of the rig unless said otherwise.
+    /// The kinds to choose from; those of the rig by default.
     pub kinds: Option<At<Vec<At<OfferKeys>>>>,
-    /// Positions at which the surface will be touched; everywhere unless said otherwise.
+    /// Positions at which the surface will be touched; everywhere by default.
     pub contacts: Option<At<ContactsKeys>>,
-    /// Whether the contact's force will be known; as in `[contact]` unless said otherwise.
+    /// Whether the contact's force will be known; as in `[contact]` by default.
     pub force: Option<Force>,
-    /// Criterion that scores a layout; `mean-limit` unless said otherwise.
+    /// Criterion that scores a layout; `mean-limit` by default.
     pub criterion: Option<DesignCriterion>,
-    /// A limit up to this is good enough; 2 mm unless said otherwise.
+    /// Largest acceptable limit; 2 mm by default.
     pub tolerance: Option<Positive<Length>>,
-    /// Least distance of two sensors; 0 unless said otherwise.
+    /// Least distance of two sensors; 0 by default.
     pub spacing: Option<NotNegative<Length>>,
-    /// Parts of the surface where no sensor may sit.
+    /// Parts of the surface without sensors.
     #[serde(default)]
     pub keep_out: Vec<At<ZoneKeys>>,
     /// Sensors that every layout has.
@@ -48,7 +48,7 @@ pub(crate) struct DesignKeys {
     pub must_have: Vec<At<MustHaveKeys>>,
     /// Greatest cost of all sensors together.
     pub budget: Option<NotNegative<Number>>,
-    /// Whether layouts are to be their own mirror image; `any` unless said otherwise.
+    /// Symmetry of layouts; `any` by default.
     pub symmetry: Option<Symmetry>,
 }
 
@@ -67,17 +67,17 @@ pub(crate) enum SitesKeys {
     List(Vec<At<Point>>),
 }
 
-/// A kind of sensor that can be had.
+/// An available kind of sensor.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a kind such as { measure = \"strain\", noise = \"1 ue\" }")]
 pub(crate) struct OfferKeys {
-    /// Its kind.
+    /// Kind.
     pub measure: At<SensorKind>,
-    /// Standard deviation of a reading's noise; that of the rig's own sensors of the kind unless said otherwise.
+    /// Standard deviation of a reading's noise; that of the rig's own sensors of the kind by default.
     pub noise: Option<At<Written>>,
-    /// Step to which a reading is rounded; that of the rig's own sensors of the kind unless said otherwise.
+    /// Step to which a reading is rounded; that of the rig's own sensors of the kind by default.
     pub resolution: Option<At<Written>>,
-    /// Cost of one; 1 unless said otherwise.
+    /// Cost of one; 1 by default.
     pub cost: Option<NotNegative<Number>>,
 }
 
@@ -95,7 +95,7 @@ pub(crate) struct ContactsKeys {
     pub weights: Option<At<Vec<NotNegative<Number>>>>,
 }
 
-/// Part of the surface where no sensor may sit.
+/// A part of the surface without sensors.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a zone such as { from = \"100 mm\", to = \"120 mm\" }")]
 pub(crate) struct ZoneKeys {
@@ -109,9 +109,9 @@ pub(crate) struct ZoneKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a sensor such as { measure = \"deflection\", at = \"200 mm\" }")]
 pub(crate) struct MustHaveKeys {
-    /// Its kind; it can be left out where there is one kind to choose from.
+    /// Kind; optional if there is only one kind.
     pub measure: Option<At<SensorKind>>,
-    /// Its position.
+    /// Position.
     pub at: At<Point>,
 }
 

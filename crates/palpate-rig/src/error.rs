@@ -33,7 +33,7 @@ pub enum RigProblem {
     /// A section is missing.
     #[error("there is no section {section}")]
     MissingSection {
-        /// Its name in brackets.
+        /// Name in brackets.
         section: &'static str,
     },
     /// A section lacks a key.
@@ -85,7 +85,7 @@ pub enum RigProblem {
     OutOfRange {
         /// The key.
         key: String,
-        /// Its value, as written.
+        /// Value, as written.
         value: String,
         /// The bound, in words.
         bound: String,
@@ -128,9 +128,9 @@ pub enum RigProblem {
     InsensitiveSensor {
         /// Number of the sensor in its section, from 1.
         number: usize,
-        /// Its kind.
+        /// Kind.
         kind: SensorKind,
-        /// Its position.
+        /// Position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -146,7 +146,7 @@ pub enum RigProblem {
     NoSupport {
         /// Number of the sensor in its section, from 1.
         number: usize,
-        /// Its position.
+        /// Position.
         position: Position,
         /// Positions of the supports that take up force.
         supports: Vec<Position>,
@@ -165,7 +165,7 @@ pub enum RigProblem {
 pub(crate) struct Place {
     /// Path: its key after those of the tables around it, with dots between; that of its list for an element; empty for the document.
     pub path: String,
-    /// Its bytes in the document.
+    /// Bytes in the document.
     pub span: Range<usize>,
     /// The value as messages quote it.
     pub written: String,

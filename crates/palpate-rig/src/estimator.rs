@@ -44,50 +44,50 @@ pub(crate) enum EstimatorKeys {
     Auto,
 }
 
-/// A feed-forward network and its training by back-propagation; what is not said is as in the founding paper.
+/// A feed-forward network and its training by back-propagation; the defaults are those of the founding paper.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct NetworkKeys {
-    /// Nodes of each hidden layer, input side first; [10] unless said otherwise.
+    /// Nodes of each hidden layer, input side first; [10] by default.
     pub hidden: Option<At<Vec<Count<1, 1000>>>>,
-    /// Activation of the hidden layers; `logistic` unless said otherwise.
+    /// Activation of the hidden layers; `logistic` by default.
     pub hidden_activation: Option<Activation>,
-    /// Activation of the output layer; `logistic` unless said otherwise.
+    /// Activation of the output layer; `logistic` by default.
     pub output_activation: Option<Activation>,
-    /// Whether every node has a bias; `true` unless said otherwise.
+    /// Whether every node has a bias; `true` by default.
     pub biases: Option<bool>,
-    /// Coding of the output; `normalized` unless said otherwise.
+    /// Coding of the output; `normalized` by default.
     pub output: Option<OutputCoding>,
-    /// Scaling of readings to inputs: `full-scale`, `standardized`, or a reading to divide by; `full-scale` unless said otherwise.
+    /// Scaling of readings to inputs: `full-scale`, `standardized`, or a reading to divide by; `full-scale` by default.
     pub input_scale: Option<At<Written>>,
-    /// The step along the gradient; 0.7 unless said otherwise.
+    /// The step along the gradient; 0.7 by default.
     pub learning_rate: Option<Positive<Number>>,
-    /// The share of the previous step that is repeated; 0.9 unless said otherwise.
+    /// The share of the previous step that is repeated; 0.9 by default.
     pub momentum: Option<Fraction>,
-    /// Training converges when the sum of squared output errors over an epoch is at most this; 1e-5 unless said otherwise.
+    /// Training converges when the sum of squared output errors over an epoch is at most this; 1e-5 by default.
     pub aggregate_error: Option<Positive<Number>>,
-    /// Training is capped after this many epochs, and with more than 65,536 rows after 200 million presentations; 1000000 unless said otherwise.
+    /// Training is capped after this many epochs, and with more than 65,536 rows after 200 million presentations; 1000000 by default.
     pub max_epochs: Option<Count<1, { u32::MAX as i64 }>>,
-    /// Order in which patterns are presented; `shuffled` unless said otherwise.
+    /// Order in which patterns are presented; `shuffled` by default.
     pub order: Option<PresentationOrder>,
-    /// Weights start uniform within ± this; 0.5 unless said otherwise.
+    /// Weights start uniform within ± this; 0.5 by default.
     pub initial_weights: Option<Positive<Number>>,
 }
 
-/// Inversion of the influence functions: what each sensor reads as a function of the contact.
+/// Inversion of the influence functions, which give the reading of each sensor as a function of the contact.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct InfluenceKeys {
-    /// Source of the influence functions; `corrected` unless said otherwise.
+    /// Source of the influence functions; `corrected` by default.
     pub source: Option<InfluenceSource>,
-    /// The most contacts that may touch at once, more than one only on a line with a model; 1 unless said otherwise.
+    /// The most contacts that may touch at once, more than one only on a line with a model; 1 by default.
     pub contacts: Option<Count<1, 3>>,
-    /// Standard deviation of the contact's force about that of `[contact]`; 0 unless said otherwise.
+    /// Standard deviation of the contact's force about that of `[contact]`; 0 by default.
     pub force_sd: Option<At<Positive<Force>>>,
     /// Structure of the readings of a `measured` surface.
     #[serde(default)]
     pub structure: Structure,
-    /// Share of untouched readings that may be taken for a contact; 0.1 % unless said otherwise.
+    /// Share of untouched readings that are estimated as a contact; 0.1 % by default.
     pub false_alarm_rate: Option<FalseAlarms>,
 }
 
@@ -95,7 +95,7 @@ pub(crate) struct InfluenceKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ClosedFormKeys {
-    /// Share of untouched readings that may be taken for a contact; 0.1 % unless said otherwise.
+    /// Share of untouched readings that are estimated as a contact; 0.1 % by default.
     pub false_alarm_rate: Option<FalseAlarms>,
 }
 
@@ -106,7 +106,7 @@ pub(crate) struct DigitKeys {
     /// The theory of bending.
     #[serde(default)]
     pub theory: DigitTheory,
-    /// Share of untouched readings that may be taken for a contact; 0.1 % unless said otherwise.
+    /// Share of untouched readings that are estimated as a contact; 0.1 % by default.
     pub false_alarm_rate: Option<FalseAlarms>,
 }
 

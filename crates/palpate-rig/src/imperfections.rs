@@ -18,46 +18,46 @@ use crate::values::{Positive, Quantity, Ratio, ShareOrQuantity, TailFreedom, Tim
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ImperfectionsKeys {
-    /// Width of the hysteresis of each channel as a share of its range; 0 unless said otherwise.
+    /// Width of the hysteresis of each channel as a share of its range; 0 by default.
     pub hysteresis: Option<Fraction>,
-    /// Creep: one or two shares of a deviation that follow with their time constants; none unless said otherwise.
+    /// Creep: one or two shares of a deviation that follow with their time constants; none by default.
     pub creep: Option<At<OneOrMany<RelaxationKeys>>>,
-    /// Share of the largest deviation of a touch that remains after it, and the time constant in which it fades; none unless said otherwise.
+    /// Share of the largest deviation of a touch that remains after it, and the time constant in which it fades; none by default.
     pub residue: Option<RelaxationKeys>,
     /// Drift of the offset of each channel in an hour, up and down in channels in turn, as a share of the channel's range or in the unit of
-    /// the sensors; 0 unless said otherwise.
+    /// the sensors; 0 by default.
     pub drift_per_hour: Option<At<ShareOrQuantity>>,
-    /// Drift of the offset that all channels share in an hour; 0 unless said otherwise.
+    /// Drift of the offset that all channels share in an hour; 0 by default.
     pub common_drift_per_hour: Option<At<ShareOrQuantity>>,
-    /// Random walk of the offset of each channel: its standard deviation after an hour; 0 unless said otherwise.
+    /// Random walk of the offset of each channel: its standard deviation after an hour; 0 by default.
     pub walk_in_hour: Option<At<ShareOrQuantity>>,
-    /// Random walk of the offset that all channels share: its standard deviation after an hour; 0 unless said otherwise.
+    /// Random walk of the offset that all channels share: its standard deviation after an hour; 0 by default.
     pub common_walk_in_hour: Option<At<ShareOrQuantity>>,
-    /// Drift of the gain of each channel in an hour, up and down in channels in turn; 0 unless said otherwise.
+    /// Drift of the gain of each channel in an hour, up and down in channels in turn; 0 by default.
     pub gain_drift_per_hour: Option<Quantity<Ratio>>,
-    /// Drift of the gain that all channels share in an hour; 0 unless said otherwise.
+    /// Drift of the gain that all channels share in an hour; 0 by default.
     pub common_gain_drift_per_hour: Option<Quantity<Ratio>>,
-    /// Correlation of the noise of any two channels; 0 unless said otherwise.
+    /// Correlation of the noise of any two channels; 0 by default.
     pub noise_correlation: Option<Fraction>,
-    /// Degrees of freedom, greater than 2, of the noise of each channel, which follows Student's t distribution; normal noise unless said otherwise.
+    /// Degrees of freedom, greater than 2, of the noise of each channel, which follows Student's t distribution; normal noise by default.
     pub noise_freedom: Option<Quantity<Number, TailFreedom>>,
-    /// Rows that repeat each reading after the first, as of a logger that is faster than its sensors; 0 unless said otherwise.
+    /// Rows that repeat each reading, as a logger writes that is faster than its sensors; 0 by default.
     pub repeated_readings: Option<Count<0, 1000>>,
-    /// Width over which a soft layer spreads a touch; 0 unless said otherwise.
+    /// Width over which a soft layer spreads a touch; 0 by default.
     pub touch_width: Option<At<NotNegative<Length>>>,
-    /// Share by which a deviation as large as the range falls short of a linear one; 0 unless said otherwise.
+    /// Share by which a deviation as large as the range falls short of a linear one; 0 by default.
     pub saturation: Option<Fraction>,
-    /// Force whose largest deviation over the surface is the range of a channel; that of the presses unless said otherwise.
+    /// Force whose largest deviation over the surface is the range of a channel; that of the presses by default.
     pub range_force: Option<Positive<Force>>,
-    /// Time for which nothing touches before each press, and after the last; 4 s unless said otherwise.
+    /// Untouched time before each press and after the last; 4 s by default.
     pub rest: Option<Positive<Time>>,
-    /// Rows of force 0 that are recorded at the end of each rest; 1 unless said otherwise.
+    /// Rows of force 0 that are recorded at the end of each rest; 1 by default.
     pub untouched_rows: Option<Count<0, 1000>>,
-    /// Time for which a press rests before its `repeats` rows are read; 2 s unless said otherwise.
+    /// Time for which a press rests before its `repeats` rows are read; 2 s by default.
     pub settle: Option<Positive<Time>>,
-    /// Rows a second within a press or a rest; 10 Hz unless said otherwise.
+    /// Rows a second within a press or a rest; 10 Hz by default.
     pub rate: Option<Positive<Frequency>>,
-    /// Time from the end of a calibration to the first contact in use; 0 unless said otherwise.
+    /// Time from the end of a calibration to the first contact in use; 0 by default.
     pub pause: Option<NotNegative<Time>>,
 }
 

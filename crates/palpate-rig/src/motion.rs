@@ -11,7 +11,7 @@ use crate::error::{RigError, RigProblem};
 use crate::values::{Count, Density, Force, Fraction, Frequency, Length, NotNegative, OneOrMany, Point};
 use crate::values::{Positive, Speed, Time};
 
-/// A contact that goes to and fro between two places.
+/// A contact that moves back and forth between two places.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MotionKeys {
@@ -19,21 +19,21 @@ pub(crate) struct MotionKeys {
     pub from: At<Point>,
     /// Position of its turn.
     pub to: At<Point>,
-    /// Its speed between turns.
+    /// Speed between turns.
     pub speed: Positive<Speed>,
-    /// The way on which it slows down and speeds up again; a fifth of the whole unless said otherwise.
+    /// Distance over which it slows down and speeds up; a fifth of the whole by default.
     pub turn: Option<At<Positive<Length>>>,
-    /// Passes from one place to the other; 1 unless said otherwise.
+    /// Passes from one place to the other; 1 by default.
     pub passes: Option<Count<1, 100_000>>,
-    /// Time for which it is lifted off at each turn; 0 unless said otherwise.
+    /// Time for which it is lifted off at each turn; 0 by default.
     pub lifted: Option<NotNegative<Time>>,
-    /// Time that it takes to touch, and to let go; 0.1 s unless said otherwise.
+    /// Time that it takes to touch, and to let go; 0.1 s by default.
     pub touch: Option<At<Positive<Time>>>,
-    /// Its force, where that is neither known nor the one of the calibration's presses.
+    /// Force, if it is neither known nor that of the presses.
     pub force: Option<At<Positive<Force>>>,
-    /// Readings a second; said by the first of two.
+    /// Readings a second; a key of the first motion only.
     pub rate: Option<At<Positive<Frequency>>>,
-    /// Damping ratio of the beam's modes; 1 % unless said otherwise.
+    /// Damping ratio of the beam's modes; 1 % by default.
     pub damping: Option<At<Fraction>>,
 }
 

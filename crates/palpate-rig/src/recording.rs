@@ -15,51 +15,50 @@ use crate::document::At;
 use crate::error::{Place, RigError, RigProblem};
 use crate::values::{Count, Force, Length, NotNegative, Positive, Quantity};
 
-/// Columns of a CSV file by their roles; what is not said is as in the recordings that palpate itself writes.
+/// Columns of a CSV file by their roles; the defaults are the columns of palpate's own recordings.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RecordingKeys {
     /// Whether the first line names the columns; without it columns are numbers, from 1.
     #[serde(default = "yes")]
     pub header: bool,
-    /// Separator of the fields; what the first line tells unless said otherwise.
+    /// Separator of the fields; recognised from the first line by default.
     pub separator: Option<Separator>,
-    /// Decimal mark; what the first number tells unless said otherwise.
+    /// Decimal mark; recognised from the first number by default.
     pub decimal: Option<Decimal>,
-    /// Column of the contact's position along a line; `position_mm` unless said otherwise.
+    /// Column of the contact's position along a line; `position_mm` by default.
     pub position: Option<At<ColumnKey>>,
-    /// Column of its position along a plane's length; `x_mm` unless said otherwise.
+    /// Column of its position along a plane's length; `x_mm` by default.
     pub x: Option<At<ColumnKey>>,
-    /// Column of its position across a plane's width; `y_mm` unless said otherwise.
+    /// Column of its position across a plane's width; `y_mm` by default.
     pub y: Option<At<ColumnKey>>,
-    /// The unit of positions; mm unless said otherwise.
+    /// The unit of positions; mm by default.
     pub position_unit: Option<At<String>>,
-    /// Columns of the sensors' readings, which also name raw sensors; the sensors' names with their units unless said otherwise.
+    /// Columns of the sensors' readings, which also name raw sensors; the sensors' names with their units by default.
     pub channels: Option<At<Vec<At<ColumnKey>>>>,
-    /// The unit of readings, or that of each channel; mm, rad, m/m, N, or none of raw channels unless said otherwise.
+    /// The unit of readings, or that of each channel; mm, rad, m/m, N, or none of raw channels by default.
     pub channel_unit: Option<At<ChannelUnitKeys>>,
-    /// Column of the contact's force, positive downward, 0 where nothing touches; `force_n`, where the file has it, unless said otherwise.
+    /// Column of the contact's force, positive downward, 0 in untouched rows; `force_n`, where the file has it, by default.
     pub force: Option<At<ColumnKey>>,
-    /// The unit of forces; N unless said otherwise.
+    /// The unit of forces; N by default.
     pub force_unit: Option<At<String>>,
-    /// Greatest force, either way, of a row in which nothing touches, as load cells never read exactly 0; found from the rows unless said
-    /// otherwise.
+    /// Largest absolute force of an untouched row, because load cells never read exactly 0; estimated from the rows by default.
     pub force_zero: Option<NotNegative<Force>>,
     /// Column of a coordinate that readings depend on, is known here, and is unknown in use, or a list of several; the first is looked for
     /// with the position.
     pub nuisance: Option<At<NuisanceKeys>>,
-    /// The unit of the nuisance coordinate, or a list of as many; none unless said otherwise.
+    /// The unit of the nuisance coordinate, or a list of as many; none by default.
     pub nuisance_unit: Option<At<ChannelUnitKeys>>,
-    /// Column of the time of each row, as numbers or timestamps; `time_s`, where the file has it, unless said otherwise.
+    /// Column of the time of each row, as numbers or timestamps; `time_s`, where the file has it, by default.
     pub time: Option<At<ColumnKey>>,
-    /// The unit of times that are numbers; s unless said otherwise.
+    /// The unit of times that are numbers; s by default.
     pub time_unit: Option<At<String>>,
-    /// Column that marks the rows in which nothing touched, with 1, true or yes; rows of force 0, and those with neither position nor force,
+    /// Column that marks untouched rows with 1, true or yes; rows of force 0, and those with neither position nor force,
     /// need no mark.
     pub untouched: Option<At<ColumnKey>>,
-    /// Times in which nothing touched, by the time of the rows, which counts from their first where they have timestamps.
+    /// Untouched times, in the time of the rows; timestamps count from the first row.
     pub untouched_times: Option<Vec<At<Span>>>,
-    /// The file's coordinates of the surface's left end or lower left corner; 0 unless said otherwise.
+    /// The file's coordinates of the surface's left end or lower left corner; 0 by default.
     pub origin: Option<At<Vec<Quantity<Length>>>>,
     /// Positions are rounded to whole multiples of this.
     pub round: Option<Positive<Length>>,

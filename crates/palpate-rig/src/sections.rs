@@ -49,7 +49,7 @@ pub struct RigSections(RigFile);
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RigFile {
-    /// The elastic body that is touched; every rig has it.
+    /// The elastic body; every rig has it.
     pub surface: Option<At<SurfaceKeys>>,
     /// The sensors; every rig has some.
     pub sensors: Option<At<OneOrMany<SensorsKeys>>>,
@@ -57,7 +57,7 @@ pub(crate) struct RigFile {
     pub contact: Option<ContactKeys>,
     /// The presses of a calibration.
     pub training: Option<At<TrainingKeys>>,
-    /// The method that locates; the founding paper's network unless said otherwise.
+    /// The method that locates; the founding paper's network by default.
     pub estimator: Option<EstimatorKeys>,
     /// Columns of a CSV file by their roles.
     pub recording: Option<At<RecordingKeys>>,

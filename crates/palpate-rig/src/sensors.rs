@@ -29,17 +29,17 @@ pub(crate) struct SensorsKeys {
     pub grid: Option<At<Grid<MOST>>>,
     /// Their positions, one by one.
     pub positions: Option<At<Vec<At<Point>>>>,
-    /// Standard deviation of a reading's noise; 0 unless said otherwise.
+    /// Standard deviation of a reading's noise; 0 by default.
     pub noise: Option<At<Written>>,
-    /// Step to which a reading is rounded; 0 unless said otherwise.
+    /// Step to which a reading is rounded; 0 by default.
     pub resolution: Option<At<Written>>,
-    /// Standard deviation of the gain's error; 0 unless said otherwise.
+    /// Standard deviation of the gain's error; 0 by default.
     pub gain_error: Option<Fraction>,
-    /// Standard deviation of the offset; 0 unless said otherwise.
+    /// Standard deviation of the offset; 0 by default.
     pub offset_error: Option<At<Written>>,
-    /// Standard deviation of the distance between a sensor and where it is said to be; 0 unless said otherwise.
+    /// Standard deviation of the distance between a sensor and its stated position; 0 by default.
     pub position_error: Option<At<NotNegative<Length>>>,
-    /// The lowest and highest reading; unlimited unless said otherwise.
+    /// The lowest and highest reading; unlimited by default.
     pub range: Option<At<RangeKeys>>,
     /// The numbers of sensors that always read 0, from 1.
     #[serde(default)]

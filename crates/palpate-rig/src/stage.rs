@@ -74,19 +74,19 @@ pub(crate) struct StageKeys {
     pub origin: OriginKeys,
     /// The machine's z as the finger touches the untouched surface.
     pub touch: Quantity<Length>,
-    /// Height above that at which the finger travels; 5 mm unless said otherwise.
+    /// Height above that at which the finger travels; 5 mm by default.
     pub clearance: Option<Positive<Length>>,
     /// Depths below `touch` to which every position is pressed, one after the other.
     pub depths: At<Vec<Positive<Length>>>,
-    /// Speed of travel; 20 mm/s unless said otherwise.
+    /// Speed of travel; 20 mm/s by default.
     pub travel_speed: Option<Positive<Speed>>,
-    /// Speed of pressing; 1 mm/s unless said otherwise.
+    /// Speed of pressing; 1 mm/s by default.
     pub press_speed: Option<Positive<Speed>>,
-    /// Name by which the board calls the values of the load cell under the finger, which are in newtons.
+    /// Name of the load cell's values in the frames of the board, in newtons.
     pub load_cell: Option<String>,
-    /// Force at the load cell beyond which the machine is stopped.
+    /// Largest force at the load cell; the machine stops above it.
     pub force_limit: Option<At<Positive<Force>>>,
-    /// Stop a machine whose firmware reads no stop during a move by a reset over the DTR line of its serial port; `false` unless said otherwise.
+    /// Stop a machine whose firmware reads no stop during a move by a reset over the DTR line of its serial port; `false` by default.
     pub dtr_reset: Option<bool>,
 }
 

@@ -28,7 +28,7 @@ use crate::values::{Count, Length, OneOrMany, Positive};
 /// A set of experiments: every arm is a rig, fitted once a seed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Study {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Seeds 0 to this less 1, unless the caller wants another number; at least 1.
     pub seeds: u64,
@@ -36,7 +36,7 @@ pub struct Study {
     pub precision: Precision,
     /// Positions and tolerance by which its locators are judged.
     pub judging: Judging,
-    /// Its arms, at least 1, with names of their own.
+    /// Arms, at least 1, with names of their own.
     pub arms: Vec<Arm>,
     /// SHA-256 of the study file, in hexadecimal.
     pub digest: String,
@@ -45,7 +45,7 @@ pub struct Study {
 /// One row of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arm {
-    /// Its name, unique in the study.
+    /// Name, unique in the study.
     pub name: String,
     /// Rig that is fitted; where a layout is asked for, it takes the place of the rig's own when the study is prepared.
     pub rig: Rig,
@@ -83,20 +83,20 @@ pub struct Judging {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StudyFile {
-    /// Its name, of letters, digits, `-` and `_`.
+    /// Name, of letters, digits, `-` and `_`.
     name: At<String>,
-    /// Seeds that each arm is fitted from; 100 unless said otherwise.
+    /// Seeds that each arm is fitted from; 100 by default.
     seeds: Option<Count<1, 1_000_000>>,
     /// The arithmetic of training networks.
     #[serde(default)]
     precision: Precision,
     /// The surface of every arm, which every study has.
     surface: Option<At<SurfaceKeys>>,
-    /// The sensors of arms that have none of their own.
+    /// Sensors of arms without `sensors`.
     sensors: Option<At<OneOrMany<SensorsKeys>>>,
-    /// The contact of arms that have none of their own.
+    /// Contact of arms without `contact`.
     contact: Option<ContactKeys>,
-    /// The calibration of arms that have none of their own.
+    /// Calibration of arms without `training`.
     training: Option<At<TrainingKeys>>,
     /// The estimator; its keys hold for arms that do not say the same keys.
     // Read by [`estimator`].
@@ -104,7 +104,7 @@ struct StudyFile {
     _estimator: Option<IgnoredAny>,
     /// Candidates for layouts that are asked for by method.
     design: Option<At<DesignKeys>>,
-    /// Positions and tolerance by which locators are judged; 399 positions, 5 readings at each unless said otherwise.
+    /// Positions and tolerance by which locators are judged; 399 positions, 5 readings at each by default.
     evaluation: Option<EvaluationKeys>,
     /// The arms: one row each, with sections of its own in the place of the study's.
     #[serde(default)]
@@ -121,9 +121,9 @@ struct EvaluationKeys {
     to: At<Positive<Length>>,
     /// The distance between two.
     step: At<Positive<Length>>,
-    /// Readings at each position; 5 unless said otherwise.
+    /// Readings at each position; 5 by default.
     readings: Option<Count<1, 1000>>,
-    /// An error up to this is good enough; 2 mm unless said otherwise.
+    /// Largest acceptable error; 2 mm by default.
     tolerance: Option<Positive<Length>>,
     /// Portions of the surface that are also judged by themselves.
     #[serde(default)]
@@ -141,19 +141,19 @@ struct PortionKeys(Positive<Length>, Positive<Length>);
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ArmKeys {
-    /// Its name, unique in the study, of letters, digits, `-`, `_`, and `.` between them.
+    /// Name, unique in the study, of letters, digits, `-`, `_`, and `.` between them.
     name: At<String>,
-    /// The title of a figure that it shares with other arms; a figure of its own unless said otherwise.
+    /// The title of a figure that it shares with other arms; a figure of its own by default.
     figure: Option<String>,
     /// The method that places its sensors.
     layout: Option<At<Method>>,
-    /// Its sensors; the study's unless said otherwise.
+    /// Sensors; the study's by default.
     sensors: Option<At<OneOrMany<SensorsKeys>>>,
-    /// Its contact; the study's unless said otherwise.
+    /// Contact; the study's by default.
     contact: Option<ContactKeys>,
-    /// Its calibration; the study's unless said otherwise.
+    /// Calibration; the study's by default.
     training: Option<At<TrainingKeys>>,
-    /// Its own keys of the estimator, beside those of the study's.
+    /// Own keys of the estimator, beside those of the study's.
     // Read by [`estimator`].
     #[serde(rename = "estimator")]
     _estimator: Option<IgnoredAny>,

@@ -13,7 +13,7 @@ use crate::error::{Place, RigError, RigProblem};
 use crate::values::{Count, Density, Length, Modulus, Number, Point, Positive, Quantity};
 use crate::values::{RotationalStiffness, Stiffness};
 
-/// The elastic body that is touched.
+/// The elastic body.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename = "by kind", rename_all = "kebab-case")]
 pub(crate) enum SurfaceKeys {
@@ -27,23 +27,23 @@ pub(crate) enum SurfaceKeys {
     Measured(MeasuredKeys),
 }
 
-/// A straight beam of rectangular section; simply supported at both ends unless `supports` says otherwise.
+/// A straight beam of rectangular section; without `supports` simply supported at both ends.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BeamKeys {
     /// Length.
     pub length: Positive<Length>,
-    /// Width of the section; that of `sections` which have none of their own.
+    /// Width of the section, and of `sections` without a width.
     pub width: Option<Positive<Length>>,
-    /// Thickness of the section; that of `sections` which have none of their own.
+    /// Thickness of the section, and of `sections` without a thickness.
     pub thickness: Option<Positive<Length>>,
     /// Young's modulus of its material.
     pub youngs_modulus: Positive<Modulus>,
-    /// The beam's supports; `simple`, at both ends, unless said otherwise.
+    /// The beam's supports; `simple`, at both ends, by default.
     pub supports: Option<At<BeamSupportsKeys>>,
     /// Stretches of one section each, from left to right.
     pub sections: Option<At<Vec<At<SectionKeys>>>>,
-    /// Density, which only a beam that swings under a moving contact needs.
+    /// Density, for a beam that swings under a moving contact.
     pub density: Option<At<Positive<Density>>>,
 }
 
@@ -74,27 +74,27 @@ pub(crate) enum EndsKeys {
 pub(crate) enum BeamSupportKeys {
     /// No deflection, free to turn.
     Simple {
-        /// Its position.
+        /// Position.
         at: At<Quantity<Length>>,
     },
     /// Neither deflection nor slope.
     Clamped {
-        /// Its position.
+        /// Position.
         at: At<Quantity<Length>>,
     },
-    /// No support: a free end, said so.
+    /// No support: a free end.
     Free {
-        /// Its position, an end of the beam.
+        /// Position, an end of the beam.
         at: At<Quantity<Length>>,
     },
     /// No slope, free to deflect.
     Guided {
-        /// Its position.
+        /// Position.
         at: At<Quantity<Length>>,
     },
     /// A spring.
     Elastic {
-        /// Its position.
+        /// Position.
         at: At<Quantity<Length>>,
         /// Upward force per downward deflection.
         stiffness: Positive<Stiffness>,
@@ -107,11 +107,11 @@ pub(crate) enum BeamSupportKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a section such as { to = \"100 mm\", thickness = \"2 mm\" }")]
 pub(crate) struct SectionKeys {
-    /// Its end; the last one ends with the beam unless it says otherwise.
+    /// End; without it, the end of the beam, for the last section.
     pub to: Option<At<Positive<Length>>>,
-    /// Its width, if not the beam's.
+    /// Width, if it differs from the beam's.
     pub width: Option<Positive<Length>>,
-    /// Its thickness, if not the beam's.
+    /// Thickness, if it differs from the beam's.
     pub thickness: Option<Positive<Length>>,
 }
 
@@ -129,11 +129,11 @@ pub(crate) struct PlateKeys {
     pub youngs_modulus: Positive<Modulus>,
     /// Poisson's ratio of its material.
     pub poissons_ratio: At<Quantity<Number>>,
-    /// Support of its edges; `free` unless said otherwise.
+    /// Support of its edges; `free` by default.
     pub edges: Option<At<EdgesKeys>>,
-    /// Its supports at points.
+    /// Supports at points.
     pub supports: Option<At<PointSupportsKeys>>,
-    /// Elements along the longer side; 128 unless said otherwise.
+    /// Elements along the longer side; 128 by default.
     pub elements: Option<At<Count<1, { i64::MAX }>>>,
 }
 
@@ -165,12 +165,12 @@ pub(crate) enum PointSupportsKeys {
 pub(crate) enum PointSupportKeys {
     /// No deflection; the plate can turn on it.
     Simple {
-        /// Its position.
+        /// Position.
         at: At<Point>,
     },
     /// A spring.
     Elastic {
-        /// Its position.
+        /// Position.
         at: At<Point>,
         /// Upward force per downward deflection.
         stiffness: Positive<Stiffness>,
@@ -199,7 +199,7 @@ pub(crate) struct DigitKeys {
 pub(crate) struct MeasuredKeys {
     /// Length.
     pub length: Positive<Length>,
-    /// Width of a plane, which is touched along and across; without it the surface is a line.
+    /// Width of a plane; without it the surface is a line.
     pub width: Option<Positive<Length>>,
 }
 
@@ -221,7 +221,7 @@ impl At<SurfaceKeys> {
         }
     }
 
-    /// Its density, if it says one.
+    /// Density, if it says one.
     pub fn density(&self) -> Option<&At<Positive<Density>>> {
         match &**self {
             SurfaceKeys::Beam(keys) => keys.density.as_ref(),

@@ -17,9 +17,9 @@ const MOST: i64 = 100_000;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ContactKeys {
-    /// Their force, where it is known and one for all; unknown unless said otherwise.
+    /// Their force, where it is known and one for all; unknown by default.
     pub force: Option<At<Positive<Force>>>,
-    /// The greatest that an unknown force can be, on a surface with a model; ten times that of the presses unless said otherwise.
+    /// The greatest that an unknown force can be, on a surface with a model; ten times that of the presses by default.
     pub greatest_force: Option<At<Positive<Force>>>,
 }
 
@@ -44,7 +44,7 @@ impl ContactKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TrainingKeys {
-    /// The rule that places them; `explicit` where there are `positions`, `grid` where there is a `grid`, else `even` unless said otherwise.
+    /// The rule that places them; `explicit` where there are `positions`, `grid` where there is a `grid`, else `even` by default.
     pub arrangement: Option<Rule>,
     /// Number of positions; needed on a line by all rules but `explicit`.
     pub count: Option<At<Count<1, MOST>>>,
@@ -53,15 +53,15 @@ pub(crate) struct TrainingKeys {
     /// Number of positions of `edge-dense` in the middle portion.
     pub middle: Option<At<Count<2, MOST>>>,
     /// Start and end of the middle portion of `edge-dense`, or of what `even` covers, as shares of the length; for `edge-dense` 25 % and
-    /// 75 % unless said otherwise.
+    /// 75 % by default.
     pub portion: Option<At<PortionKeys>>,
     /// The positions of `explicit`.
     pub positions: Option<At<Vec<At<Point>>>>,
-    /// Presses at each position; 1 unless said otherwise.
+    /// Presses at each position; 1 by default.
     pub repeats: Option<Count<1, MOST>>,
-    /// The force of the presses; that of [contact] unless said otherwise.
+    /// The force of the presses; that of [contact] by default.
     pub force: Option<At<Positive<Force>>>,
-    /// How far off the asked place a person presses: the standard deviation in each direction; unknown unless said otherwise.
+    /// Standard deviation of the pressed place from the asked place, in each direction; unknown by default.
     pub placement: Option<At<Positive<Length>>>,
 }
 

@@ -10,11 +10,11 @@ use super::source::{Field, Item, Shape, Types, attribute};
 
 const HEAD: &str = "# Keys of rigs and studies
 
-A rig is one TOML file that says what is on the bench, a study a set of experiments over rigs (docs/studies.md). Here is every key, with what
-can be its value. Lengths, forces and all other quantities are texts with units: `\"400 mm\"`, `\"3 N\"`, `\"200 GPa\"`, `\"5 um\"`; shares are
-numbers or percentages, `0.05` or `\"5 %\"`. A key that is not here is an error that names the place.
+A rig is a TOML file that describes a bench; a study is a set of experiments over rigs (docs/studies.md). This page lists every key with its
+values. Quantities are texts with units: `\"400 mm\"`, `\"3 N\"`, `\"200 GPa\"`, `\"5 um\"`. Shares are
+numbers or percentages, `0.05` or `\"5 %\"`. An unknown key is an error with its place in the file.
 
-This page is written by `cargo xtask rig-keys` from the types that the files are read into; a test holds it to them.
+`cargo xtask rig-keys` writes this page from the types that read the files; a test compares the two.
 ";
 
 /// The page.
@@ -24,7 +24,7 @@ pub fn page(root: &Path) -> Result<String> {
     let find = |file: &str, name: &str| {
         types.find(&folder.join(file), name).with_context(|| format!("there is no {name} in {file}"))
     };
-    let mut page = Page { types: &types, text: HEAD.to_owned(), told: BTreeMap::new() };
+    let mut page = Page { types: &types, text: HEAD.to_owned(), explained: BTreeMap::new() };
     page.sections("The rig", find("sections.rs", "RigFile")?);
     page.sections("The study", find("study.rs", "StudyFile")?);
     Ok(page.text.trim_end().to_owned() + "\n")
@@ -34,7 +34,7 @@ struct Page<'a> {
     types: &'a Types,
     text: String,
     /// Types that have been explained, and under which heading.
-    told: BTreeMap<(PathBuf, String), String>,
+    explained: BTreeMap<(PathBuf, String), String>,
 }
 
 impl<'a> Page<'a> {
@@ -61,13 +61,13 @@ impl<'a> Page<'a> {
             return;
         }
         let place = (item.file.clone(), item.name.clone());
-        if let Some(heading) = self.told.get(&place) {
+        if let Some(heading) = self.explained.get(&place) {
             if self.is_table(item) {
                 let _ = write!(self.text, "\n{} {path}\n\nAs {heading} of the rig.\n", "#".repeat(level));
             }
             return;
         }
-        self.told.insert(place, path.to_owned());
+        self.explained.insert(place, path.to_owned());
         match &item.shape {
             Shape::Struct(fields) => {
                 let _ = write!(self.text, "\n{} {path}\n\n{}\n", "#".repeat(level), item.docs);
@@ -90,14 +90,14 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// Tables that are told by the key `kind`.
+    /// Tables that the key `kind` distinguishes.
     fn kinds(&mut self, item: &'a Item, path: &str, level: usize) {
         let Shape::Enum(variants) = &item.shape else { return };
         let _ = write!(self.text, "\n{} {path}\n\n{}", "#".repeat(level), item.docs);
         let words: Vec<String> = variants.iter().map(|variant| format!("`{}`", item.word(variant))).collect();
         let without =
             item.attribute("rename").and_then(|by| by.split_once(" or ").map(|(_, word)| word.to_owned()));
-        let without = without.map_or(String::new(), |word| format!("; `{word}` where it is not said"));
+        let without = without.map_or(String::new(), |word| format!("; the default is `{word}`"));
         let _ = writeln!(self.text, " Its `kind` is one of {}{without}.", words.join(", "));
         for variant in variants {
             let kind = format!("{path}, `kind = \"{}\"`", item.word(variant));
@@ -124,7 +124,7 @@ impl<'a> Page<'a> {
     }
 
     fn table(&mut self, fields: &[Field], file: &Path) {
-        self.text += "\n| key | value | where it is not said | meaning |\n|---|---|---|---|\n";
+        self.text += "\n| key | value | default | meaning |\n|---|---|---|---|\n";
         for field in fields {
             let (meaning, default) = split_default(&field.docs);
             let default = default.unwrap_or_else(|| self.default(field, file));
@@ -135,7 +135,7 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// Value of a key that is not said, where its comment is silent.
+    /// Default of a key whose comment gives none.
     fn default(&self, field: &Field, file: &Path) -> String {
         let fields_of = |item: &&Item| matches!(&item.shape, Shape::Struct(fields) if fields.iter().any(|own| std::ptr::eq(own, field)));
         let all_default =
@@ -144,7 +144,7 @@ impl<'a> Page<'a> {
         match attribute(&field.serde, "default") {
             Some(function) if function == "yes" => "`true`".to_owned(),
             _ if is_optional => "–".to_owned(),
-            _ if !field.serde.contains("default") && !all_default => "must be said".to_owned(),
+            _ if !field.serde.contains("default") && !all_default => "required".to_owned(),
             _ if field.type_text == "bool" => "`false`".to_owned(),
             _ => match self.item(file, &field.type_text).map(|item| (item, &item.shape)) {
                 Some((item, Shape::Enum(variants))) => {
@@ -273,9 +273,9 @@ fn quantity(dimension: &str) -> &str {
     }
 }
 
-/// A comment without "; … unless said otherwise", and what that says.
+/// A comment without "; … by default", and that default.
 pub fn split_default(docs: &str) -> (String, Option<String>) {
-    let Some((before, after)) = docs.split_once(" unless said otherwise") else {
+    let Some((before, after)) = docs.split_once(" by default") else {
         return (docs.to_owned(), None);
     };
     match before.rsplit_once("; ") {

@@ -44,7 +44,7 @@ pub enum Structure {
 pub enum InfluenceSource {
     /// From the recording alone, by splines that the supports hold.
     Recording,
-    /// From the mechanics alone; the recording tells the noise.
+    /// From the mechanics alone; the recording gives the noise.
     Mechanics,
     /// From the mechanics, corrected by the recording: gains, offsets, sensors beside their place, and a remainder.
     Corrected,

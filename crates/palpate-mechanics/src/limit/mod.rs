@@ -39,7 +39,7 @@ use zone::Grid;
 pub enum Force {
     /// Its value.
     Known,
-    /// Nothing: it is estimated together with the position.
+    /// The force is estimated together with the position.
     Unknown,
 }
 

@@ -94,7 +94,7 @@ pub enum FirstRigError {
         column: String,
         /// The first field that is no number.
         text: String,
-        /// Its line.
+        /// Line.
         line: usize,
     },
     /// A hint names a column that marks no rows.
@@ -118,7 +118,7 @@ pub enum FirstRigError {
     OnePosition {
         /// The heading of the position.
         column: String,
-        /// Its value.
+        /// Value.
         value: f64,
     },
     /// The heading of a column says a unit in which its role is not read.
@@ -126,7 +126,7 @@ pub enum FirstRigError {
     ForeignUnit {
         /// The heading.
         column: String,
-        /// Its unit.
+        /// Unit.
         unit: String,
         /// Quantity that the column should measure.
         wanted: Dimension,

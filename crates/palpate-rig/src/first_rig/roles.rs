@@ -367,7 +367,7 @@ pub(super) fn range(numbers: &[f64]) -> (f64, f64) {
 
 /// A heading taken apart.
 struct Name {
-    /// Its words in small letters, the unit left out.
+    /// Words in small letters, the unit left out.
     words: Vec<String>,
     /// Heading without the number at its end, and whether there is one.
     stem: (String, bool),

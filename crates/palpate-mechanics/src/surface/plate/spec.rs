@@ -33,7 +33,7 @@ pub struct PlateSpec {
     pub elements: usize,
 }
 
-/// Supports of the four edges; free where nothing is said.
+/// Supports of the four edges; edges without a key are free.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Edges {
@@ -55,7 +55,7 @@ pub enum Edge {
     Simple,
     /// Its deflection and its slope are zero.
     Clamped,
-    /// Nothing holds it.
+    /// No support.
     #[default]
     Free,
 }
