@@ -152,14 +152,19 @@ pub fn compare<'py>(
             contenders(bench, &own, rows)
         }
     };
-    let known: Vec<&str> = contenders.iter().map(|contender| contender.kind()).collect();
-    if let Some(unknown) = only.iter().find(|kind| !known.contains(&kind.as_str())) {
+    let is_named = |contender: &estimator::Estimator, only: &str| {
+        [contender.kind(), contender.name()].contains(&only)
+    };
+    let suits = |only: &&String| contenders.iter().any(|contender| is_named(contender, only));
+    if let Some(unknown) = only.iter().find(|only| !suits(only)) {
+        let mut known: Vec<&str> = contenders.iter().map(|contender| contender.kind()).collect();
+        known.dedup();
         let known = known.join(", ");
         return Err(refused(format!(
             "`only` names \"{unknown}\", which does not suit the bench; it can be: {known}"
         )));
     }
-    contenders.retain(|contender| only.is_empty() || only.iter().any(|kind| kind == contender.kind()));
+    contenders.retain(|contender| only.is_empty() || only.iter().any(|only| is_named(contender, only)));
     // Alone it is refused; among others it is left out.
     if let ([only], Some(trial)) = (&contenders[..], trials.first()) {
         check_memory(memory_limit, only, bench, &trial.training)?;
@@ -187,7 +192,7 @@ pub fn compare<'py>(
     fields.column("limit_ratio", ratios)?;
     let about = |kind: &str| About { kind: kind.to_owned(), source: source.clone(), how: how.clone() };
     let evaluations = comparisons.iter().map(|Comparison { estimator, tried }| {
-        Evaluation::new(tried.evaluation.clone(), Arc::clone(&setup.0), about(estimator.kind()))
+        Evaluation::new(tried.evaluation.clone(), Arc::clone(&setup.0), about(estimator.name()))
     });
     fields.set(
         "evaluations",
@@ -209,7 +214,7 @@ fn columns(fields: &Fields<'_>, comparisons: &[Comparison], tolerance_m: f64) ->
     let summaries: Vec<Option<ErrorSummary>> =
         comparisons.iter().map(|comparison| comparison.tried.evaluation.summary(None)).collect();
     fields
-        .set("names", comparisons.iter().map(|comparison| comparison.estimator.kind()).collect::<Vec<_>>())?;
+        .set("names", comparisons.iter().map(|comparison| comparison.estimator.name()).collect::<Vec<_>>())?;
     for (name, of) in FIGURES {
         fields.column(name, summaries.iter().map(|errors| errors.as_ref().map(of)))?;
     }

@@ -125,7 +125,8 @@ impl Estimator {
         let chosen = choice.as_ref().map_or(&self.inner, |choice| &choice.best);
         let rounds = Some(chosen.most_rounds()).filter(|most| *most > 0);
         let fitted = work::run_with(py, progress, rounds, |watch| chosen.fit_task(task.watch(watch)))?;
-        let locator = fitted.map_err(|error| of_work(&error))?;
+        let mut locator = fitted.map_err(|error| of_work(&error))?;
+        locator.provenance.choice = choice.as_ref().map_or_else(Vec::new, |choice| choice.tried.clone());
         if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) =
             locator.training_outcome()
         {
@@ -233,10 +234,10 @@ impl SeedQueue<estimator::Locator> for Seeds<'_> {
 /// What the choice of `auto` was made by: the chosen kind, what every contender came to, and who was left out.
 fn choice_dict<'py>(py: Python<'py>, choice: &Choice) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    dict.set_item("best", choice.best.kind())?;
+    dict.set_item("best", choice.best.name())?;
     let tried = choice.tried.iter().map(|tried| {
         let one = PyDict::new(py);
-        one.set_item("kind", tried.kind)?;
+        one.set_item("name", &tried.name)?;
         one.set_item("mean_error", tried.mean_error_m)?;
         one.set_item("interval_score", tried.interval_score_m)?;
         one.set_item("coverage", tried.coverage_percent.map(|percent| percent / 100.0))?;

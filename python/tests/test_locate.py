@@ -183,16 +183,22 @@ def test_the_csv_of_the_command_is_ours(tmp_path, command, presses, locator):
     assert np.allclose([float(row["position_mm"]) for row in rows], frame["x [mm]"], atol=5.1e-5)
 
 
-def test_auto_says_why():
+def test_auto_says_why(tmp_path):
     setup = pp.Setup(pp.Measured("100 mm"), pp.raw("left", "right"))
     x = np.linspace(0.01, 0.09, 12)
     noise = np.random.default_rng(0).normal(scale=0.01, size=(12, 2))
     presses = setup.recording(np.column_stack([0.1 - x, x]) * 10 + noise, x, force=1.0)
     locator = pp.Auto().fit(presses, progress=False)
     choice = locator.choice
-    assert choice["best"] == locator.kind
-    tried = {one["kind"]: one for one in choice["tried"]}
-    assert locator.kind in tried and tried[locator.kind]["mean_error"] > 0
+    best = choice["best"]
+    assert best.split()[0] == locator.kind
+    tried = {one["name"]: one for one in choice["tried"]}
+    assert best in tried and tried[best]["mean_error"] > 0
+    # Presses of one force have one structure only.
+    assert "influence free" in tried and {"influence force-linear", "influence force-monotone"} <= set(choice["left_out"])
+    locator.save(tmp_path / "locator.json")
+    chosen = next(line for line in pp.inspect(tmp_path / "locator.json").says if line.startswith("chosen by `auto`"))
+    assert chosen.startswith(f"chosen by `auto`: {best} (mean error ") and "better at held-out positions than" in chosen
 
 
 def test_many_seeds_are_those_of_single_fits(beam):

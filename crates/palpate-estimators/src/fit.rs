@@ -19,6 +19,7 @@ use crate::setup::Setup;
 use crate::split::Split;
 use crate::status::{FalseAlarmRate, SIGNIFICANCE, unless_left_open};
 use crate::thinning::thinned;
+use crate::tried::Tried;
 use crate::untouched_drift::UntouchedDrift;
 use crate::untouched_scatter::{Rests, UntouchedScatter};
 
@@ -424,6 +425,9 @@ pub struct LocatorProvenance {
     pub seed: u64,
     /// The recording that it was fitted to.
     pub recording: Provenance,
+    /// Estimators among which `auto` chose this one, best first; empty of an estimator that was named.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub choice: Vec<Tried>,
 }
 
 impl<M: Locate> Fitted<M> {
@@ -433,6 +437,7 @@ impl<M: Locate> Fitted<M> {
             palpate: env!("CARGO_PKG_VERSION").to_owned(),
             seed: task.seed,
             recording: task.recording.provenance.clone(),
+            choice: Vec::new(),
         };
         let untouched = task.recording.untouched_mean();
         Self {

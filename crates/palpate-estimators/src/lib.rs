@@ -60,4 +60,5 @@ pub mod track_errors;
 pub mod tracking;
 mod trade_off;
 pub mod untouched_drift;
+mod tried;
 pub mod untouched_scatter;

@@ -65,7 +65,7 @@ impl ComparisonReport<'_> {
             li { (counted(self.comparisons.len(), "estimator", "estimators")) " on " (self.trials) "." }
             @if let (Some(best), Some(mean)) = (best, mean) {
                 li {
-                    "The least mean error is that of " b { (best.estimator.kind()) } ": "
+                    "The least mean error is that of " b { (best.estimator.name()) } ": "
                     (number(mean.average_m * 1e3)) " mm, median " (number(mean.median_m * 1e3)) " mm."
                 }
                 @if let Some(ratio) = limit_ratio(self.setup, &best.tried.evaluation) {
@@ -94,7 +94,7 @@ impl ComparisonReport<'_> {
             " of the length, 1/80 of it away from the ends. A dash: the bench has no limit."
         };
         Table::from_rows(self.tried())
-            .short("estimator", |(comparison, ..)| comparison.estimator.kind())
+            .short("estimator", |(comparison, ..)| comparison.estimator.name())
             .mm("mean", |(.., summary)| summary.average_m)
             .number("% of length", |(_, of, summary)| {
                 percentage_error(summary.average_m, of.extent.length_m())
@@ -122,7 +122,7 @@ impl ComparisonReport<'_> {
                 .map(|(_, percent)| percent)
         };
         Table::from_rows(self.tried())
-            .short("estimator", |(comparison, ..)| comparison.estimator.kind())
+            .short("estimator", |(comparison, ..)| comparison.estimator.name())
             .number("covered, %", |(_, evaluation, _)| evaluation.coverage_percent())
             .mm("score, mm", |(_, evaluation, _)| evaluation.interval_score_m())
             .number("force, N", |(_, of, _)| of.force_summary().map(|forces| forces.average_n))
@@ -150,7 +150,7 @@ impl ComparisonReport<'_> {
         // The last colour is black, which the limit has.
         const COLOURS: usize = 6;
         let series = |(i, comparison): (usize, &Comparison)| {
-            let (label, points) = (comparison.estimator.kind(), points(&comparison.tried.evaluation));
+            let (label, points) = (comparison.estimator.name(), points(&comparison.tried.evaluation));
             let drawn = if i < COLOURS { Series::line } else { Series::dashes };
             drawn(label, i % COLOURS, points)
         };
@@ -160,7 +160,7 @@ impl ComparisonReport<'_> {
     fn errors_map(&self) -> Figure {
         let shown = self.comparisons.iter().take(MOST_MAPS);
         let evaluations: Vec<(&str, &Evaluation)> =
-            shown.map(|comparison| (comparison.estimator.kind(), &comparison.tried.evaluation)).collect();
+            shown.map(|comparison| (comparison.estimator.name(), &comparison.tried.evaluation)).collect();
         let what = "Median error of each estimator, from the best mean to the worst and all on one scale";
         error_map(self.setup, "Median error over the surface", what, &evaluations)
     }

@@ -7,6 +7,7 @@ use super::maps::error_map;
 use super::numbers::{counted, listed, mm, number, stretch, whole};
 use super::page::{Figure, Page, ReportFile, Section, Table, text};
 use super::{Axis, Chart, Marker, Series};
+use palpate_estimators::description;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{
     ErrorSummary, Evaluation, Located, Portion, Quantiles, percentage_error,
@@ -321,6 +322,7 @@ fn locator_facts(locator: &Locator) -> Vec<(&'static str, Markup)> {
     });
     let fitted_to = &locator.provenance.recording;
     let mut facts = vec![("estimator", text(locator.kind()))];
+    facts.extend(description::choice(&locator.provenance.choice).map(|words| ("choice", text(words))));
     facts.extend(training);
     facts.extend([
         (

@@ -11,7 +11,7 @@ use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
 use crate::tare::{TareOption, tare_splits};
 use crate::target::{Inputs, TargetFolder};
 use crate::{input, output, progress, tables};
-use palpate_estimators::estimator::{self, CompareOptions, Compared, Comparison, contenders};
+use palpate_estimators::estimator::{self, CompareOptions, Compared, Comparison, Estimator, contenders};
 use palpate_estimators::evaluation::{Evaluation, ForceSummary, Split, limit_ratio, percentage_error};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Progress, Watch};
@@ -126,7 +126,7 @@ fn errors_table(comment: &str, comparisons: &[Comparison], extent: Extent) -> Cs
         for (position, evaluation) in tried.evaluation.by_position() {
             let position = tables::position_cells(position, extent);
             table.row(
-                [vec![estimator.kind().to_owned()], position, tables::error_cells(&evaluation)].concat(),
+                [vec![estimator.name().to_owned()], position, tables::error_cells(&evaluation)].concat(),
             );
         }
     }
@@ -146,7 +146,7 @@ fn trials_table(comment: &str, comparisons: &[Comparison], trials: &[Split]) -> 
             let (own, others) = rest.split_at(count.min(rest.len()));
             rest = others;
             let evaluation = Evaluation { extent: *extent, located: own.to_vec() };
-            let head = vec![estimator.kind().to_owned(), number.to_string()];
+            let head = vec![estimator.name().to_owned(), number.to_string()];
             table.row([head, tables::error_cells(&evaluation)].concat());
         }
     }
@@ -196,13 +196,16 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
 fn compare(arguments: &Arguments, rig: &Rig, trials: &[Split]) -> Result<Compared, Failure> {
     let rows = trials.first().map_or(0, |trial| trial.training.rows.len());
     let mut contenders = contenders(&rig.setup, &rig.estimator, rows);
-    let known: Vec<&str> = contenders.iter().map(|contender| contender.kind()).collect();
-    if let Some(unknown) = arguments.only.iter().find(|kind| !known.contains(&kind.as_str())) {
+    let mut known: Vec<&str> = contenders.iter().map(|contender| contender.kind()).collect();
+    known.dedup();
+    let is_named = |contender: &Estimator, only: &str| [contender.kind(), contender.name()].contains(&only);
+    let suits = |only: &&String| contenders.iter().any(|contender| is_named(contender, only));
+    if let Some(unknown) = arguments.only.iter().find(|only| !suits(only)) {
         let complaint = Complaint::new(format!("--only {unknown}: no estimator of this kind suits the rig"));
         return Err(complaint.help(format!("it can be: {}", known.join(", "))).into());
     }
     contenders.retain(|contender| {
-        arguments.only.is_empty() || arguments.only.iter().any(|kind| kind == contender.kind())
+        arguments.only.is_empty() || arguments.only.iter().any(|only| is_named(contender, only))
     });
     // Alone it is refused; among others it is left out.
     if let ([only], Some(trial)) = (&contenders[..], trials.first()) {
@@ -237,7 +240,7 @@ fn json_row(rig: &Rig, comparison: &Comparison, arguments: &Arguments) -> Option
     let evaluation = &comparison.tried.evaluation;
     let summary = evaluation.summary(None)?;
     Some(object! {
-        "name": comparison.estimator.kind(),
+        "name": comparison.estimator.name(),
         "error_mm": ErrorFigures::new(&summary, |error_m| error_m * 1e3),
         "error_percent": percentage_error(summary.average_m, evaluation.extent.length_m()),
         "effective_percent": evaluation.effective_percent(arguments.tolerance),
@@ -259,7 +262,7 @@ fn table(rig: &Rig, comparisons: &[Comparison], arguments: &Arguments) -> String
     let or_dash = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
     let has_forces = comparisons.iter().any(|of| of.tried.evaluation.force_summary().is_some());
     let table = Table::from_rows(rows)
-        .column("error, mm (% of length)", |(comparison, ..)| comparison.estimator.kind().to_owned())
+        .column("error, mm (% of length)", |(comparison, ..)| comparison.estimator.name().to_owned())
         .column("mean", |(_, evaluation, summary)| {
             let percent = percentage_error(summary.average_m, evaluation.extent.length_m());
             format!("{:.4} ({percent:.4})", summary.average_m * 1e3)

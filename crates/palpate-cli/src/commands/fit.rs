@@ -17,6 +17,7 @@ use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
 use palpate_mechanics::units::{format_count, format_length_mm};
 use palpate_rig::Rig;
+use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -59,13 +60,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let cost = cost(&rig, &recording, arguments);
     arguments.memory.check(&rig.estimator, cost, &rig.setup, &recording)?;
-    let rig = decided(rig, &recording, arguments)?;
+    let (rig, choice) = decided(rig, &recording, arguments)?;
     let needed = rig.estimator.positions_needed();
     recording.check_distinct_positions(needed).map_err(Complaint::new)?;
     let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
-    let locator = Observer::of_rounds(rig.estimator.most_rounds())
+    let mut locator = Observer::of_rounds(rig.estimator.most_rounds())
         .watch(|watch| rig.estimator.fit_task(task.watch(watch)))
         .map_err(|error| Failure::from_error(&error))?;
+    locator.provenance.choice = choice;
     let training = locator.training_outcome();
     if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) = training {
         let epochs = format_count(u64::from(epochs));
@@ -85,6 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "rows": recording.rows.len(),
             "training"?: training,
             "interval_check": locator.interval_check,
+            "choice"?: choice_json(&locator.provenance.choice),
             "learnt"?: learnt.map(|(linear, names)| learnt::json(linear, &names)),
         });
     }
@@ -114,10 +117,10 @@ fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
     FitCost { seconds: choice + chosen.seconds, ..cost }
 }
 
-/// The rig with its estimator chosen by cross-validation where it is `auto`, saying why.
-fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result<Rig, Failure> {
+/// The rig with the estimator that cross-validation chooses where it is `auto`, and the estimators that were tried.
+fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result<(Rig, Vec<Tried>), Failure> {
     if rig.estimator != Estimator::Auto {
-        return Ok(rig);
+        return Ok((rig, Vec::new()));
     }
     let start = Instant::now();
     let clock = || start.elapsed().as_secs_f64();
@@ -131,19 +134,32 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     }
     remark!(
         "auto: {}, with the least mean error × interval score at positions held out ({CHOICE_FOLDS} folds)",
-        choice.best.kind()
+        choice.best.name()
     );
-    remark!("{:<20} {:>12} {:>20} {:>14}", "", "mean error", "score of 95 %", "95 % covers");
-    for Tried { kind, mean_error_m, interval_score_m, coverage_percent } in &choice.tried {
+    remark!("{:<24} {:>12} {:>20} {:>14}", "", "mean error", "score of 95 %", "95 % covers");
+    for Tried { name, mean_error_m, interval_score_m, coverage_percent } in &choice.tried {
         let covers = coverage_percent.map_or_else(|| "–".to_owned(), |percent| format!("{percent:.1} %"));
         let [error, score] = [mean_error_m, interval_score_m].map(|length_m| format_length_mm(*length_m));
-        remark!("{kind:<20} {error:>12} {score:>20} {covers:>14}");
+        remark!("{name:<24} {error:>12} {score:>20} {covers:>14}");
     }
-    for (kind, reason) in &choice.left_out {
-        remark!("{kind:<20} left out: {reason}");
+    for (name, reason) in &choice.left_out {
+        remark!("{name:<24} left out: {reason}");
     }
     rig.estimator = choice.best;
-    Ok(rig)
+    Ok((rig, choice.tried))
+}
+
+/// The estimators that `auto` tried, best first; `None` for an estimator that the rig names.
+fn choice_json(tried: &[Tried]) -> Option<Vec<impl Serialize>> {
+    let one = |tried: &Tried| {
+        object! {
+            "estimator": tried.name.clone(),
+            "mean_error_mm": tried.mean_error_m * 1e3,
+            "interval_score_mm": tried.interval_score_m * 1e3,
+            "coverage_95": tried.coverage_percent,
+        }
+    };
+    (!tried.is_empty()).then(|| tried.iter().map(one).collect())
 }
 
 fn in_words(outcome: TrainingOutcome) -> String {

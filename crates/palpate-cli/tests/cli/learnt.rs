@@ -109,3 +109,19 @@ fn the_structure_that_was_taken_is_said_with_its_reason() {
     let said: Vec<String> = ["auto", "force-linear", "force-monotone", "free"].map(said_of).to_vec();
     insta::assert_snapshot!(said.join("\n"));
 }
+
+#[test]
+fn structures_are_compared_as_estimators_of_their_own() {
+    let (folder, mut board) = (folder(RIG), Board::new(3));
+    fs::write(folder.path().join("presses.csv"), board.calibration(60)).unwrap();
+    let names = |only: &str| -> Vec<String> {
+        let compare = ["compare", "rig.toml", "--data", "presses.csv", "--json", "--only", only];
+        let found: serde_json::Value = serde_json::from_str(&said(&run(folder.path(), &compare))).unwrap();
+        let rows = found["estimators"].as_array().unwrap().iter();
+        rows.map(|row| row["name"].as_str().unwrap().to_owned()).collect()
+    };
+    let mut all = names("influence");
+    all.sort();
+    assert_eq!(all, ["influence force-linear", "influence force-monotone", "influence free"]);
+    assert_eq!(names("influence free"), ["influence free"]);
+}

@@ -2,12 +2,12 @@
 
 use super::learnt::learnt;
 use crate::centroid::Weighing;
-use crate::estimator::{Locator, Method};
+use crate::estimator::{Locator, Method, Tried};
 use crate::influence::InfluenceLocator;
 use crate::influence::measured::{MeasuredLocator, NuisanceRole};
 use crate::interval_check::{Coverage, IntervalCheck};
 use crate::network::Topology;
-use palpate_mechanics::units::format_count;
+use palpate_mechanics::units::{format_count, format_length_mm};
 use palpate_numerics::FEWEST_FOR_95;
 
 /// A locator: its setup, what it learnt, how its estimates are checked, and the recording that it was fitted to.
@@ -20,6 +20,7 @@ pub fn locator(locator: &Locator) -> Vec<String> {
         provenance.seed
     )];
     lines.extend(super::setup(&locator.setup));
+    lines.extend(choice(&provenance.choice));
     lines.extend(method(locator));
     if let Some(check) = &locator.check {
         lines.push(if check.keeps_intervals() {
@@ -50,6 +51,25 @@ pub fn locator(locator: &Locator) -> Vec<String> {
         lines.push(format!("    sha256 {digest}"));
     }
     lines
+}
+
+/// The choice of `auto`: the estimator, and by how much it is better than the next one.
+pub fn choice(tried: &[Tried]) -> Option<String> {
+    let figures = |one: &Tried| {
+        let [error, score] = [one.mean_error_m, one.interval_score_m].map(format_length_mm);
+        format!("{} (mean error {error}, interval score {score})", one.name)
+    };
+    let (best, others) = tried.split_first()?;
+    let Some(next) = others.first() else {
+        return Some(format!("chosen by `auto`: {}, the only one that suits", figures(best)));
+    };
+    let percent = 100.0 * (1.0 - best.score_m() / next.score_m());
+    let behind: Vec<String> = others.iter().map(figures).collect();
+    Some(format!(
+        "chosen by `auto`: {}, {percent:.0} % better at held-out positions than {}",
+        figures(best),
+        behind.join(", ")
+    ))
 }
 
 /// The check of a locator's 95 % intervals at held-out places.

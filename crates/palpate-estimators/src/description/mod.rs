@@ -4,7 +4,7 @@ mod learnt;
 mod locator;
 
 pub use learnt::{learnt, learnt_summary, noise_is_hardly_told};
-pub use locator::{interval_check, locator};
+pub use locator::{choice, interval_check, locator};
 
 use crate::arrangement::{Arrangement, Training};
 use crate::recording::Recording;

@@ -22,7 +22,7 @@ fn estimators_that_are_not_done_in_time_are_stopped_and_left_out() {
     let task = FitTask::new(&bench.setup, &recording).watch(Watch::new(&observe));
     let choice = choose(task, Some(limit)).unwrap();
     // Fits that are done before they are watched at all need no stopping.
-    assert!(choice.tried.iter().any(|tried| tried.kind == "influence"), "{:?}", choice.tried);
+    assert!(choice.tried.iter().any(|tried| tried.name == "influence"), "{:?}", choice.tried);
     assert_eq!(choice.tried.len() + choice.left_out.len(), Estimator::contenders(&bench.setup).len());
     for kind in ["network", "network-lm", "gaussian-process"] {
         assert!(choice.left_out.contains(&(kind, NOT_IN_TIME.to_owned())), "{kind}: {:?}", choice.left_out);

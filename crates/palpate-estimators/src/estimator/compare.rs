@@ -3,6 +3,7 @@
 use super::trial_splits::TrialSplits;
 use super::{Estimator, FitCost};
 use crate::evaluation::{Split, TimedEvaluation};
+use crate::influence::{Influence, Structure};
 use crate::setup::Setup;
 use palpate_numerics::watch::{Cancelled, Watch};
 
@@ -22,8 +23,14 @@ pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator>
     const MOST_PRESENTATIONS: usize = 20_000_000;
     let mut contenders = Estimator::contenders(setup);
     for contender in &mut contenders {
-        if contender.kind() == own.kind() {
-            *contender = own.clone();
+        match (&*contender, own) {
+            (Estimator::Influence(Influence { structure, .. }), Estimator::Influence(own))
+                if *structure != Structure::Auto =>
+            {
+                *contender = Estimator::Influence(Influence { structure: *structure, ..*own });
+            }
+            _ if contender.kind() == own.kind() => *contender = own.clone(),
+            _ => {}
         }
         if let Estimator::Network(config) = contender {
             let most = u32::try_from(MOST_PRESENTATIONS / rows.max(1)).unwrap_or(u32::MAX).max(1);
@@ -42,7 +49,7 @@ pub struct CompareOptions<'a> {
     pub clock: &'a dyn Fn() -> f64,
     /// Reason why an estimator of this cost is not fitted; `None` where it is.
     pub refuse: &'a dyn Fn(&Estimator, FitCost) -> Option<String>,
-    /// Watch over the comparison, which is told the kind of estimator that is tried and how many have been.
+    /// Watch over the comparison, which receives the name of the estimator that is tried and the number of those done.
     pub watch: Watch<'a>,
 }
 
@@ -51,7 +58,7 @@ pub struct CompareOptions<'a> {
 pub struct Compared {
     /// Estimators that were tried, by rising mean error.
     pub comparisons: Vec<Comparison>,
-    /// Kinds that were not, with the reason.
+    /// Names of those that were not, with the reason.
     pub left_out: Vec<(&'static str, String)>,
 }
 
@@ -86,19 +93,19 @@ pub fn compare(
     let of = contenders.len();
     let splits = TrialSplits::new(setup, trials, options.seed, options.clock);
     for (done, estimator) in contenders.into_iter().enumerate() {
-        let kind = estimator.kind();
-        let observe = || options.watch.counted(kind, "estimators", done, of);
+        let name = estimator.name();
+        let observe = || options.watch.counted(name, "estimators", done, of);
         observe()?;
         let cost = trials.first().map(|trial| estimator.fit_cost(setup, &trial.training));
         if let Some(why) = cost.and_then(|cost| (options.refuse)(&estimator, cost)) {
-            compared.left_out.push((kind, why));
+            compared.left_out.push((name, why));
             continue;
         }
         let go_on = |_| observe().is_ok();
         match splits.evaluate(&estimator, Watch::new(&go_on)) {
             Ok(tried) => compared.comparisons.push(Comparison { estimator, tried }),
             Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
-            Err(error) => compared.left_out.push((kind, error.to_string())),
+            Err(error) => compared.left_out.push((name, error.to_string())),
         }
     }
     let mean_m = |comparison: &Comparison| {

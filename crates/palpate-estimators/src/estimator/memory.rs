@@ -79,7 +79,8 @@ impl MemoryLimit {
         let suits = |other: &&Estimator| {
             other.kind() != refused.kind() && self.check_fit(other, other.fit_cost(setup, recording)).is_ok()
         };
-        let kinds: Vec<&str> = others.iter().filter(suits).map(Estimator::kind).collect();
+        let mut kinds: Vec<&str> = others.iter().filter(suits).map(Estimator::kind).collect();
+        kinds.dedup();
         match kinds[..] {
             [] => "raise the limit, or leave rows out".into(),
             _ => {

@@ -20,6 +20,7 @@ pub use cost::FitCost;
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
 pub use memory::{MemoryExceeded, MemoryLimit, MemoryLimitError, Size};
 pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Tare, TareError, Uncertainty};
+pub use crate::tried::Tried;
 pub use settings::Setting;
 
 use std::borrow::Cow;
@@ -37,7 +38,7 @@ use crate::fit::{
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{
     BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, InfluencesAtNodes,
-    PlateLikelihood,
+    PlateLikelihood, Structure,
 };
 use crate::likelihood::Likelihood;
 use crate::load_profile::LoadChannel;
@@ -128,7 +129,12 @@ macro_rules! estimators {
             fn fit_task(&self, task: FitTask) -> Result<Locator, FitError> {
                 match self {
                     // The folds of the check need no choice of their own.
-                    Self::Auto => choose(task, None)?.best.fit_task(task),
+                    Self::Auto => {
+                        let Choice { best, tried, .. } = choose(task, None)?;
+                        let mut locator = best.fit_task(task)?;
+                        locator.provenance.choice = tried;
+                        Ok(locator)
+                    }
                     _ => fit_with_interval_check(self, task),
                 }
             }
@@ -241,12 +247,29 @@ impl Estimator {
         }
     }
 
-    /// Every method that can be asked to locate on a bench, each with its default settings, the best guess first.
+    /// Name in comparisons: the kind, and with it the structure that an influence estimator states.
+    pub fn name(&self) -> &'static str {
+        let Self::Influence(Influence { structure, .. }) = self else { return self.kind() };
+        match structure {
+            Structure::Auto => self.kind(),
+            Structure::ForceLinear => "influence force-linear",
+            Structure::ForceMonotone => "influence force-monotone",
+            Structure::Free => "influence free",
+        }
+    }
+
+    /// Every method that can locate on a bench, each with its default settings, the best guess first. On a surface without a model each structure of
+    /// the readings is a method of its own.
     pub fn contenders(setup: &Setup) -> Vec<Self> {
-        let mut contenders = vec![
-            Self::Influence(Influence::default()),
-            Self::GaussianProcess(GaussianProcessEstimator::default()),
-        ];
+        let structures: &[Structure] = match setup.surface().model() {
+            Some(_) => &[Structure::Auto],
+            None => &[Structure::ForceLinear, Structure::ForceMonotone, Structure::Free],
+        };
+        let with = |structure: &Structure| {
+            Self::Influence(Influence { structure: *structure, ..Influence::default() })
+        };
+        let mut contenders: Vec<Self> = structures.iter().map(with).collect();
+        contenders.push(Self::GaussianProcess(GaussianProcessEstimator::default()));
         if matches!(setup.surface(), SurfaceSpec::Beam(_)) {
             contenders.push(Self::ClosedForm(ClosedForm::default()));
         }
@@ -576,39 +599,20 @@ pub struct Choice {
     pub best: Estimator,
     /// Estimators that were tried, best first.
     pub tried: Vec<Tried>,
-    /// Kinds that were not, with the reason.
+    /// Names of those that were not, with the reason.
     pub left_out: Vec<(&'static str, String)>,
     /// Greatest change of each channel by the drift that was taken off the readings held out; nothing where the presses tell none.
     pub drift: Option<Vec<f64>>,
 }
 
-/// Errors and intervals of an estimator at positions held out.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tried {
-    /// Its kind.
-    pub kind: &'static str,
-    /// Mean error in metres.
-    pub mean_error_m: f64,
-    /// Mean score of its 95 % intervals in metres: [`Evaluation::interval_score_m`].
-    pub interval_score_m: f64,
-    /// Share of its 95 % regions that hold the contact, in %, where it has them.
-    pub coverage_percent: Option<f64>,
-}
-
-impl Tried {
-    /// Geometric mean of mean error and interval score in metres: an estimator must be near and know how near.
-    pub fn score_m(&self) -> f64 {
-        (self.mean_error_m * self.interval_score_m).sqrt()
-    }
-
-    fn of_evaluation(kind: &'static str, evaluation: &Evaluation) -> Option<Self> {
-        Some(Self {
-            kind,
-            mean_error_m: evaluation.summary(None)?.average_m,
-            interval_score_m: evaluation.interval_score_m()?,
-            coverage_percent: evaluation.coverage_percent(),
-        })
-    }
+/// Figures of an estimator that was tried; `None` without intervals.
+fn figures(name: &str, evaluation: &Evaluation) -> Option<Tried> {
+    Some(Tried {
+        name: name.to_owned(),
+        mean_error_m: evaluation.summary(None)?.average_m,
+        interval_score_m: evaluation.interval_score_m()?,
+        coverage_percent: evaluation.coverage_percent(),
+    })
 }
 
 /// The time that the choice of an estimator may take.
@@ -688,23 +692,23 @@ pub fn choose(task: FitTask, limit: Option<TimeLimit>) -> Result<Choice, FitErro
     let count = contenders.len();
     let trials = TrialSplits::new(setup, &splits, seed, &|| 0.0);
     for (done, estimator) in contenders.into_iter().enumerate() {
-        let kind = estimator.kind();
+        let name = estimator.name();
         watch.counted("trying estimators", "estimators", done, count)?;
         match trials.evaluate(&estimator, limited) {
             Ok(one) => {
-                if let Some(outcome) = Tried::of_evaluation(kind, &one.evaluation) {
+                if let Some(outcome) = figures(name, &one.evaluation) {
                     tried.push((estimator, outcome));
                 }
             }
             Err(error) if Cancelled::caused(&error) => {
-                let why = stopped(Some(kind));
+                let why = stopped(Some(name));
                 if tried.is_empty() || matches!(why, FitError::Cancelled(_)) {
                     return Err(why);
                 }
-                left_out.push((kind, NOT_IN_TIME.to_owned()));
+                left_out.push((name, NOT_IN_TIME.to_owned()));
             }
             Err(error) => {
-                left_out.push((kind, error.to_string()));
+                left_out.push((name, error.to_string()));
                 last = Some(error);
             }
         }
