@@ -235,6 +235,7 @@ impl Readings {
         let mut columns: Columns = setup.recording_columns();
         if no_header {
             columns.header = Header::Absent;
+            columns.time = None;
             for (i, channel) in columns.channels.iter_mut().enumerate() {
                 channel.column = Column::Number(i + 1);
             }
@@ -251,6 +252,11 @@ impl Readings {
             }
         }
         Ok(None)
+    }
+
+    /// Time of the last reading in seconds, where the source has times.
+    pub fn time_s(&self) -> Option<f64> {
+        self.parsing.parser.time_s()
     }
 
     /// True until the columns are known, by a header or by `--no-header`.

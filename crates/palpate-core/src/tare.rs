@@ -7,7 +7,7 @@
 mod rest;
 
 use crate::{Estimate, LARGEST_READING, Status};
-use rest::{Course, RestWatch};
+use rest::{Course, RestLength, RestWatch};
 
 /// Baseline of the channels of a surface, kept in arrays, vectors or slices `B` of the caller's.
 ///
@@ -33,6 +33,8 @@ pub struct Tare<B> {
     /// Time of the reading before and mean interval between readings, in seconds, of readings that have times.
     clock: Option<Clock>,
     zero: Zero,
+    /// Mean of the untouched readings of the last moment, and the time of the first of them, where [`Zero::Last`] will take it.
+    moment: Option<(Baseline<B>, f64)>,
     current: Baseline<B>,
     /// True for a baseline that is known to be that of the untouched surface.
     is_confirmed: bool,
@@ -65,6 +67,8 @@ enum Zero {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Clock {
     last_s: f64,
+    /// Time since the reading before the last one.
+    step_s: f64,
     interval_s: f64,
     /// Intervals of the mean, at most a time constant.
     intervals: u32,
@@ -136,6 +140,9 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     pub const SETTLED: u32 = 20;
     /// Time over which a followed baseline forgets, in seconds, where readings have times ([`Tare::note_time`]).
     pub const TIME_CONSTANT_S: f64 = 10.0;
+    /// Time in seconds over which untouched readings are averaged for [`Tare::with_last_zero`]: longer than a touch takes to build up, so that
+    /// the baseline does not follow it.
+    pub const MOMENT_S: f64 = 1.0;
     /// Readings over which a followed baseline forgets where readings have no times: [`Tare::TIME_CONSTANT_S`] at 100 readings a second.
     pub const TIME_CONSTANT: u32 = 1000;
 
@@ -158,7 +165,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     }
 
     /// A tare whose followed baseline is the latest untouched reading, for calibrations whose presses are less the untouched reading before
-    /// each.
+    /// each. Of readings with times it is the mean over the last [`Tare::MOMENT_S`].
     #[must_use]
     pub fn with_last_zero(self) -> Self {
         Self { zero: Zero::Last, ..self }
@@ -168,15 +175,17 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// rate of the readings, but over no fewer than [`Tare::SETTLED`] readings. A time that is not later than the one before starts the clock
     /// anew.
     ///
-    /// Counts that remain readings are those that the noise of single readings asks for: [`Tare::SETTLED`] and [`Tare::LET_GO`].
+    /// The rest after a touch lasts seconds too. Counts that remain readings are those that the noise of single readings asks for:
+    /// [`Tare::SETTLED`] and [`Tare::LET_GO`].
     pub fn note_time(&mut self, time_s: f64) {
-        let new = Clock { last_s: time_s, interval_s: 0.0, intervals: 0 };
+        let new = Clock { last_s: time_s, step_s: f64::INFINITY, interval_s: 0.0, intervals: 0 };
         let Some(mut clock) = self.clock.filter(|clock| time_s > clock.last_s) else {
             self.clock = time_s.is_finite().then_some(new);
             return;
         };
+        clock.step_s = time_s - clock.last_s;
         clock.intervals = clock.intervals.saturating_add(1).min(self.time_constant);
-        clock.interval_s += (time_s - clock.last_s - clock.interval_s) / f64::from(clock.intervals);
+        clock.interval_s += (clock.step_s - clock.interval_s) / f64::from(clock.intervals);
         clock.last_s = time_s;
         self.clock = clock.interval_s.is_finite().then_some(clock);
         // The conversion saturates.
@@ -214,6 +223,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             time_constant: Self::TIME_CONSTANT,
             clock: None,
             zero: Zero::Followed,
+            moment: None,
             is_confirmed: false,
             other: None,
             strange: 0,
@@ -315,7 +325,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         }
         let course =
             match self.takes_rests && self.current.weight >= Self::SETTLED && self.is_possible(reading) {
-                true => self.rest.add(reading, self.current.values.as_ref(), status, self.time_constant),
+                true => self.add_to_rest(reading, status),
                 false => Course::Steady,
             };
         if course == Course::AtRest {
@@ -328,6 +338,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             (self.let_go, self.as_learnt, self.strange) = (0, 0, 0);
         }
         if status == Status::OutsideModel {
+            self.moment = None;
             if course == Course::AtRest {
                 return Ok(estimate);
             }
@@ -350,8 +361,10 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         if status == Status::NoContact && course == Course::Steady {
             match self.zero {
                 Zero::Followed => self.current.follow(reading, self.time_constant),
-                Zero::Last => self.current.put_to(reading, 1),
+                Zero::Last => self.take_last(reading),
             }
+        } else {
+            self.moment = None;
         }
         self.current.count(status);
         if !self.is_confirmed && self.current.saw_a_whole_touch() {
@@ -359,6 +372,34 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             self.other = None;
         }
         Ok(estimate)
+    }
+
+    fn add_to_rest(&mut self, reading: &[f64], status: Status) -> Course {
+        let length = match self.clock {
+            Some(Clock { intervals: 1.., interval_s, .. }) => RestLength::of_interval(interval_s),
+            _ => RestLength::COUNTED,
+        };
+        self.rest.add(reading, self.current.values.as_ref(), status, self.time_constant, length)
+    }
+
+    /// Takes the mean of the untouched readings of a moment of [`Tare::MOMENT_S`] for the baseline once it is over; a reading that is as long after the one
+    /// before it, or has no time, is a moment by itself. A touch ends the moment, so that its slow beginning is not taken.
+    fn take_last(&mut self, reading: &[f64]) {
+        if self.current.weight < Self::SETTLED {
+            self.current.average(reading, Self::SETTLED);
+        }
+        let Some(clock) = self.clock else {
+            self.current.put_to(reading, 1);
+            return;
+        };
+        let learnt = &self.learnt;
+        let (mean, since_s) =
+            self.moment.get_or_insert_with(|| (Baseline::new(learnt.clone(), 0), clock.last_s));
+        mean.average(reading, u32::MAX);
+        if clock.step_s.max(clock.last_s - *since_s) >= Self::MOMENT_S {
+            self.current.put_to(mean.values.as_ref(), mean.weight);
+            self.moment = None;
+        }
     }
 
     /// Compares other baselines by a reading that is `outside_model` by a settled one, `tared` by it.
@@ -662,6 +703,26 @@ mod tests {
             assert_eq!(tare.baseline(), untouched);
             assert_eq!(follow(&mut tare, reading(i, moved, 1.5, 0.3)).status, Status::Located, "{i}");
             assert_eq!(tare.baseline(), untouched);
+        }
+    }
+
+    #[test]
+    fn a_slow_touch_does_not_go_into_the_baseline_of_a_fast_board() {
+        // The force grows from 0 to 1.5 within 0.8 s at 1,000 readings a second, after rests of several lengths.
+        for is_last in [false, true] {
+            for rest in [1500_u32, 1700, 1950, 2300] {
+                let tare = Tare::new(LEARNT).unwrap();
+                let mut tare = if is_last { tare.with_last_zero() } else { tare };
+                for i in 0..rest + 1500 {
+                    tare.note_time(f64::from(i) * 1e-3);
+                    let force = 1.5 * f64::from(i.saturating_sub(rest).min(800)) / 800.0;
+                    follow(&mut tare, reading(i, MOVED, force, 0.3));
+                }
+                // The baseline is off by less than a touch that the locator detects.
+                let errors = (0..4).map(|c| tare.baseline()[c] - LEARNT[c] - MOVED[c]);
+                let square: f64 = errors.map(|error| error * error).sum();
+                assert!(square < 20.0, "{is_last}, {rest}: {square}");
+            }
         }
     }
 

@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         Follower::Filter(Tracker::new(tracking.likelihood(), config))
     };
-    let taring = Taring::new(&arguments.tare, &locator, false)?;
+    let taring = Taring::new(&arguments.tare.in_use(&locator), &locator, false)?;
     let records = if arguments.json { Records::Json } else { Records::None };
     let mut stream = Stream {
         arguments,
@@ -198,8 +198,15 @@ impl Stream<'_> {
         let rate_s = |rate_hz: f64| self.times as f64 / rate_hz;
         let time_s = reading.time_s.or(self.arguments.rate.map(rate_s)).unwrap_or(0.0);
         self.times += 1;
-        match self.taring.as_mut().map_or(Ok(Taken::Tared), |taring| taring.take(&mut reading.reading)) {
-            Ok(Taken::Tared) => {}
+        let taken = match &mut self.taring {
+            None => Ok(Taken::Tared),
+            Some(taring) => {
+                let has_time = reading.time_s.is_some() || self.arguments.rate.is_some();
+                taring.take(&mut reading.reading, has_time.then_some(time_s))
+            }
+        };
+        match taken {
+            Ok(Taken::Tared | Taken::Located(_)) => {}
             Ok(Taken::Baseline) => return Ok(()),
             Err(error) => return self.lines.lose(&error),
         }

@@ -48,7 +48,7 @@ use crate::network::{
 };
 use crate::offset_course::OffsetCourse;
 use crate::reading_check::ReadingCheck;
-use crate::recording::Recording;
+use crate::recording::{Recording, Zero};
 use crate::setup::{Setup, SetupError};
 use crate::status::FalseAlarmRate;
 
@@ -439,7 +439,8 @@ impl Locator {
         known.ok_or(NoBaseline { kind: self.kind() })
     }
 
-    /// A tare of its readings, whose baseline is as calibration left it.
+    /// A tare of its readings, whose baseline is as calibration left it. Followed, it takes the latest untouched reading where the calibration
+    /// did ([`Zero::Last`]).
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, fit::Fit, influence::Influence, setup::Setup};
@@ -463,7 +464,11 @@ impl Locator {
     /// # Errors
     /// [`NoBaseline`] where calibration does not tell what the surface reads untouched.
     pub fn tare(&self) -> Result<Tare<Vec<f64>>, NoBaseline> {
-        let tare = Tare::new(self.untouched_reading()?);
+        let tare =
+            Tare::new(self.untouched_reading()?).map(|tare| match self.setup.recording_columns().zero {
+                Zero::None => tare,
+                Zero::Last => tare.with_last_zero(),
+            });
         let tare = match &self.untouched_drift {
             Some(drift) => {
                 tare.and_then(|tare| tare.with_drift(drift.last.clone(), drift.reach(self.layout())))
