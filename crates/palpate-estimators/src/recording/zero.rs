@@ -1,7 +1,6 @@
 //! Readings less the untouched reading before them.
 
 use super::Recording;
-use palpate_numerics::mean;
 use serde::{Deserialize, Serialize};
 
 /// Zero of a recording's readings.
@@ -28,8 +27,8 @@ impl Zero {
 pub struct NoUntouchedRow;
 
 impl Recording {
-    /// The recording with each reading less the latest untouched reading before it, plus the mean m of all untouched readings: r − u + m. Rows before
-    /// the first untouched row are less that one. Rows follow each other by their times, or in their order where some have none.
+    /// The recording with each reading less the latest untouched reading before it. Rows before the first untouched row are less that one. Rows follow
+    /// each other by their times, or in their order where some have none.
     ///
     /// An untouched row is less the untouched row before it, so that untouched rows scatter as those of a tare by the latest reading do.
     ///
@@ -44,19 +43,12 @@ impl Recording {
         if let Some(times_s) = self.times_s() {
             order.sort_by(|a, b| times_s[*a].total_cmp(&times_s[*b]));
         }
-        let is_untouched = |i: &&usize| !self.rows[**i].touches();
-        let first = *order.iter().find(is_untouched).ok_or(NoUntouchedRow)?;
-        let untouched: Vec<&[f64]> =
-            order.iter().filter(is_untouched).map(|i| self.rows[*i].reading.as_slice()).collect();
-        let channels = 0..self.rows[first].reading.len();
-        let means: Vec<f64> = channels.map(|c| mean(untouched.iter().map(|reading| reading[c]))).collect();
-        let mut last = self.rows[first].reading.clone();
+        let first = order.iter().find(|i| !self.rows[**i].touches()).ok_or(NoUntouchedRow)?;
+        let mut last = self.rows[*first].reading.clone();
         for i in order {
             let row = &mut self.rows[i];
             let recorded = row.reading.clone();
-            for (value, (zero, mean)) in row.reading.iter_mut().zip(last.iter().zip(&means)) {
-                *value += mean - zero;
-            }
+            row.reading.iter_mut().zip(&last).for_each(|(value, zero)| *value -= zero);
             if !row.touches() {
                 last = recorded;
             }
@@ -91,17 +83,16 @@ mod tests {
 
     #[test]
     fn subtracts_the_latest_untouched_reading_before_each_row() {
-        // The mean of the untouched readings is 4.
         let rows =
             [(None, 1.0, 11.0), (None, 0.0, 2.0), (None, 1.0, 12.0), (None, 0.0, 6.0), (None, 1.0, 17.0)];
-        assert_eq!(zeroed(&rows), [13.0, 4.0, 14.0, 8.0, 15.0]);
+        assert_eq!(zeroed(&rows), [9.0, 0.0, 10.0, 4.0, 11.0]);
     }
 
     #[test]
     fn follows_times_where_all_rows_have_them() {
         let rows =
             [(Some(3.0), 1.0, 17.0), (Some(2.0), 0.0, 6.0), (Some(1.0), 1.0, 12.0), (Some(0.0), 0.0, 2.0)];
-        assert_eq!(zeroed(&rows), [15.0, 8.0, 14.0, 4.0]);
+        assert_eq!(zeroed(&rows), [11.0, 4.0, 10.0, 0.0]);
     }
 
     #[test]
