@@ -172,14 +172,14 @@ impl FromStr for Source {
 }
 
 /// Use of a reading by the tare.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Taken {
     /// One of those that make the baseline: it is not located.
     Baseline,
     /// One that has been tared.
     Tared,
     /// One that has been tared, with its estimate by the tare that follows the baseline.
-    Located(Estimate),
+    Located(Box<Estimate>),
 }
 
 /// A reading that the tare cannot use.
@@ -303,7 +303,7 @@ impl<'a> Taring<'a> {
                 let estimate = self.locator.locate_following(&mut self.tare, reading, &mut self.tared)?;
                 self.count += u64::from(estimate.status == Status::NoContact);
                 self.unexplained += u64::from(estimate.status == Status::OutsideModel);
-                Taken::Located(estimate)
+                Taken::Located(Box::new(estimate))
             }
         };
         reading.copy_from_slice(&self.tared);

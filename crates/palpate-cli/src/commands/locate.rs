@@ -104,7 +104,7 @@ fn locate(
 ) -> Result<Option<Estimate>, Box<dyn Error>> {
     match taring.map(|taring| taring.take(reading, time_s)).transpose()? {
         Some(Taken::Baseline) => Ok(None),
-        Some(Taken::Located(estimate)) => Ok(Some(estimate)),
+        Some(Taken::Located(estimate)) => Ok(Some(*estimate)),
         Some(Taken::Tared) | None => Ok(Some(locator.locate(reading)?)),
     }
 }
