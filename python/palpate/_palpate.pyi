@@ -273,7 +273,7 @@ class Locator:
         recording: Recording | None = None,
         *,
         seed: int = 0,
-        tare: Literal["auto"] | int | npt.ArrayLike | None = None,
+        tare: Literal["auto", "last"] | int | npt.ArrayLike | None = None,
         progress: Progress = None,
     ) -> Evaluation: ...
     def load_profile(

@@ -72,7 +72,7 @@ pub fn tare<'py>(
     })
 }
 
-/// A recording with its readings tared: by those that are found untouched ("auto"), by so many of the first rows, which are left out, or by
+/// A recording with its readings tared: by those that are found untouched ("auto"), by the latest of them ("last"), by so many of the first rows, which are left out, or by
 /// untouched readings.
 ///
 /// # Errors
@@ -88,7 +88,10 @@ pub fn tared_recording(
     let mut tared = recording.clone();
     let text = tare.extract::<std::borrow::Cow<'_, str>>().ok();
     let first = match (text.as_deref(), tare.extract::<usize>()) {
-        (Some("auto"), _) => {
+        (Some(followed @ ("auto" | "last")), _) => {
+            if followed == "last" {
+                taring = taring.with_last_zero();
+            }
             check_tells_untouched(
                 locator,
                 "give the number of the first untouched readings, or such readings",
@@ -99,6 +102,9 @@ pub fn tared_recording(
                     if i.is_multiple_of(READINGS_EACH) {
                         watch.round()?;
                     }
+                    if let Some(time_s) = row.time_s {
+                        taring.note_time(time_s);
+                    }
                     locator.locate_following(&mut taring, &row.reading, &mut tared.reading)?;
                 }
                 Ok::<(), Stopped>(())
@@ -107,7 +113,7 @@ pub fn tared_recording(
         }
         (Some(other), _) => {
             return Err(refused(format!(
-                "`tare` is \"{other}\"; it must be \"auto\", a number of readings, or untouched readings"
+                "`tare` is \"{other}\"; it must be \"auto\", \"last\", a number of readings, or untouched readings"
             )));
         }
         (None, Ok(0)) => return Err(refused("`tare` is 0; it must be at least 1 reading")),

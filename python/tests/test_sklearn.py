@@ -9,6 +9,7 @@ import pickle
 import numpy as np
 import pytest
 from sklearn.base import clone
+from sklearn.metrics import r2_score
 from sklearn.model_selection import GridSearchCV, cross_val_predict, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
@@ -151,6 +152,74 @@ def test_forces_and_data_frames(board):
     regressor = InfluenceRegressor(setup=setup).fit(frame[columns], board.x, force=board.force)
     assert list(regressor.feature_names_in_) == columns
     assert regressor.locate(frame[columns]).force.shape == (48,)
-    assert LevenbergMarquardtRegressor(random_state=3).get_params() == {"random_state": 3, "setup": None}
+    assert LevenbergMarquardtRegressor(random_state=3).get_params() == {
+        "random_state": 3,
+        "setup": None,
+        "target": "position",
+    }
     assert AutoRegressor()._seed() == 0 and NetworkRegressor(random_state=np.random.RandomState(1))._seed() > 0
     assert CentroidRegressor().__sklearn_tags__().regressor_tags.poor_score
+
+
+@pytest.fixture(scope="module")
+def weighed() -> tuple[np.ndarray, np.ndarray, np.ndarray, pp.Setup]:
+    """Readings, positions and forces of presses of 2 to 5 N, and the setup, whose force is unknown."""
+    setup = pp.Setup(pp.Beam("400 mm", "40 mm", "1.2 mm", "200 GPa"), pp.deflection(8, noise="0.2 um"))
+    presses = [setup.simulate(pp.even(12), force=f"{force} N", repeats=2, seed=force) for force in (2, 3, 4, 5)]
+    columns = (np.concatenate([getattr(rows, name) for rows in presses]) for name in ("readings", "x", "force"))
+    return (*columns, setup)
+
+
+def test_force_is_a_target_alone_and_beside_the_position(weighed):
+    X, x, force, setup = weighed
+    y = np.column_stack([x, force])
+    both = InfluenceRegressor(setup=setup, target="both").fit(X, y)
+    alone = InfluenceRegressor(setup=setup, target="force").fit(X, force, position=x)
+    predicted, std = both.predict(X, return_std=True)
+    assert predicted.shape == std.shape == y.shape
+    assert np.array_equal(alone.predict(X), predicted[:, 1])
+    assert np.array_equal(InfluenceRegressor(setup=setup).fit(X, x, force=force).predict(X), predicted[:, 0])
+    assert both.score(X, y) > 0.99 and np.isclose(alone.score(X, force), r2_score(force, predicted[:, 1]))
+    low, high = both.predict_interval(X)
+    assert np.all(np.mean((low <= y) & (y <= high), axis=0) > 0.85)
+    scores = cross_val_score(InfluenceRegressor(setup=setup, target="both"), X, y, cv=4)
+    assert scores.shape == (4,) and np.all(np.isfinite(scores))
+
+
+def test_force_is_beside_two_columns_of_a_plane(plate):
+    presses = plate.simulate(pp.grid(5, 4), repeats=2, seed=3)
+    y = np.column_stack([presses.positions, presses.force])
+    regressor = InfluenceRegressor(setup=plate, source="mechanics", target="both").fit(presses.readings, y)
+    assert regressor.predict(presses.readings).shape == y.shape
+
+
+def test_evaluate_gives_errors_statuses_and_interval_scores_of_other_contacts(weighed):
+    X, x, force, setup = weighed
+    y = np.column_stack([x, force])
+    regressor = InfluenceRegressor(setup=setup, target="both").fit(X[::2], y[::2])
+    evaluation = regressor.evaluate(X[1::2], y[1::2])
+    predicted = regressor.predict(X[1::2])
+    assert np.allclose(evaluation.error, np.abs(predicted[:, 0] - x[1::2]))
+    assert np.allclose(evaluation.estimated_force, predicted[:, 1])
+    assert evaluation.coverage > 0.8 and evaluation.interval_score > 0.0 and evaluation.statuses["located"] > 0.8
+    assert evaluation.force_summary()["mean"] < 0.5
+    theirs = InfluenceRegressor(setup=setup).fit(X[::2], x[::2], force=force[::2]).evaluate(
+        X[1::2], x[1::2], force=force[1::2]
+    )
+    assert np.array_equal(theirs.error, evaluation.error)
+
+
+def test_targets_that_do_not_suit_are_refused(weighed):
+    X, x, force, setup = weighed
+    for target, y, more, words in [
+        ("place", x, {}, '"position", "force" or "both"'),
+        ("both", x, {}, "one of forces"),
+        ("both", np.column_stack([x, force]), {"force": force}, "`force` is given twice"),
+        ("force", force, {}, "`position` is missing"),
+        ("force", np.column_stack([x, force]), {"position": x}, "forces have one column"),
+        ("position", x, {"position": x, "force": force}, "`position` is given twice"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            InfluenceRegressor(setup=setup, target=target).fit(X, y, **more)
+    with pytest.raises(ValueError, match="`neighbours` does not estimate the force"):
+        NeighboursRegressor(setup=setup, target="both").fit(X, np.column_stack([x, force]))

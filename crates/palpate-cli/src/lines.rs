@@ -41,6 +41,9 @@ pub enum Records {
     Json,
 }
 
+/// Most lines about skipped lines on stderr: nobody reads hundreds that say one thing.
+const MOST_SKIPS: u64 = 20;
+
 /// Most bytes of a line.
 pub const MOST_BYTES: usize = 1 << 20;
 
@@ -114,17 +117,18 @@ impl Lines {
     /// Counts the line as one that gave nothing, and says why.
     pub fn lose(&mut self, error: &(dyn Error + 'static)) -> Result<(), Failure> {
         self.lost += 1;
-        let (column, reason) = match error.downcast_ref::<CsvError>() {
+        // An error of a parser names source and line itself.
+        let (column, reason, words) = match error.downcast_ref::<CsvError>() {
             Some(CsvError { place, problem, .. }) => {
-                // It names source and line itself.
-                remark!("palpate: skipped: {error}");
-                (place.as_ref().and_then(|place| place.column), problem.to_string())
+                (place.as_ref().and_then(|place| place.column), problem.to_string(), error.to_string())
             }
-            None => {
-                remark!("palpate: skipped: {}:{}: {error}", self.name(), self.count);
-                (None, error.to_string())
-            }
+            None => (None, error.to_string(), format!("{}:{}: {error}", self.name(), self.count)),
         };
+        if self.lost <= MOST_SKIPS {
+            remark!("palpate: skipped: {words}");
+        } else if self.lost == MOST_SKIPS + 1 {
+            remark!("palpate: skipped: further lines, which are counted at the end");
+        }
         if self.records == Records::None {
             return Ok(());
         }
@@ -231,6 +235,7 @@ impl Readings {
         let mut columns: Columns = setup.recording_columns();
         if no_header {
             columns.header = Header::Absent;
+            columns.time = None;
             for (i, channel) in columns.channels.iter_mut().enumerate() {
                 channel.column = Column::Number(i + 1);
             }
@@ -247,6 +252,11 @@ impl Readings {
             }
         }
         Ok(None)
+    }
+
+    /// Time of the last reading in seconds, where the source has times.
+    pub fn time_s(&self) -> Option<f64> {
+        self.parsing.parser.time_s()
     }
 
     /// True until the columns are known, by a header or by `--no-header`.

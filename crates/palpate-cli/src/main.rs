@@ -11,6 +11,7 @@
 
 mod chunks;
 mod commands;
+mod contact_lines;
 mod cost;
 mod estimate_columns;
 mod failure;

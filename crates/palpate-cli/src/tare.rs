@@ -1,15 +1,15 @@
 //! `--tare`: readings of a surface whose offsets have moved since its calibration.
 
 use crate::failure::{Complaint, Failure};
-use crate::input::RecordingFiles;
+use crate::input::{self, RecordingFiles};
 use crate::lines::{Lines, Readings, Records};
 use crate::progress::Observer;
 use crate::remark::remark;
-use palpate_estimators::estimator::{Locator, Status, Tare, TareError, take_off_drift};
+use palpate_estimators::estimator::{Estimate, Locator, Status, Tare, TareError, take_off_drift};
 use palpate_estimators::evaluation::Split;
 use palpate_estimators::fit::FitTask;
 use palpate_estimators::influence::Influence;
-use palpate_estimators::recording::Recording;
+use palpate_estimators::recording::{Recording, Zero};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::units::{Quantity, format_count};
 use std::path::{Path, PathBuf};
@@ -18,9 +18,10 @@ use std::str::FromStr;
 /// Source of the baseline.
 #[derive(clap::Args)]
 pub struct TareOption {
-    /// Take the untouched reading of today from the first N readings, from a FILE of untouched readings, find and follow it (`auto`), or take
-    /// the first N and follow from there (`N,auto`); every reading is brought to the untouched reading of the calibration
-    #[arg(long, value_name = "N|FILE|auto|N,auto")]
+    /// Take the untouched reading of today from the first N readings, from those of a time such as "2 s", from a FILE of untouched readings,
+    /// find and follow it (`auto`), or find the latest one (`last`). `N,auto` and "2 s,auto" take the first and follow from there. Every
+    /// reading is brought to the untouched reading of the calibration
+    #[arg(long, value_name = "N|TIME|FILE|auto|last|N,auto")]
     pub tare: Option<Source>,
 }
 
@@ -31,6 +32,14 @@ impl TareOption {
             Some(Source::File(path)) => Some(path),
             _ => None,
         }
+    }
+
+    /// The tare of readings in use: `last` by default where the calibration has `zero = "last"` and untouched readings can be found.
+    pub fn in_use(&self, locator: &Locator) -> Self {
+        let is_last = locator.setup.recording_columns().zero == Zero::Last;
+        let default = || Source::Last { first: Start::NONE };
+        let by_locator = (is_last && locator.false_alarm_rate().is_some()).then(default);
+        Self { tare: self.tare.clone().or(by_locator) }
     }
 
     /// Words behind a description of readings that are judged.
@@ -60,23 +69,77 @@ impl TareOption {
 /// The untouched readings.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
-    /// So many of the first ones.
-    First(u64),
+    /// The first ones.
+    First(Start),
     /// All of a file.
     File(PathBuf),
-    /// So many of the first ones, and those that the locator's own rule finds behind them.
+    /// The first ones, and those that the locator's own rule finds behind them.
     Auto {
         /// Readings from the beginning that are known to be untouched.
-        first: u64,
+        first: Start,
     },
+    /// The first ones, and then the latest one that the locator's own rule finds.
+    Last {
+        /// Readings from the beginning that are known to be untouched.
+        first: Start,
+    },
+}
+
+/// Beginning of a stream of readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// So many readings.
+    Readings(u64),
+    /// Those of the first so many seconds.
+    Seconds(f64),
+}
+
+impl Start {
+    /// No reading.
+    const NONE: Self = Self::Readings(0);
+}
+
+impl std::fmt::Display for Start {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Readings(count) => write!(f, "{count}"),
+            Self::Seconds(seconds) => write!(f, "{seconds} s"),
+        }
+    }
+}
+
+impl FromStr for Start {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Ok(count) = text.parse() {
+            return if count > 0 {
+                Ok(Self::Readings(count))
+            } else {
+                Err("it must be at least 1 reading".to_owned())
+            };
+        }
+        input::time(text).map(Self::Seconds).map_err(|_| {
+            format!("`{text}` must be a whole number of readings, at least 1, or a time, as in `20` or `2 s`")
+        })
+    }
 }
 
 impl Source {
     /// Readings from the beginning that are known to be untouched.
-    fn first(&self) -> u64 {
+    fn first(&self) -> Start {
         match self {
-            Self::First(count) | Self::Auto { first: count } => *count,
-            Self::File(_) => 0,
+            Self::First(first) | Self::Auto { first } | Self::Last { first } => *first,
+            Self::File(_) => Start::NONE,
+        }
+    }
+
+    /// The word of a baseline that is followed.
+    fn followed(&self) -> Option<&'static str> {
+        match self {
+            Self::Auto { .. } => Some("auto"),
+            Self::Last { .. } => Some("last"),
+            Self::First(_) | Self::File(_) => None,
         }
     }
 }
@@ -85,36 +148,51 @@ impl FromStr for Source {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if let Some(first) = text.strip_suffix(",auto") {
-            return match first.parse() {
-                Ok(first) if first > 0 => Ok(Self::Auto { first }),
-                _ => {
-                    Err(format!("`{first}` must be a whole number of readings, at least 1, as in `20,auto`"))
-                }
-            };
+        if let Some((first, followed @ ("auto" | "last"))) = text.rsplit_once(',') {
+            let first = first.trim().parse()?;
+            return Ok(if followed == "auto" { Self::Auto { first } } else { Self::Last { first } });
         }
         let is_number = text.contains(|c: char| c.is_ascii_digit()) && text.parse::<f64>().is_ok();
         match text {
-            "auto" => Ok(Self::Auto { first: 0 }),
+            "auto" => Ok(Self::Auto { first: Start::NONE }),
+            "last" => Ok(Self::Last { first: Start::NONE }),
             "-" => Err("untouched readings cannot come from stdin; name a file".to_owned()),
             _ if is_number => match text.parse() {
-                Ok(count) if count > 0 => Ok(Self::First(count)),
+                Ok(count) if count > 0 => Ok(Self::First(Start::Readings(count))),
                 _ => Err(format!(
                     "`{text}` must be a whole number of readings, at least 1; a file of that name is `./{text}`"
                 )),
             },
-            _ => Ok(Self::File(text.into())),
+            _ => match input::time(text) {
+                Ok(seconds) => Ok(Self::First(Start::Seconds(seconds))),
+                Err(_) => Ok(Self::File(text.into())),
+            },
         }
     }
 }
 
 /// Use of a reading by the tare.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Taken {
     /// One of those that make the baseline: it is not located.
     Baseline,
     /// One that has been tared.
     Tared,
+    /// One that has been tared, with its estimate by the tare that follows the baseline.
+    Located(Box<Estimate>),
+}
+
+/// A reading that the tare cannot use.
+#[derive(Debug, thiserror::Error)]
+pub enum TakeError {
+    /// A reading of other channels or values.
+    #[error(transparent)]
+    Tare(#[from] TareError),
+    /// A reading without a time among the first seconds.
+    #[error(
+        "the reading has no time, and --tare takes those of the first {0} s: name the column as `time` in [recording], or give a number of readings"
+    )]
+    NoTime(f64),
 }
 
 /// The tare of a stream of readings.
@@ -122,6 +200,12 @@ pub struct Taring<'a> {
     locator: &'a Locator,
     source: Source,
     tare: Tare<Vec<f64>>,
+    /// True until the readings known to be untouched are over.
+    is_beginning: bool,
+    /// Time of the first reading.
+    begun_s: Option<f64>,
+    /// Readings of the beginning.
+    first: u64,
     /// Readings that have made the baseline, or, where it is followed, untouched readings that were found.
     count: u64,
     /// Readings that are `outside_model` by a baseline that is followed.
@@ -145,14 +229,25 @@ impl<'a> Taring<'a> {
             )
         })?;
         let tared = tare.learnt().to_vec();
-        let mut taring =
-            Self { locator, source: source.clone(), tare, count: 0, unexplained: 0, kept: Vec::new(), tared };
+        let mut taring = Self {
+            locator,
+            source: source.clone(),
+            tare,
+            is_beginning: source.first() != Start::NONE,
+            begun_s: None,
+            first: 0,
+            count: 0,
+            unexplained: 0,
+            kept: Vec::new(),
+            tared,
+        };
         match source {
             Source::File(path) => taring.read(&path, no_header)?,
             Source::First(_) => {}
-            Source::Auto { .. } if locator.false_alarm_rate().is_none() => {
+            Source::Auto { .. } | Source::Last { .. } if locator.false_alarm_rate().is_none() => {
                 let complaint = format!(
-                    "--tare auto: a locator of kind `{}` does not tell untouched readings from contacts",
+                    "--tare {}: a locator of kind `{}` does not tell untouched readings from contacts",
+                    source.followed().unwrap_or_default(),
                     locator.kind()
                 );
                 return Err(Complaint::new(complaint)
@@ -160,6 +255,7 @@ impl<'a> Taring<'a> {
                     .into());
             }
             Source::Auto { .. } => {}
+            Source::Last { .. } => taring.tare = taring.tare.with_last_zero(),
         }
         Ok(Some(taring))
     }
@@ -182,25 +278,53 @@ impl<'a> Taring<'a> {
         Ok(())
     }
 
-    /// Takes a reading, which is the tared one afterwards.
-    pub fn take(&mut self, reading: &mut [f64]) -> Result<Taken, TareError> {
-        if self.count < self.source.first() {
+    /// Takes a reading of a time in seconds, which is the tared one afterwards.
+    pub fn take(&mut self, reading: &mut [f64], time_s: Option<f64>) -> Result<Taken, TakeError> {
+        if let Some(time_s) = time_s {
+            self.tare.note_time(time_s);
+        }
+        if self.is_beginning && self.is_of_beginning(time_s)? {
             self.add(reading)?;
-            if self.count == self.source.first() {
-                self.look_again();
+            self.first = self.count;
+            if self.source.first() == Start::Readings(self.count) {
+                self.end_beginning();
             }
             return Ok(Taken::Baseline);
         }
-        match self.source {
-            Source::First(_) | Source::File(_) => self.tare.apply(reading, &mut self.tared)?,
-            Source::Auto { .. } => {
+        if self.is_beginning {
+            self.end_beginning();
+        }
+        let taken = match self.source {
+            Source::First(_) | Source::File(_) => {
+                self.tare.apply(reading, &mut self.tared)?;
+                Taken::Tared
+            }
+            Source::Auto { .. } | Source::Last { .. } => {
                 let estimate = self.locator.locate_following(&mut self.tare, reading, &mut self.tared)?;
                 self.count += u64::from(estimate.status == Status::NoContact);
                 self.unexplained += u64::from(estimate.status == Status::OutsideModel);
+                Taken::Located(Box::new(estimate))
+            }
+        };
+        reading.copy_from_slice(&self.tared);
+        Ok(taken)
+    }
+
+    /// True for a reading that is known to be untouched.
+    fn is_of_beginning(&mut self, time_s: Option<f64>) -> Result<bool, TakeError> {
+        match self.source.first() {
+            Start::Readings(first) => Ok(self.count < first),
+            Start::Seconds(seconds) => {
+                let time_s = time_s.ok_or(TakeError::NoTime(seconds))?;
+                let begun_s = *self.begun_s.get_or_insert(time_s);
+                Ok(time_s - begun_s < seconds)
             }
         }
-        reading.copy_from_slice(&self.tared);
-        Ok(Taken::Tared)
+    }
+
+    fn end_beginning(&mut self) {
+        self.is_beginning = false;
+        self.look_again();
     }
 
     fn add(&mut self, reading: &[f64]) -> Result<(), TareError> {
@@ -240,8 +364,9 @@ impl<'a> Taring<'a> {
         let Some((channel, value)) = most else { return };
         let sensor = &self.locator.setup.layout().sensors()[channel];
         let from = match self.source {
-            Source::Auto { first } if self.count > first => {
-                format!("{} untouched readings that were found", format_count(self.count - first))
+            Source::Last { .. } if self.count > self.first => "the latest untouched reading".to_owned(),
+            Source::Auto { .. } if self.count > self.first => {
+                format!("{} untouched readings that were found", format_count(self.count - self.first))
             }
             _ => format!("the mean of {} readings", self.count),
         };
@@ -250,7 +375,7 @@ impl<'a> Taring<'a> {
     }
 
     /// Says what was followed, and warns where too few readings were untouched for a baseline.
-    fn say_followed(&self, source: &str) {
+    fn say_followed(&self, followed: &str, source: &str) {
         if self.count > 0 {
             self.say();
         }
@@ -258,13 +383,13 @@ impl<'a> Taring<'a> {
         if self.count < settled {
             let found = if self.count == 0 { "no".to_owned() } else { format!("only {}", self.count) };
             remark!(
-                "palpate: warning: --tare auto found {found} untouched reading{} in {source}, and so the baseline may be that of a touch; \
+                "palpate: warning: --tare {followed} found {found} untouched reading{} in {source}, and so the baseline may be that of a touch; \
                  leave the surface alone for a moment, or tare by --tare N or --tare FILE",
                 if self.count > 1 { "s" } else { "" }
             );
         } else if !self.tare.is_confirmed() && self.unexplained >= settled {
             remark!(
-                "palpate: warning: --tare auto: {} readings of {source} are no contact by the baseline, and none has come and gone by it: \
+                "palpate: warning: --tare {followed}: {} readings of {source} are no contact by the baseline, and none has come and gone by it: \
                  was the surface touched when the readings began? --tare N or --tare FILE takes readings that are known to be untouched",
                 format_count(self.unexplained)
             );
@@ -276,16 +401,16 @@ impl<'a> Taring<'a> {
     /// # Errors
     /// A failure where there were fewer readings than make the baseline.
     pub fn finish(&self, source: &str) -> Result<(), Failure> {
-        let needed = self.source.first();
-        if self.count < needed {
+        if self.is_beginning {
+            let needed = self.source.first();
             let complaint = format!(
                 "--tare {needed}: {source} holds {} readings; the first {needed} are to be the untouched ones",
                 self.count
             );
             return Err(Complaint::new(complaint).help("give fewer, or record longer").into());
         }
-        if let Source::Auto { .. } = self.source {
-            self.say_followed(source);
+        if let Some(followed) = self.source.followed() {
+            self.say_followed(followed, source);
         }
         Ok(())
     }
@@ -300,10 +425,9 @@ pub fn tare_splits(
     splits: &mut [Split],
 ) -> Result<(), Failure> {
     match option.tare {
-        Some(Source::Auto { first: 0 }) => {}
+        Some(Source::Auto { first: Start::NONE }) => {}
         Some(_) => {
-            let complaint =
-                "--tare N and --tare FILE are for a locator: a rig is judged by folds of one recording";
+            let complaint = "--tare takes `auto` alone here; N, a time, a FILE and `last` are for a locator: a rig is judged by folds of one recording";
             return Err(Complaint::new(complaint)
                 .help("--tare auto takes off the drift that the presses tell")
                 .into());
@@ -360,7 +484,7 @@ pub fn tared_recording(
     let Some(mut taring) = Taring::new(option, locator, false)? else { return Ok(recording) };
     let mut kept = Vec::with_capacity(recording.rows.len());
     for (i, row) in recording.rows.iter_mut().enumerate() {
-        if taring.take(&mut row.reading).map_err(Complaint::new)? == Taken::Tared {
+        if taring.take(&mut row.reading, row.time_s).map_err(Complaint::new)? != Taken::Baseline {
             kept.push(i);
         }
     }

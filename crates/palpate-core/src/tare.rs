@@ -7,7 +7,7 @@
 mod rest;
 
 use crate::{Estimate, LARGEST_READING, Status};
-use rest::{Course, RestWatch};
+use rest::{Course, RestLength, RestWatch};
 
 /// Baseline of the channels of a surface, kept in arrays, vectors or slices `B` of the caller's.
 ///
@@ -30,6 +30,11 @@ pub struct Tare<B> {
     /// Untouched reading of each channel, as calibration learnt it.
     learnt: B,
     time_constant: u32,
+    /// Time of the reading before and mean interval between readings, in seconds, of readings that have times.
+    clock: Option<Clock>,
+    zero: Zero,
+    /// Mean of the untouched readings of the last moment, and the time of the first of them, where [`Zero::Last`] will take it.
+    moment: Option<(Baseline<B>, f64)>,
     current: Baseline<B>,
     /// True for a baseline that is known to be that of the untouched surface.
     is_confirmed: bool,
@@ -47,6 +52,26 @@ pub struct Tare<B> {
     takes_rests: bool,
     /// Drift of the untouched reading in the course of the calibration.
     drift: Option<CalibrationDrift<B>>,
+}
+
+/// Untouched readings that make a followed baseline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Zero {
+    /// Those of a time constant.
+    Followed,
+    /// The latest one.
+    Last,
+}
+
+/// Times of readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Clock {
+    last_s: f64,
+    /// Time since the reading before the last one.
+    step_s: f64,
+    interval_s: f64,
+    /// Intervals of the mean, at most a time constant.
+    intervals: u32,
 }
 
 /// Drift of the untouched reading in the course of a calibration.
@@ -113,7 +138,12 @@ impl core::error::Error for TareError {}
 impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// Readings from which on a followed baseline is believed: their mean has a fifth of the noise of one.
     pub const SETTLED: u32 = 20;
-    /// Readings over which a followed baseline forgets: ten seconds at 100 readings a second.
+    /// Time over which a followed baseline forgets, in seconds, where readings have times ([`Tare::note_time`]).
+    pub const TIME_CONSTANT_S: f64 = 10.0;
+    /// Time in seconds over which untouched readings are averaged for [`Tare::with_last_zero`]: longer than a touch takes to build up, so that
+    /// the baseline does not follow it.
+    pub const MOMENT_S: f64 = 1.0;
+    /// Readings over which a followed baseline forgets where readings have no times: [`Tare::TIME_CONSTANT_S`] at 100 readings a second.
     pub const TIME_CONSTANT: u32 = 1000;
 
     /// Readings in a row by which a surface is known to have been let go: three of a thousand readings of noise alone are outside the model.
@@ -132,6 +162,34 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     #[must_use]
     pub fn with_time_constant(self, readings: u32) -> Self {
         Self { time_constant: readings.max(Self::SETTLED), ..self }
+    }
+
+    /// A tare whose followed baseline is the latest untouched reading, for calibrations whose presses are less the untouched reading before
+    /// each. Of readings with times it is the mean over the last [`Tare::MOMENT_S`].
+    #[must_use]
+    pub fn with_last_zero(self) -> Self {
+        Self { zero: Zero::Last, ..self }
+    }
+
+    /// Notes the time of the next reading in seconds, by any clock. A followed baseline then forgets over [`Tare::TIME_CONSTANT_S`] at the mean
+    /// rate of the readings, but over no fewer than [`Tare::SETTLED`] readings. A time that is not later than the one before starts the clock
+    /// anew.
+    ///
+    /// The rest after a touch lasts seconds too. Counts that remain readings are those that the noise of single readings asks for:
+    /// [`Tare::SETTLED`] and [`Tare::LET_GO`].
+    pub fn note_time(&mut self, time_s: f64) {
+        let new = Clock { last_s: time_s, step_s: f64::INFINITY, interval_s: 0.0, intervals: 0 };
+        let Some(mut clock) = self.clock.filter(|clock| time_s > clock.last_s) else {
+            self.clock = time_s.is_finite().then_some(new);
+            return;
+        };
+        clock.step_s = time_s - clock.last_s;
+        clock.intervals = clock.intervals.saturating_add(1).min(self.time_constant);
+        clock.interval_s += (clock.step_s - clock.interval_s) / f64::from(clock.intervals);
+        clock.last_s = time_s;
+        self.clock = clock.interval_s.is_finite().then_some(clock);
+        // The conversion saturates.
+        self.time_constant = ((Self::TIME_CONSTANT_S / clock.interval_s) as u32).max(Self::SETTLED);
     }
 
     /// A tare that leaves the residue of a touch in the tared readings, for a caller that takes creep off by itself.
@@ -163,6 +221,9 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             drift: None,
             learnt,
             time_constant: Self::TIME_CONSTANT,
+            clock: None,
+            zero: Zero::Followed,
+            moment: None,
             is_confirmed: false,
             other: None,
             strange: 0,
@@ -174,9 +235,9 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// A tare of the same calibration and settings that begins anew.
     #[must_use]
     pub fn restarted(&self) -> Self {
-        let Self { time_constant, takes_rests, .. } = *self;
+        let Self { time_constant, clock, zero, takes_rests, .. } = *self;
         let drift = self.drift.clone();
-        Self { time_constant, takes_rests, drift, ..Self::of_learnt(self.learnt.clone()) }
+        Self { time_constant, clock, zero, takes_rests, drift, ..Self::of_learnt(self.learnt.clone()) }
     }
 
     /// Untouched reading of each channel today, as far as is known.
@@ -224,7 +285,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// Locates a tared reading, and follows the drift of the baseline while nothing touches. `tared` holds the tared reading afterwards.
     ///
     /// The status that `locate` gives says what a reading is to the baseline:
-    /// - `no_contact`: the baseline moves towards it, by a straight line through the last [`Tare::TIME_CONSTANT`] such readings, whose slope is the drift;
+    /// - `no_contact`: the baseline moves towards it, by a straight line through such readings of the last [`Tare::TIME_CONSTANT_S`], whose slope is
+    ///   the drift; [`Tare::with_last_zero`] takes the reading itself;
     /// - a contact, whether held for a second or an hour: the baseline is not moved by it. It drifts on as before for as many readings as the drift was
     ///   learnt from. The first reading is the new baseline where more of the calibration's drift explains it ([`Tare::with_drift`]);
     /// - after a touch, readings that stay and are `no_contact`, or small beside the touch: hysteresis, creep or drift have left them, and their mean is the new
@@ -263,7 +325,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         }
         let course =
             match self.takes_rests && self.current.weight >= Self::SETTLED && self.is_possible(reading) {
-                true => self.rest.add(reading, self.current.values.as_ref(), status, self.time_constant),
+                true => self.add_to_rest(reading, status),
                 false => Course::Steady,
             };
         if course == Course::AtRest {
@@ -276,6 +338,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             (self.let_go, self.as_learnt, self.strange) = (0, 0, 0);
         }
         if status == Status::OutsideModel {
+            self.moment = None;
             if course == Course::AtRest {
                 return Ok(estimate);
             }
@@ -296,7 +359,12 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             self.is_confirmed = true;
         }
         if status == Status::NoContact && course == Course::Steady {
-            self.current.follow(reading, self.time_constant);
+            match self.zero {
+                Zero::Followed => self.current.follow(reading, self.time_constant),
+                Zero::Last => self.take_last(reading),
+            }
+        } else {
+            self.moment = None;
         }
         self.current.count(status);
         if !self.is_confirmed && self.current.saw_a_whole_touch() {
@@ -306,7 +374,35 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         Ok(estimate)
     }
 
-    /// Looks whether a reading that is `outside_model` by a settled baseline, `tared` by it, tells another one.
+    fn add_to_rest(&mut self, reading: &[f64], status: Status) -> Course {
+        let length = match self.clock {
+            Some(Clock { intervals: 1.., interval_s, .. }) => RestLength::of_interval(interval_s),
+            _ => RestLength::COUNTED,
+        };
+        self.rest.add(reading, self.current.values.as_ref(), status, self.time_constant, length)
+    }
+
+    /// Takes the mean of the untouched readings of a moment of [`Tare::MOMENT_S`] for the baseline once it is over; a reading that is as long after the one
+    /// before it, or has no time, is a moment by itself. A touch ends the moment, so that its slow beginning is not taken.
+    fn take_last(&mut self, reading: &[f64]) {
+        if self.current.weight < Self::SETTLED {
+            self.current.average(reading, Self::SETTLED);
+        }
+        let Some(clock) = self.clock else {
+            self.current.put_to(reading, 1);
+            return;
+        };
+        let learnt = &self.learnt;
+        let (mean, since_s) =
+            self.moment.get_or_insert_with(|| (Baseline::new(learnt.clone(), 0), clock.last_s));
+        mean.average(reading, u32::MAX);
+        if clock.step_s.max(clock.last_s - *since_s) >= Self::MOMENT_S {
+            self.current.put_to(mean.values.as_ref(), mean.weight);
+            self.moment = None;
+        }
+    }
+
+    /// Compares other baselines by a reading that is `outside_model` by a settled one, `tared` by it.
     fn doubt(&mut self, reading: &[f64], tared: &[f64], locate: &mut impl FnMut(&[f64]) -> Estimate) {
         let mut scratch = self.learnt.clone();
         let mut status_of = |values: &[f64]| {
@@ -559,6 +655,75 @@ mod tests {
     fn is_right(tare: &Tare<[f64; 4]>, moved: [f64; 4]) -> bool {
         let expected = LEARNT.iter().zip(moved).map(|(learnt, moved)| learnt + moved);
         tare.baseline().iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1.0)
+    }
+
+    #[test]
+    fn forgets_over_seconds_where_readings_have_times() {
+        for (rate_hz, readings) in [(10.0, 100), (100.0, 1000), (1000.0, 10_000), (0.5, 20)] {
+            let mut tare = Tare::new(LEARNT).unwrap();
+            for i in 0..=200 {
+                tare.note_time(5.0 + f64::from(i) / rate_hz);
+            }
+            assert!(tare.time_constant.abs_diff(readings) <= 1, "{rate_hz} Hz: {}", tare.time_constant);
+        }
+        let mut tare = Tare::new(LEARNT).unwrap();
+        for time_s in [0.0, f64::NAN, 1.0, f64::INFINITY, 0.5, 0.5, -1.0, 1e308, f64::MAX] {
+            tare.note_time(time_s);
+        }
+        assert!(tare.time_constant >= Tare::<[f64; 4]>::SETTLED);
+    }
+
+    #[test]
+    fn follows_a_drift_of_a_minute_at_ten_readings_a_second() {
+        // Largest error of the baseline in ten minutes, in counts.
+        let worst_error = |has_times: bool| {
+            let mut tare = Tare::new(LEARNT).unwrap();
+            (0..6000).fold(0.0, |worst: f64, i| {
+                let time_s = f64::from(i) / 10.0;
+                let moved = 2.0 * libm::sin(core::f64::consts::TAU * time_s / 60.0);
+                if has_times {
+                    tare.note_time(time_s);
+                }
+                follow(&mut tare, reading(i, [moved; 4], 0.0, 0.0));
+                let error = (tare.baseline()[0] - LEARNT[0] - moved).abs();
+                if i < 1000 { worst } else { worst.max(error) }
+            })
+        };
+        let (timed, counted) = (worst_error(true), worst_error(false));
+        assert!(timed < 1.0 && counted > 1.5, "{timed} {counted}");
+    }
+
+    #[test]
+    fn the_latest_untouched_reading_is_the_zero() {
+        let mut tare = Tare::new(LEARNT).unwrap().with_last_zero();
+        for i in 0..40 {
+            let moved = [0.5 * f64::from(i); 4];
+            let untouched = reading(i, moved, 0.0, 0.0);
+            assert_eq!(follow(&mut tare, untouched).status, Status::NoContact, "{i}");
+            assert_eq!(tare.baseline(), untouched);
+            assert_eq!(follow(&mut tare, reading(i, moved, 1.5, 0.3)).status, Status::Located, "{i}");
+            assert_eq!(tare.baseline(), untouched);
+        }
+    }
+
+    #[test]
+    fn a_slow_touch_does_not_go_into_the_baseline_of_a_fast_board() {
+        // The force grows from 0 to 1.5 within 0.8 s at 1,000 readings a second, after rests of several lengths.
+        for is_last in [false, true] {
+            for rest in [1500_u32, 1700, 1950, 2300] {
+                let tare = Tare::new(LEARNT).unwrap();
+                let mut tare = if is_last { tare.with_last_zero() } else { tare };
+                for i in 0..rest + 1500 {
+                    tare.note_time(f64::from(i) * 1e-3);
+                    let force = 1.5 * f64::from(i.saturating_sub(rest).min(800)) / 800.0;
+                    follow(&mut tare, reading(i, MOVED, force, 0.3));
+                }
+                // The baseline is off by less than a touch that the locator detects.
+                let errors = (0..4).map(|c| tare.baseline()[c] - LEARNT[c] - MOVED[c]);
+                let square: f64 = errors.map(|error| error * error).sum();
+                assert!(square < 20.0, "{is_last}, {rest}: {square}");
+            }
+        }
     }
 
     #[test]

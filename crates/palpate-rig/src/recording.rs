@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use palpate_estimators::recording::{
     Column, Columns, Decimal, ForceColumn, Frame, Header, Need, PositionColumns, RepeatedReadings, Separator,
-    TimeSpan, ValueColumn,
+    TimeSpan, ValueColumn, Zero,
 };
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -65,6 +65,9 @@ pub(crate) struct RecordingKeys {
     /// Treatment of rows that repeat the reading before them in every channel.
     #[serde(default)]
     pub repeated_readings: RepeatedReadings,
+    /// Zero of the readings.
+    #[serde(default)]
+    pub zero: Zero,
 }
 
 fn yes() -> bool {
@@ -140,6 +143,7 @@ impl At<RecordingKeys> {
             force_zero_n: self.force_zero.map(|force| force.si),
             untouched_times: self.untouched_times.iter().flatten().map(|span| span.0).collect(),
             repeated_readings: self.repeated_readings,
+            zero: self.zero,
         })
     }
 

@@ -355,6 +355,7 @@ fn every_key_can_be_said() {
         untouched = 8
         untouched_times = ["0 s..10 s", "95 s.."]
         repeated_readings = "collapse"
+        zero = "last"
         header = false
         position = 1
         position_unit = "m"

@@ -1,4 +1,4 @@
-"""Estimators as scikit-learn has them: readings are features, positions are targets.
+"""Estimators with scikit-learn's interface: readings are features; positions, forces or both are targets.
 
 >>> import numpy as np
 >>> import palpate.sklearn

@@ -1,10 +1,10 @@
-"""Regressors: an estimator of palpate behind scikit-learn's interface."""
+"""Estimators of palpate with scikit-learn's interface."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Any, TypeVar, cast
+from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -16,51 +16,68 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from .. import _estimators as estimators
 from .. import _palpate
 from .._errors import PalpateError
-from .._palpate import Estimates, Locator, Setup
+from .._palpate import Estimates, Evaluation, Locator, Recording, Setup
 from .._sensors import deflection, raw
 from .._surfaces import Beam, Measured, Quantity
 
 _Floats = npt.NDArray[np.float64]
 _Self = TypeVar("_Self", bound="_Regressor")
+Target = Literal["position", "force", "both"]
 
-# A surface that is made of the targets alone is of 1 m, and they lie on the middle 80 % of its longer side.
+# Width of a 95 % interval of the normal distribution, in standard deviations.
+_WIDTH_95 = 2 * 1.959963984540054
+
+# A surface that is made of the positions alone is of 1 m, and they lie on the middle 80 % of its longer side.
 _MARGIN = 0.1
 _SPAN = 0.8
 
 
 class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
-    """What the regressors share.
+    """Interface of scikit-learn that all regressors share.
+
+    `score` is scikit-learn's R² of the targets; `evaluate` gives the errors and intervals of palpate's own evaluation.
 
     Attributes
     ----------
     locator_ : Locator
-        What fitting gave.
+        The fitted locator.
     setup_ : Setup
-        Its surface and sensors: those that were given, or a surface made of the targets.
+        Its surface and sensors: those that were given, or a surface made of the positions.
     n_features_in_ : int
         Number of channels.
     """
 
     setup: Setup | None
+    target: Target
     random_state: int | np.random.RandomState | None
 
     def _estimator(self) -> estimators.Estimator:
         raise NotImplementedError
 
     def fit(
-        self: _Self, X: Any, y: Any, *, force: Any = None, nuisance: Any = None, time: Any = None
+        self: _Self,
+        X: Any,
+        y: Any,
+        *,
+        force: Any = None,
+        position: Any = None,
+        nuisance: Any = None,
+        time: Any = None,
     ) -> _Self:
-        """Calibrate: fit to readings with their positions.
+        """Calibrate: fit to readings with their contacts.
 
         Parameters
         ----------
         X : array_like
             Readings in SI units, or raw: of the shape (rows, channels).
         y : array_like
-            Positions of the contacts: of the shape (rows), or (rows, 2) on a plane. On a `setup` they are in metres; without one they may be in
-            any unit, which is that of the predictions too.
+            Targets, by `target`: positions, of the shape (rows), or (rows, 2) on a plane; forces in newtons, of the shape (rows); or both, with
+            the forces in the last column. On a `setup` positions are in metres; without one they may be in any unit, which is that of the
+            predictions too.
         force : float or array_like, optional
-            Force of each contact, in newtons; the setup's where nothing is said.
+            Force of each contact in newtons, where `y` has positions alone; the setup's by default.
+        position : array_like, optional
+            Positions of the contacts, where `y` has forces alone.
         nuisance : array_like, optional
             Coordinates that shape the readings and are unknown in use: of the shape (rows) or (rows, coordinates).
         time : array_like, optional
@@ -73,23 +90,15 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         Raises
         ------
         ValueError
-            For readings that do not suit the setup or the method.
+            For readings that do not suit the setup or the method, and for forces as targets of a method that does not estimate them.
         """
         X, y = validate_data(self, X, y, dtype=np.float64, multi_output=True, y_numeric=True)
-        y = np.asarray(y, dtype=np.float64)
-        if y.ndim == 2 and y.shape[1] == 1:
-            words = "A column-vector y was passed when a 1d array was expected; its one column is taken."
-            warnings.warn(words, DataConversionWarning, stacklevel=2)
-            y = y[:, 0]
-        if y.ndim == 2 and y.shape[1] != 2:
-            raise PalpateError(f"y has the shape {y.shape}; positions have one column, or two on a plane")
-        self.setup_ = self.setup if self.setup is not None else self._surface_of(X, y)
-        frame: tuple[Any, float] = (0.0, 1.0) if self.setup is not None else _frame(y)
+        positions, force = self._contacts(y, force, position)
+        self.setup_ = self.setup if self.setup is not None else self._surface_of(X, positions)
+        frame: tuple[Any, float] = (0.0, 1.0) if self.setup is not None else _frame(positions)
         self._origin, self._scale = frame
-        positions = (y - self._origin) / self._scale
-        along, across = (positions, None) if y.ndim == 1 else positions.T
         try:
-            recording = self.setup_.recording(X, along, across, force=force, nuisance=nuisance, time=time)
+            recording = self._recording(X, positions, force=force, nuisance=nuisance, time=time)
             estimator = self._estimator().of(self.setup_)
             self.locator_: Locator = estimator.fit(recording, seed=self._seed(), progress=False)
         except PalpateError as error:
@@ -97,10 +106,14 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
                 # Which number is too small, in scikit-learn's words: the surface is not the user's own.
                 raise PalpateError(f"n_samples={X.shape[0]}, n_features={X.shape[1]}: {error}") from error
             raise
+        if self.target != "position" and np.all(np.isnan(self.locate(X).force)):
+            raise PalpateError(
+                f'`target` is "{self.target}"; a locator of kind `{self.locator_.kind}` does not estimate the force: use "position"'
+            )
         return self
 
     def predict(self, X: Any, return_std: bool = False) -> _Floats | tuple[_Floats, _Floats]:
-        """Positions of the contacts that readings tell.
+        """Targets of readings: positions, forces, or both, by `target`.
 
         Parameters
         ----------
@@ -111,40 +124,40 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
         Returns
         -------
-        positions : ndarray of float64
-            Of the shape (readings), or (readings, 2) on a plane.
+        targets : ndarray of float64
+            Of the shape of the targets that `fit` takes.
         std : ndarray of float64
-            Standard deviations of the positions, of the same shape: the 95 % interval's width over 3.92, NaN where the method tells none.
+            Standard deviations of the targets, of the same shape: the 95 % interval's width over 3.92, NaN where the method has none.
         """
         estimates = self.locate(X)
-        positions = self._in_frame(estimates.x, estimates.y)
+        targets = self._targets(estimates.x, estimates.y, estimates.force)
         if not return_std:
-            return positions
+            return targets
         low, high = self.predict_interval(X, estimates=estimates)
-        return positions, (high - low) / (2 * 1.959963984540054)
+        return targets, (high - low) / _WIDTH_95
 
     def predict_interval(self, X: Any, *, estimates: Estimates | None = None) -> tuple[_Floats, _Floats]:
-        """Ends of the 95 % intervals of the positions.
+        """Ends of the 95 % intervals of the targets.
 
         Parameters
         ----------
         X : array_like
             Readings: of the shape (readings, channels).
         estimates : Estimates, optional
-            What `locate` gave for them, where it is at hand.
+            Result of `locate` for them, where it is at hand.
 
         Returns
         -------
         low, high : ndarray of float64
-            Of the shape (readings), or (readings, 2) on a plane; NaN where the method tells none.
+            Of the shape of the targets that `fit` takes; NaN where the method has no intervals.
         """
         estimates = self.locate(X) if estimates is None else estimates
-        x_95, y_95 = estimates.x_95.T, None if estimates.y_95 is None else estimates.y_95.T
-        ends = [self._in_frame(x_95[end], None if y_95 is None else y_95[end]) for end in (0, 1)]
+        x_95, y_95, force_95 = estimates.x_95.T, estimates.y_95, estimates.force_95.T
+        ends = [self._targets(x_95[end], None if y_95 is None else y_95.T[end], force_95[end]) for end in (0, 1)]
         return ends[0], ends[1]
 
     def locate(self, X: Any) -> Estimates:
-        """Estimates of readings, with all that the locator says of them, in metres on the surface `setup_`.
+        """Estimates of readings with status, intervals and force, in metres on the surface `setup_`.
 
         Parameters
         ----------
@@ -159,8 +172,72 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         X = validate_data(self, X, dtype=np.float64, order="C", reset=False)
         return cast(Estimates, self.locator_.locate(np.ascontiguousarray(X)))
 
+    def evaluate(
+        self, X: Any, y: Any, *, force: Any = None, position: Any = None, nuisance: Any = None, time: Any = None
+    ) -> Evaluation:
+        """Errors, coverage, statuses and interval scores of position and force at contacts that are known.
+
+        Parameters
+        ----------
+        X, y, force, position, nuisance, time
+            As of `fit`; of other contacts than those that were fitted.
+
+        Returns
+        -------
+        Evaluation
+            In metres on the surface `setup_`.
+
+        Raises
+        ------
+        ValueError
+            For readings that do not suit the locator.
+        """
+        check_is_fitted(self)
+        X, y = validate_data(self, X, y, dtype=np.float64, multi_output=True, y_numeric=True, reset=False)
+        positions, force = self._contacts(y, force, position)
+        recording = self._recording(X, positions, force=force, nuisance=nuisance, time=time)
+        return self.locator_.evaluate(recording, progress=False)
+
+    def _contacts(self, y: Any, force: Any, position: Any) -> tuple[_Floats, Any]:
+        """Positions and forces of contacts, which `y` has by `target`."""
+        if self.target not in ("position", "force", "both"):
+            raise PalpateError(f'`target` is {self.target!r}; it must be "position", "force" or "both"')
+        y = np.asarray(y, dtype=np.float64)
+        if self.target != "position" and force is not None:
+            raise PalpateError(f'`force` is given twice: with `target` "{self.target}" `y` has the forces')
+        if self.target != "force" and position is not None:
+            raise PalpateError(f'`position` is given twice: with `target` "{self.target}" `y` has the positions')
+        if self.target == "both":
+            if y.ndim != 2 or y.shape[1] not in (2, 3):
+                raise PalpateError(f"y has the shape {y.shape}; it must have one or two columns of positions and one of forces")
+            return (y[:, 0] if y.shape[1] == 2 else y[:, :2]), y[:, -1]
+        y = _without_column(y)
+        if self.target == "force":
+            if y.ndim != 1:
+                raise PalpateError(f"y has the shape {y.shape}; forces have one column")
+            if position is None:
+                raise PalpateError('`position` is missing: with `target` "force" a fit needs the positions of the contacts')
+            y, force = np.asarray(position, dtype=np.float64), y
+            y = y[:, 0] if y.ndim == 2 and y.shape[1] == 1 else y
+        if y.ndim == 2 and y.shape[1] != 2:
+            raise PalpateError(f"y has the shape {y.shape}; positions have one column, or two on a plane")
+        return y, force
+
+    def _recording(self, X: _Floats, positions: _Floats, **contacts: Any) -> Recording:
+        """Readings with contacts on the surface `setup_`."""
+        on_surface = (positions - self._origin) / self._scale
+        along, across = (on_surface, None) if on_surface.ndim == 1 else on_surface.T
+        return self.setup_.recording(X, along, across, **contacts)
+
+    def _targets(self, along: _Floats, across: _Floats | None, force: _Floats) -> _Floats:
+        """Targets of contacts on the surface."""
+        if self.target == "force":
+            return np.asarray(force)
+        positions = self._in_frame(along, across)
+        return positions if self.target == "position" else np.column_stack([positions, force])
+
     def _in_frame(self, along: _Floats, across: _Floats | None) -> _Floats:
-        """Positions on the surface in the frame of the targets."""
+        """Positions in the unit and origin of the targets."""
         positions = along if across is None else np.column_stack([along, across])
         return np.asarray(positions * self._scale + self._origin)
 
@@ -171,15 +248,24 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return 0 if self.random_state is None else int(check_random_state(self.random_state).randint(2**31))
 
     def _surface_of(self, X: _Floats, y: _Floats) -> Setup:
-        """A surface without a model, as the targets make it."""
+        """A surface without a model, made of the positions."""
         surface = Measured(1.0) if y.ndim == 1 else Measured(1.0, 1.0)
         return _palpate.Setup(surface, raw(X.shape[1]))
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
-        # Targets of two columns are positions on a plane; of any number, as scikit-learn means it, they are not.
+        # scikit-learn means any number of targets; here they are positions and a force.
         tags.target_tags.multi_output = False
         return tags
+
+
+def _without_column(y: _Floats) -> _Floats:
+    """Targets of one column as scikit-learn has them."""
+    if y.ndim != 2 or y.shape[1] != 1:
+        return y
+    words = "A column-vector y was passed when a 1d array was expected; its one column is taken."
+    warnings.warn(words, DataConversionWarning, stacklevel=4)
+    return y[:, 0]
 
 
 def _frame(y: _Floats) -> tuple[Any, float]:
@@ -196,7 +282,9 @@ class InfluenceRegressor(_Regressor):
     Parameters
     ----------
     setup : Setup, optional
-        Surface and sensors; a surface without a model, made of the targets, where nothing is said.
+        Surface and sensors; a surface without a model, made of the positions, by default.
+    target : "position", "force" or "both"
+        Targets of `fit` and `predict`: positions; forces in newtons; or positions with the forces in the last column.
     source, contacts, force_sd, structure, false_alarm_rate
         As of `palpate.Influence`.
     random_state : int, RandomState or None
@@ -207,6 +295,7 @@ class InfluenceRegressor(_Regressor):
         self,
         *,
         setup: Setup | None = None,
+        target: Target = "position",
         source: str | None = None,
         contacts: int | None = None,
         force_sd: Quantity | None = None,
@@ -215,6 +304,7 @@ class InfluenceRegressor(_Regressor):
         random_state: int | np.random.RandomState | None = None,
     ) -> None:
         self.setup = setup
+        self.target = target
         self.source = source
         self.contacts = contacts
         self.force_sd = force_sd
@@ -234,10 +324,12 @@ class NetworkRegressor(_Regressor):
     Parameters
     ----------
     setup : Setup, optional
-        Surface and sensors; a surface without a model, made of the targets, where nothing is said.
+        Surface and sensors; a surface without a model, made of the positions, by default.
+    target : "position", "force" or "both"
+        Targets of `fit` and `predict`: positions; forces in newtons; or positions with the forces in the last column.
     hidden, hidden_activation, output_activation, biases, output, input_scale, learning_rate, momentum, aggregate_error, max_epochs, order, \
 initial_weights
-        As of `palpate.Network`, but that training is capped after 10,000 epochs and inputs are standardized where nothing is said.
+        As of `palpate.Network`, but that training is capped after 10,000 epochs and inputs are standardized by default.
     random_state : int, RandomState or None
         Seed of the weights and of the order of the patterns.
     """
@@ -246,6 +338,7 @@ initial_weights
         self,
         *,
         setup: Setup | None = None,
+        target: Target = "position",
         hidden: Sequence[int] | None = None,
         hidden_activation: str | None = None,
         output_activation: str | None = None,
@@ -261,6 +354,7 @@ initial_weights
         random_state: int | np.random.RandomState | None = None,
     ) -> None:
         self.setup = setup
+        self.target = target
         self.hidden = hidden
         self.hidden_activation = hidden_activation
         self.output_activation = output_activation
@@ -298,9 +392,14 @@ class _Plain(_Regressor):
     _kind: type[estimators.Estimator]
 
     def __init__(
-        self, *, setup: Setup | None = None, random_state: int | np.random.RandomState | None = None
+        self,
+        *,
+        setup: Setup | None = None,
+        target: Target = "position",
+        random_state: int | np.random.RandomState | None = None,
     ) -> None:
         self.setup = setup
+        self.target = target
         self.random_state = random_state
 
     def _estimator(self) -> estimators.Estimator:
@@ -313,7 +412,9 @@ class LevenbergMarquardtRegressor(_Plain):
     Parameters
     ----------
     setup : Setup, optional
-        Surface and sensors; a surface without a model, made of the targets, where nothing is said.
+        Surface and sensors; a surface without a model, made of the positions, by default.
+    target : "position", "force" or "both"
+        Targets of `fit` and `predict`: positions; forces in newtons; or positions with the forces in the last column.
     random_state : int, RandomState or None
         Seed of the networks' weights.
     """
@@ -327,7 +428,9 @@ class GaussianProcessRegressor(_Plain):
     Parameters
     ----------
     setup : Setup, optional
-        Surface and sensors; a surface without a model, made of the targets, where nothing is said.
+        Surface and sensors; a surface without a model, made of the positions, by default.
+    target : "position", "force" or "both"
+        Targets of `fit` and `predict`: positions; forces in newtons; or positions with the forces in the last column.
     random_state : int, RandomState or None
         Seed of whatever the method draws at random.
     """
@@ -341,7 +444,9 @@ class NeighboursRegressor(_Plain):
     Parameters
     ----------
     setup : Setup, optional
-        Surface and sensors; a surface without a model, made of the targets, where nothing is said.
+        Surface and sensors; a surface without a model, made of the positions, by default.
+    target : "position", "force" or "both"
+        Targets of `fit` and `predict`: positions; forces in newtons; or positions with the forces in the last column.
     random_state : int, RandomState or None
         Seed of whatever the method draws at random.
     """
@@ -355,8 +460,10 @@ class CentroidRegressor(_Plain):
     Parameters
     ----------
     setup : Setup, optional
-        Surface and sensors. Where nothing is said, a surface without a model, made of the targets, with as many sensors as there are channels,
+        Surface and sensors. Where nothing is said, a surface without a model, made of the positions, with as many sensors as there are channels,
         evenly along it; on a plane calibration finds a position for every channel.
+    target : "position", "force" or "both"
+        Targets of `fit` and `predict`: positions; forces in newtons; or positions with the forces in the last column.
     random_state : int, RandomState or None
         Seed of whatever the method draws at random.
     """
@@ -381,7 +488,9 @@ class AutoRegressor(_Plain):
     Parameters
     ----------
     setup : Setup, optional
-        Surface and sensors; a surface without a model, made of the targets, where nothing is said.
+        Surface and sensors; a surface without a model, made of the positions, by default.
+    target : "position", "force" or "both"
+        Targets of `fit` and `predict`: positions; forces in newtons; or positions with the forces in the last column.
     random_state : int, RandomState or None
         Seed of whatever the methods draw at random.
     """
@@ -395,8 +504,10 @@ class ClosedFormRegressor(_Regressor):
     Parameters
     ----------
     setup : Setup, optional
-        A beam with its sensors. Where nothing is said, a beam that is simply supported at both ends of 1.25 times the targets' range, with as
+        A beam with its sensors. Where nothing is said, a beam that is simply supported at both ends of 1.25 times the positions' range, with as
         many sensors of deflection as there are channels, evenly along it.
+    target : "position", "force" or "both"
+        Targets of `fit` and `predict`: positions; forces in newtons; or positions with the forces in the last column.
     false_alarm_rate
         As of `palpate.ClosedForm`.
     random_state : int, RandomState or None
@@ -407,10 +518,12 @@ class ClosedFormRegressor(_Regressor):
         self,
         *,
         setup: Setup | None = None,
+        target: Target = "position",
         false_alarm_rate: float | str | None = None,
         random_state: int | np.random.RandomState | None = None,
     ) -> None:
         self.setup = setup
+        self.target = target
         self.false_alarm_rate = false_alarm_rate
         self.random_state = random_state
 

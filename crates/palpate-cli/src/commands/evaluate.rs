@@ -164,9 +164,12 @@ fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
 fn cross_validated(arguments: &Arguments, rig: Box<Rig>) -> Result<Answers, Failure> {
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
-        None => Observer::of_stages()
-            .watch(|watch| rig.simulate_watched(arguments.seed, watch))
-            .map_err(|error| Failure::of_work(error, simulation_complaint))?,
+        None => {
+            let simulated = Observer::of_stages()
+                .watch(|watch| rig.simulate_watched(arguments.seed, watch))
+                .map_err(|error| Failure::of_work(error, simulation_complaint))?;
+            input::zeroed(&rig.setup, simulated)?
+        }
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
     let cost = rig.estimator.fit_cost(&rig.setup, &recording);
@@ -189,7 +192,7 @@ fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Fail
             warn_of_training_data(&locator, &recording);
             recording
         }
-        None => simulated(&locator, arguments.seed)?,
+        None => input::zeroed(&locator.setup, simulated(&locator, arguments.seed)?)?,
     };
     let recording = tared_recording(&arguments.tare, &locator, recording)?;
     let evaluation = Observer::of_stages()

@@ -52,7 +52,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Complaint::new(complaint).help("only the `digit` estimator does").into());
     }
     let path = arguments.readings.as_deref().unwrap_or(Path::new("-"));
-    let mut taring = Taring::new(&arguments.tare, &locator, arguments.no_header)?;
+    let tare = arguments.tare.in_use(&locator);
+    let mut taring = Taring::new(&tare, &locator, arguments.no_header)?;
     let records = if arguments.json { Records::Json } else { Records::None };
     let mut readings = Readings::new(Lines::open(path, records)?, &locator.setup, arguments.no_header);
     let extent = locator.setup.surface().extent();
@@ -62,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         output::print(&mut out, columns.heading("line").as_bytes())?;
     }
     while let Some(mut reading) = readings.next()? {
-        let estimate = match locate(&locator, taring.as_mut(), &mut reading) {
+        let estimate = match locate(&locator, taring.as_mut(), &mut reading, readings.time_s()) {
             Ok(estimate) => estimate,
             Err(error) => {
                 readings.lines.lose(&*error)?;
@@ -99,13 +100,13 @@ fn locate(
     locator: &Locator,
     taring: Option<&mut Taring>,
     reading: &mut [f64],
+    time_s: Option<f64>,
 ) -> Result<Option<Estimate>, Box<dyn Error>> {
-    if let Some(taring) = taring
-        && taring.take(reading)? == Taken::Baseline
-    {
-        return Ok(None);
+    match taring.map(|taring| taring.take(reading, time_s)).transpose()? {
+        Some(Taken::Baseline) => Ok(None),
+        Some(Taken::Located(estimate)) => Ok(Some(*estimate)),
+        Some(Taken::Tared) | None => Ok(Some(locator.locate(reading)?)),
     }
-    Ok(Some(locator.locate(reading)?))
 }
 
 /// The status of a reading that is taken for an untouched one, and is not located.

@@ -1,5 +1,6 @@
 //! `palpate track`: moving contacts, line by line or smoothed.
 
+use crate::contact_lines::ContactLines;
 use crate::failure::{Complaint, Failure};
 use crate::json::{Fields, Object, fields, object};
 use crate::lines::{Lines, Parsing, Records};
@@ -19,13 +20,14 @@ use palpate_mechanics::surface::modal::ModalBeam;
 use palpate_numerics::watch::Watch;
 use palpate_report::{TrackReport, track_report};
 use serde_json::json;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 /// Follow a moving contact, or two: readings in time in (a CSV file, or stdin), the track out.
 ///
 /// Two are followed on a line by a locator whose estimator has `contacts = 2`; on a plane, one. Time comes from a column `time_s`
-/// or from --rate. Where the file has the true contacts, the errors are said at the end, on stderr.
+/// or from --rate. A terminal gets a line where a contact begins, changes by more than its interval, and ends; a file or a pipe gets a row of
+/// CSV a reading. Where the file has the true contacts, stderr gets the errors at the end.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// An influence locator of a surface with a model
@@ -49,9 +51,15 @@ pub struct Arguments {
     seed: u64,
     #[command(flatten)]
     tare: TareOption,
-    /// Print one JSON object a line instead of CSV
+    /// Print one JSON object a reading
     #[arg(long)]
     json: bool,
+    /// Print one row of CSV a reading, also on a terminal
+    #[arg(long, conflicts_with = "json")]
+    csv: bool,
+    /// Print the lines of a terminal, also into a file or a pipe
+    #[arg(long, conflicts_with_all = ["json", "csv"])]
+    text: bool,
     /// Folder for a report
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
@@ -70,10 +78,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let config = TrackerConfig { swing: told.or(own), ..TrackerConfig::default() };
     let tracking = locator.tracking(&config).map_err(|error| Complaint::about(&arguments.locator, error))?;
     let extent = tracking.likelihood().extent();
-    let columns = match (extent, tracking.likelihood().most_contacts()) {
-        (Extent::Plane { .. }, _) => Columns::Plane,
-        (Extent::Line { .. }, 1) => Columns::One,
-        (Extent::Line { .. }, _) => Columns::Two,
+    let format = match (arguments, extent, tracking.likelihood().most_contacts()) {
+        (Arguments { json: true, .. }, ..) => Format::Json,
+        _ if arguments.prints_text() => Format::Text(Box::default()),
+        (_, Extent::Plane { .. }, _) => Format::Csv(Columns::Plane),
+        (_, Extent::Line { .. }, 1) => Format::Csv(Columns::One),
+        (_, Extent::Line { .. }, _) => Format::Csv(Columns::Two),
     };
     let keeps = arguments.smooth || arguments.report.is_some();
     let follower = if keeps {
@@ -81,14 +91,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         Follower::Filter(Tracker::new(tracking.likelihood(), config))
     };
-    let taring = Taring::new(&arguments.tare, &locator, false)?;
+    let taring = Taring::new(&arguments.tare.in_use(&locator), &locator, false)?;
     let records = if arguments.json { Records::Json } else { Records::None };
     let mut stream = Stream {
         arguments,
         taring,
         follower,
         extent,
-        columns,
+        format,
         lines: Lines::open(arguments.readings.as_deref().unwrap_or(Path::new("-")), records)?,
         times: 0,
         numbers: Vec::new(),
@@ -119,6 +129,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
+    /// True where stdout gets lines for people.
+    fn prints_text(&self) -> bool {
+        self.text || (!self.csv && std::io::stdout().is_terminal())
+    }
+
     /// The folder for the report, which must hold none of the files that are read.
     fn report_folder(&self) -> Result<Option<TargetFolder>, Failure> {
         let read = [Some(&self.locator), self.readings.as_ref(), self.rig.as_ref()];
@@ -139,8 +154,7 @@ struct Stream<'a> {
     taring: Option<Taring<'a>>,
     follower: Follower,
     extent: Extent,
-    /// Columns of the CSV.
-    columns: Columns,
+    format: Format,
     lines: Lines,
     /// Readings so far, skipped ones too: --rate counts them.
     times: u64,
@@ -158,8 +172,8 @@ impl Stream<'_> {
         let parser = TimedParser::new(self.lines.name(), locator.setup.schema(&columns));
         let mut parsing = Parsing::new(parser, columns.header);
         let mut out = std::io::stdout().lock();
-        if !self.arguments.json {
-            output::print(&mut out, (self.columns.heading() + "\n").as_bytes())?;
+        if let Format::Csv(columns) = self.format {
+            output::print(&mut out, (columns.heading() + "\n").as_bytes())?;
         }
         while let Some(reading) = parsing.next(&mut self.lines)? {
             if let Some(reading) = reading {
@@ -184,8 +198,15 @@ impl Stream<'_> {
         let rate_s = |rate_hz: f64| self.times as f64 / rate_hz;
         let time_s = reading.time_s.or(self.arguments.rate.map(rate_s)).unwrap_or(0.0);
         self.times += 1;
-        match self.taring.as_mut().map_or(Ok(Taken::Tared), |taring| taring.take(&mut reading.reading)) {
-            Ok(Taken::Tared) => {}
+        let taken = match &mut self.taring {
+            None => Ok(Taken::Tared),
+            Some(taring) => {
+                let has_time = reading.time_s.is_some() || self.arguments.rate.is_some();
+                taring.take(&mut reading.reading, has_time.then_some(time_s))
+            }
+        };
+        match taken {
+            Ok(Taken::Tared | Taken::Located(_)) => {}
             Ok(Taken::Baseline) => return Ok(()),
             Err(error) => return self.lines.lose(&error),
         }
@@ -212,7 +233,9 @@ impl Stream<'_> {
 
     /// The filter's tracks and the smoother's, and prints those that were kept back.
     fn finish(&mut self) -> Result<(Vec<Track>, Vec<Track>), Failure> {
+        let mut out = std::io::stdout().lock();
         let Follower::Smoother(tracker) = &self.follower else {
+            self.print_summary(&mut out)?;
             return Ok((std::mem::take(&mut self.filtered), Vec::new()));
         };
         let filtered = tracker.filtered().to_vec();
@@ -221,21 +244,28 @@ impl Stream<'_> {
             true => tracker.smoothed(Watch::NONE).map_err(|_| Failure::stopped())?,
             false => Vec::new(),
         };
-        let mut out = std::io::stdout().lock();
         let shown = if self.arguments.smooth { &smoothed } else { &filtered };
-        for (track, line) in shown.iter().zip(&self.numbers) {
-            self.print(track, *line, &mut out)?;
+        for (track, line) in shown.iter().zip(std::mem::take(&mut self.numbers)) {
+            self.print(track, line, &mut out)?;
         }
+        self.print_summary(&mut out)?;
         Ok((filtered, smoothed))
     }
 
-    fn print(&self, track: &Track, line: u64, out: &mut impl Write) -> Result<(), Failure> {
-        let line = if self.arguments.json {
-            json(track, line, self.extent)? + "\n"
-        } else {
-            self.columns.csv(track, line)
+    fn print(&mut self, track: &Track, line: u64, out: &mut impl Write) -> Result<(), Failure> {
+        let text = match &mut self.format {
+            Format::Json => json(track, line, self.extent)? + "\n",
+            Format::Csv(columns) => columns.csv(track, line),
+            Format::Text(contacts) => contacts.lines(track),
         };
-        output::print(out, line.as_bytes())
+        output::print(out, text.as_bytes())
+    }
+
+    fn print_summary(&self, out: &mut impl Write) -> Result<(), Failure> {
+        match &self.format {
+            Format::Text(contacts) => output::print(out, contacts.summary().as_bytes()),
+            Format::Json | Format::Csv(_) => Ok(()),
+        }
     }
 
     /// The errors of both, where the truth is known.
@@ -288,6 +318,16 @@ impl Stream<'_> {
         };
         folder.write_report(track_report(&report))
     }
+}
+
+/// Output on stdout.
+enum Format {
+    /// A JSON object a reading.
+    Json,
+    /// A row a reading.
+    Csv(Columns),
+    /// Lines for people.
+    Text(Box<ContactLines>),
 }
 
 /// Columns of the CSV; the cells of a contact that does not touch are empty.
@@ -360,8 +400,11 @@ fn cells_on_plane(contact: Option<&Tracked>) -> Vec<String> {
     numbers.map(cell).to_vec()
 }
 
+/// Numbers from which on four decimals are beyond the precision of a float.
+const LARGE: f64 = 1e11;
+
 fn cell(number: f64) -> String {
-    format!("{number:.4}")
+    if number.abs() < LARGE { format!("{number:.4}") } else { format!("{number:.4e}") }
 }
 
 /// A line of JSON: all that is known of the reading in line `line` of its source.

@@ -64,6 +64,9 @@ fn a_board_that_moved_is_as_good_as_a_fresh_one_with_a_tare() {
         assert!(tared.0 < 1.15 * fresh.0 + 0.1, "--tare {tare}: {tared:?}, fresh {fresh:?}");
         assert!(tared.1 > 0.95, "--tare {tare}: {tared:?}");
     }
+    // One reading has more noise than a mean, of which a calibration by offsets does not know.
+    let last = judged(folder.path(), &touches, &["--tare", "last"]);
+    assert!(last.0 < 1.5 * fresh.0 && last.1 > 0.5, "{last:?}, fresh {fresh:?}");
 }
 
 #[test]
@@ -324,4 +327,52 @@ fn a_track_is_tared_too() {
     assert_eq!(plain.len(), tared.len());
     assert!(plain.len() > 100);
     assert!(plain.iter().zip(&tared).all(|(a, b)| (a - b).abs() < 0.1));
+}
+
+/// A recording with the time of each row, so many a second.
+fn timed(recording: &str, rate_hz: f64) -> String {
+    let rows = recording.lines().enumerate().map(|(i, line)| match i {
+        0 => format!("time_s,{line}\n"),
+        _ => format!("{},{line}\n", (i - 1) as f64 / rate_hz),
+    });
+    rows.collect()
+}
+
+#[test]
+fn the_first_seconds_are_tared_by_where_rows_have_times() {
+    let (folder, mut board) = fitted();
+    let touches = touches(&mut board);
+    board.move_offsets(50.0);
+    let recording = board.recording(&touches);
+    fs::write(folder.path().join("touches.csv"), &recording).unwrap();
+    let locate = |tare: &str| run(folder.path(), &["locate", "board.json", "touches.csv", "--tare", tare]);
+    let without = complained(&locate("2 s"), 2);
+    assert!(without.contains("has no time"), "{without}");
+    // Two seconds are 20 readings.
+    fs::write(folder.path().join("touches.csv"), timed(&recording, 10.0)).unwrap();
+    for (seconds, readings) in
+        [("2 s", "20"), ("2 s,auto", "20,auto"), ("0.05 min", "30"), ("2s,last", "20,last")]
+    {
+        assert_eq!(said(&locate(seconds)), said(&locate(readings)), "{seconds}");
+    }
+    let long = complained(&locate("1 h"), 2);
+    assert!(long.contains("the first 3600 s"), "{long}");
+}
+
+#[test]
+fn a_calibration_by_the_latest_zero_is_used_by_it() {
+    let (folder, mut board) = (folder(RIG), Board::new(7));
+    let rig = RIG.replacen("[recording]", "[recording]\nzero = \"last\"", 1);
+    assert_ne!(rig, RIG);
+    fs::write(folder.path().join("rig.toml"), rig).unwrap();
+    fs::write(folder.path().join("presses.csv"), board.calibration(84)).unwrap();
+    said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
+    let touches = touches(&mut board);
+    fs::write(folder.path().join("touches.csv"), board.recording(&touches)).unwrap();
+    let fresh = judged(folder.path(), &touches, &[]);
+    board.move_offsets(500.0);
+    fs::write(folder.path().join("touches.csv"), board.recording(&touches)).unwrap();
+    let moved = judged(folder.path(), &touches, &[]);
+    println!("fresh {fresh:?}, moved {moved:?}");
+    assert!(moved.0 < 1.15 * fresh.0 + 0.1 && moved.1 > 0.95, "{fresh:?} {moved:?}");
 }

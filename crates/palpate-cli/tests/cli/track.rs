@@ -73,6 +73,35 @@ fn rows_that_cannot_be_followed_are_skipped_and_counted() {
 }
 
 #[test]
+fn prints_lines_for_people_where_a_contact_changes() {
+    let folder = moved();
+    let text = said(&run(folder.path(), &["track", "locator.json", "moving.csv", "--text"]));
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(lines[0].contains("s: contact 1 at "), "{text}");
+    assert!(lines.last().unwrap().starts_with("1 contact in "), "{text}");
+    // A line a second at most, and none twice.
+    let csv = fs::read_to_string(folder.path().join("moving.csv")).unwrap();
+    let last_s: f64 = csv.lines().last().unwrap().split(',').next().unwrap().parse().unwrap();
+    assert!(lines.len() > 4 && (lines.len() as f64) < last_s + 4.0, "{last_s} s: {text}");
+    assert!(lines.windows(2).all(|pair| pair[0] != pair[1]), "{text}");
+    assert!(text.split([' ', '(', ')']).all(|word| word.len() < 10), "{text}");
+    complained(&run(folder.path(), &["track", "locator.json", "moving.csv", "--text", "--csv"]), 2);
+}
+
+#[test]
+fn prints_few_messages_about_many_skipped_rows() {
+    let folder = moved();
+    let csv = fs::read_to_string(folder.path().join("moving.csv")).unwrap();
+    let mut lines: Vec<&str> = csv.lines().take(10).collect();
+    lines.extend(std::iter::repeat_n(lines[9], 340));
+    fs::write(folder.path().join("held.csv"), lines.join("\n") + "\n").unwrap();
+    let output = run(folder.path(), &["track", "locator.json", "held.csv"]);
+    let complaint = complained(&output, 3);
+    assert!(complaint.contains("340 of 350 lines gave no estimate"), "{complaint}");
+    assert!(complaint.lines().count() < 30, "{complaint}");
+}
+
+#[test]
 fn what_cannot_be_tracked_is_refused_in_words() {
     let folder = moved();
     said(&run(folder.path(), &["simulate", "rig.toml", "-o", "presses.csv"]));

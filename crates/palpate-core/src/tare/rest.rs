@@ -6,10 +6,14 @@
 use super::{LET_GO, next_in_row};
 use crate::Status;
 
-/// Readings in a row that stay, by which a surface is at rest.
+/// Fewest readings in a row that stay, by which a surface is at rest.
 const AT_REST: u32 = 2 * LET_GO;
+/// Time in seconds for which they stay: [`AT_REST`] readings at 100 a second. Over less, the slow beginning of a touch seems to stay.
+const AT_REST_S: f64 = 0.1;
 /// Untouched readings after a touch by which it is at rest, whether they stay or not.
 const UNTOUCHED: u32 = 10 * AT_REST;
+/// Time in seconds of these readings, where they have times.
+const UNTOUCHED_S: f64 = 10.0 * AT_REST_S;
 /// Untouched readings from which on the noise is known.
 const NOISE_KNOWN: u32 = 20;
 /// Largest size of a residue, as a share of the touch before it. Gauges on elastic surfaces leave up to 3 % by hysteresis, and as much by creep.
@@ -26,6 +30,25 @@ pub(super) enum Course {
     Settling,
     /// A touch has ended, and readings are at rest: their mean is [`RestWatch::rest`].
     AtRest,
+}
+
+/// Readings that make a rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct RestLength {
+    stays: u32,
+    untouched: u32,
+}
+
+impl RestLength {
+    /// Numbers for readings without times.
+    pub const COUNTED: Self = Self { stays: AT_REST, untouched: UNTOUCHED };
+
+    /// Numbers for readings so many seconds apart.
+    pub fn of_interval(interval_s: f64) -> Self {
+        // The conversions saturate.
+        let readings = |seconds: f64| libm::ceil(seconds / interval_s) as u32;
+        Self { stays: readings(AT_REST_S).max(AT_REST), untouched: readings(UNTOUCHED_S).max(AT_REST) }
+    }
 }
 
 /// Watch for the rest after a touch.
@@ -91,7 +114,14 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
     }
 
     /// Takes a reading that has a status by the baseline.
-    pub fn add(&mut self, reading: &[f64], baseline: &[f64], status: Status, time_constant: u32) -> Course {
+    pub fn add(
+        &mut self,
+        reading: &[f64],
+        baseline: &[f64],
+        status: Status,
+        time_constant: u32,
+        length: RestLength,
+    ) -> Course {
         let is_untouched = status == Status::NoContact;
         if is_untouched && self.touched == 0 {
             self.learn_noise(reading, baseline, time_constant);
@@ -118,7 +148,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         }
         self.follow_rest(reading);
         let is_residue = is_untouched || size <= RESIDUE * RESIDUE * self.touch_size;
-        if (is_residue && self.rested >= AT_REST) || self.untouched >= UNTOUCHED {
+        if (is_residue && self.rested >= length.stays) || self.untouched >= length.untouched {
             Course::AtRest
         } else if is_untouched {
             Course::Settling

@@ -49,7 +49,7 @@ use crate::network::{
 };
 use crate::offset_course::OffsetCourse;
 use crate::reading_check::ReadingCheck;
-use crate::recording::Recording;
+use crate::recording::{Recording, Zero};
 use crate::setup::{Setup, SetupError};
 use crate::status::FalseAlarmRate;
 
@@ -462,7 +462,8 @@ impl Locator {
         known.ok_or(NoBaseline { kind: self.kind() })
     }
 
-    /// A tare of its readings, whose baseline is as calibration left it.
+    /// A tare of its readings, whose baseline is as calibration left it. Followed, it takes the latest untouched reading where the calibration
+    /// did ([`Zero::Last`]); the first reading is untouched then.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, fit::Fit, influence::Influence, setup::Setup};
@@ -487,11 +488,16 @@ impl Locator {
     /// [`NoBaseline`] where calibration does not tell what the surface reads untouched.
     pub fn tare(&self) -> Result<Tare<Vec<f64>>, NoBaseline> {
         let tare = Tare::new(self.untouched_reading()?);
-        let tare = match &self.untouched_drift {
-            Some(drift) => {
+        let channels = self.layout().len();
+        let tare = match (self.setup.recording_columns().zero, &self.untouched_drift) {
+            // The calibration has no offsets: the first reading in use is the first zero, whatever it reads.
+            (Zero::Last, _) => tare.and_then(|tare| {
+                tare.with_last_zero().with_drift(vec![0.0; channels], vec![f64::INFINITY; channels])
+            }),
+            (Zero::None, Some(drift)) => {
                 tare.and_then(|tare| tare.with_drift(drift.last.clone(), drift.reach(self.layout())))
             }
-            None => tare,
+            (Zero::None, None) => tare,
         };
         // Channels and values of a locator are checked.
         tare.map_err(|_| NoBaseline { kind: self.kind() })

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::marks::{Decimal, Separator};
 use super::repeated_readings::RepeatedReadings;
 use super::untouched::TimeSpan;
+use super::zero::Zero;
 
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
@@ -57,6 +58,9 @@ pub struct Columns {
     /// Treatment of rows that repeat the reading before them.
     #[serde(default, skip_serializing_if = "RepeatedReadings::is_auto")]
     pub repeated_readings: RepeatedReadings,
+    /// Zero of the readings.
+    #[serde(default, skip_serializing_if = "Zero::is_none")]
+    pub zero: Zero,
 }
 
 /// Conversion of a file's coordinates to positions on the surface: rounded, then less the origin.
@@ -215,6 +219,7 @@ impl Columns {
             separator: None,
             decimal: None,
             repeated_readings: RepeatedReadings::Auto,
+            zero: Zero::None,
         }
     }
 
@@ -289,6 +294,7 @@ impl Columns {
             separator: None,
             decimal: None,
             repeated_readings: RepeatedReadings::Auto,
+            zero: Zero::None,
         }
     }
 }

@@ -232,6 +232,9 @@ pub enum CsvProblem {
         /// Greatest time of a row, in seconds.
         to_s: f64,
     },
+    /// No row is untouched, and the zero of the readings needs such rows.
+    #[error("{0}")]
+    NoZero(#[from] super::zero::NoUntouchedRow),
     /// A field of the time column is neither a number nor a timestamp.
     #[error(
         "`{text}` is not a time; write a number, `2026-04-03 14:03:25.120`, `03.04.2026 14:03:25,120` or `14:03:25`"

@@ -52,7 +52,7 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
     let rows = settle_forces(rows, columns, &mut dialect)?;
     schema.check_untouched_times(source, &rows)?;
     let placement_sd_m = placement_of(&file.content);
-    let mut recording = schema.recording(source, rows, vec![file.digest], [dialect]);
+    let mut recording = schema.recording(source, rows, vec![file.digest], [dialect])?;
     recording.provenance.placement_sd_m = placement_sd_m;
     Ok(recording)
 }
@@ -93,7 +93,7 @@ pub fn read_pair(
     let rows = settle_forces(rows, columns, &mut contact_dialect)?;
     schema.check_untouched_times(readings.source, &rows)?;
     let digests = vec![readings.digest, contacts.digest];
-    Ok(schema.recording(&source, rows, digests, [reading_dialect, contact_dialect]))
+    schema.recording(&source, rows, digests, [reading_dialect, contact_dialect])
 }
 
 impl Schema<'_> {
@@ -128,11 +128,12 @@ impl Schema<'_> {
         rows: Vec<Row>,
         digests: Vec<String>,
         dialects: impl IntoIterator<Item = Dialect>,
-    ) -> Recording {
+    ) -> Result<Recording, CsvError> {
         let mut recording = Recording::new(self.layout, source, rows);
         recording.provenance.digests = digests;
         recording.provenance.dialects = dialects.into_iter().filter(|dialect| !dialect.is_plain()).collect();
-        recording.treat_repeated_readings(self.columns.repeated_readings)
+        let recording = recording.treat_repeated_readings(self.columns.repeated_readings);
+        recording.zeroed(self.columns.zero).map_err(|error| CsvProblem::from(error).in_file(source))
     }
 }
 
@@ -380,6 +381,14 @@ impl TimeField {
         time.map(field).transpose().map(Self)
     }
 
+    /// The field where the column is there.
+    fn find_optional(head: &mut Cells, columns: &Columns) -> Result<Self, CsvError> {
+        match Self::find(head, columns) {
+            Err(CsvError { problem: CsvProblem::MissingColumn { .. }, .. }) => Ok(Self(None)),
+            found => found,
+        }
+    }
+
     fn read(self, cells: &mut Cells, clock: &mut Clock) -> Result<Option<f64>, CsvError> {
         self.0.map(|(field, unit)| cells.time(field, unit, clock)).transpose()
     }
@@ -405,14 +414,27 @@ pub trait LineParser {
 /// Turns lines of CSV into readings; only the channel columns need to be there.
 #[derive(Debug)]
 pub struct ReadingParser {
-    lines: Lines<ChannelFields>,
+    lines: Lines<(ChannelFields, TimeField)>,
     columns: Columns,
+    clock: Clock,
+    time_s: Option<f64>,
 }
 
 impl ReadingParser {
     /// A parser for the lines of `source`, from the first one; the position and force columns need not be there.
     pub fn new(source: &str, columns: &Columns) -> Self {
-        Self { lines: Lines::new(source, Reading::of(columns, Origin::Stream)), columns: columns.clone() }
+        let lines = Lines::new(source, Reading::of(columns, Origin::Stream));
+        Self { lines, columns: columns.clone(), clock: Clock::default(), time_s: None }
+    }
+
+    /// Time of the last reading in seconds, where its line has one.
+    pub fn time_s(&self) -> Option<f64> {
+        self.time_s
+    }
+
+    /// True where a column has the time.
+    pub fn has_time(&self) -> bool {
+        self.lines.fields().is_some_and(|(_, time)| time.0.is_some())
     }
 }
 
@@ -421,9 +443,15 @@ impl LineParser for ReadingParser {
     type Parsed = Vec<f64>;
 
     fn parse_line(&mut self, line: &[u8]) -> Result<Option<Vec<f64>>, CsvError> {
-        let Self { lines, columns } = self;
-        let next = lines.next(line, |head| ChannelFields::find(head, columns))?;
-        next.map(|(mut cells, channels)| channels.checked_reading(&mut cells)).transpose()
+        let Self { lines, columns, clock, time_s } = self;
+        let next = lines.next(line, |head| {
+            Ok((ChannelFields::find(head, columns)?, TimeField::find_optional(head, columns)?))
+        })?;
+        let Some((mut cells, (channels, time))) = next else { return Ok(None) };
+        let reading = channels.checked_reading(&mut cells)?;
+        // A reading without its time is a reading all the same.
+        *time_s = time.read(&mut cells, clock).unwrap_or(None);
+        Ok(Some(reading))
     }
 
     fn progress(&mut self) -> &mut dyn LineProgress {
@@ -567,10 +595,7 @@ impl TimedFields {
         let second = field(SECOND[0])?.zip(field(SECOND[1])?);
         Ok(Self {
             second,
-            time: match TimeField::find(head, columns) {
-                Err(CsvError { problem: CsvProblem::MissingColumn { .. }, .. }) => TimeField(None),
-                found => found?,
-            },
+            time: TimeField::find_optional(head, columns)?,
             contact: if named { ContactFields::find(head, columns).ok() } else { None },
             channels: ChannelFields::find(head, columns)?,
         })

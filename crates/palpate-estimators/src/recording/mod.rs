@@ -21,6 +21,7 @@ mod text;
 mod timestamp;
 mod untouched;
 mod warnings;
+mod zero;
 mod zero_force;
 
 pub use columns::{Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn};
@@ -43,6 +44,7 @@ pub use text::TextDecoder;
 pub use untouched::{TimeSpan, TimeSpanError};
 pub(crate) use warnings::channel_list;
 pub use warnings::{DriftRows, Warning};
+pub use zero::{NoUntouchedRow, Zero};
 pub use zero_force::ZeroForce;
 
 use serde::{Deserialize, Serialize};

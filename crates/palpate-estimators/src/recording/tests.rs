@@ -38,6 +38,7 @@ fn foreign() -> Columns {
         separator: None,
         decimal: None,
         repeated_readings: RepeatedReadings::Auto,
+        zero: Zero::None,
     }
 }
 

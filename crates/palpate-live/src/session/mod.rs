@@ -206,6 +206,7 @@ impl<'a> Session<'a> {
         self.health.add(&frame.reading, |event| out.push(Output::Event(EventRecord { time_s, event })));
         let is_repeat = self.watch_repeats(time_s, &frame.reading, out);
         let mut tared = frame.reading.clone();
+        self.taring.note_time(time_s);
         // The baseline follows single readings, whatever becomes of them afterwards: a filtered reading would be late to show a contact.
         let single = if is_repeat {
             let single = self.taring.locate_repeat(self.locator, &frame.reading, &mut tared);

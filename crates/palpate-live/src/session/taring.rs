@@ -30,6 +30,13 @@ impl Taring {
         Self { tare, follows, taken: None }
     }
 
+    /// Notes the time of the next reading, in seconds.
+    pub fn note_time(&mut self, time_s: f64) {
+        if let Some(tare) = &mut self.tare {
+            tare.note_time(time_s);
+        }
+    }
+
     /// Begins to take a baseline.
     pub fn begin(&mut self) {
         self.taken = self.tare.as_ref().map(|tare| (tare.restarted(), READINGS));
