@@ -152,9 +152,8 @@ pub fn compare<'py>(
             contenders(bench, &own, rows)
         }
     };
-    let is_named = |contender: &estimator::Estimator, only: &str| {
-        [contender.kind(), contender.name()].contains(&only)
-    };
+    let is_named =
+        |contender: &estimator::Estimator, only: &str| [contender.kind(), contender.name()].contains(&only);
     let suits = |only: &&String| contenders.iter().any(|contender| is_named(contender, only));
     if let Some(unknown) = only.iter().find(|only| !suits(only)) {
         let mut known: Vec<&str> = contenders.iter().map(|contender| contender.kind()).collect();

@@ -59,6 +59,6 @@ mod thinning;
 pub mod track_errors;
 pub mod tracking;
 mod trade_off;
-pub mod untouched_drift;
 mod tried;
+pub mod untouched_drift;
 pub mod untouched_scatter;

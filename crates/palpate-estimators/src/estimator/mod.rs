@@ -15,12 +15,12 @@ pub use crate::load_profile::{
 pub use crate::tracking::{
     Across, Creep, Drift, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig,
 };
+pub use crate::tried::Tried;
 pub use compare::{CompareOptions, Compared, Comparison, compare, contenders};
 pub use cost::FitCost;
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
 pub use memory::{MemoryExceeded, MemoryLimit, MemoryLimitError, Size};
 pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Tare, TareError, Uncertainty};
-pub use crate::tried::Tried;
 pub use settings::Setting;
 
 use std::borrow::Cow;
