@@ -21,7 +21,7 @@ pub struct Estimate {
 pub struct ContactEstimate {
     /// Estimated position.
     pub position: Position,
-    /// Its force in newtons, positive downward, where it is known or estimated.
+    /// Force in newtons, positive downward, where it is known or estimated.
     pub force_n: Option<f64>,
     /// Uncertainty of position and force, where the method can tell.
     pub uncertainty: Option<Uncertainty>,
@@ -71,7 +71,7 @@ impl Uncertainty {
 pub struct Mode {
     /// The contact there.
     pub contact: ContactEstimate,
-    /// Its share of the posterior probability, 0 to 1.
+    /// Share of the posterior probability, 0 to 1.
     pub probability: f64,
 }
 
@@ -120,7 +120,7 @@ impl Status {
     pub const ALL: [Self; 5] =
         [Self::Located, Self::NoContact, Self::Ambiguous, Self::OutsideModel, Self::OutsideSurface];
 
-    /// Its name in files and on streams.
+    /// Name in files and on streams.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Located => "located",

@@ -115,7 +115,7 @@ pub enum TareError {
     NotFinite {
         /// Which channel, from 1.
         channel: usize,
-        /// Its value.
+        /// Value.
         value: f64,
     },
 }
@@ -303,7 +303,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// A baseline is confirmed where calibration learnt the same, where readings known to be untouched made it, or once a contact has come and gone
     /// by it. So a board that is touched while it starts is right from the moment it is let go; where it has moved and what touched it is no contact
     /// (a palm, another force than the known one), it is right from the end of the first touch that is one. Contacts lighter than
-    /// those that are told from noise go into the baseline.
+    /// those that are distinguished from noise go into the baseline.
     ///
     /// # Errors
     /// [`TareError`] as for [`Tare::apply`].

@@ -11,7 +11,7 @@ use crate::contacts::WeightedContacts;
 pub struct Verification {
     /// The mean error, in metres, over all calibrations.
     pub mean_error_m: f64,
-    /// Its standard error, in metres, from how the calibrations differ.
+    /// Standard error, in metres, from how the calibrations differ.
     pub standard_error_m: f64,
     /// The median of the calibrations' mean errors, in metres.
     pub median_error_m: f64,

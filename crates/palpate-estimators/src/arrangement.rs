@@ -73,17 +73,17 @@ pub enum ArrangementError {
     /// The middle portion is empty or reaches a support.
     #[error("the middle portion goes from {start} to {end} of the length; 0 < start < end < 1 must hold")]
     Portion {
-        /// Its start, as a share of the length.
+        /// Start, as a share of the length.
         start: f64,
-        /// Its end, as a share of the length.
+        /// End, as a share of the length.
         end: f64,
     },
     /// The portion of even positions is empty or reaches beyond the surface.
     #[error("the portion goes from {start} to {end} of the length; 0 ≤ start < end ≤ 1 must hold")]
     EvenPortion {
-        /// Its start, as a share of the length.
+        /// Start, as a share of the length.
         start: f64,
-        /// Its end, as a share of the length.
+        /// End, as a share of the length.
         end: f64,
     },
     /// The explicit positions are not as many as was said.

@@ -72,7 +72,7 @@ pub struct ModeRecord {
     /// The contact there.
     #[serde(flatten)]
     pub contact: ContactRecord,
-    /// Its share of the probability, 0 to 1.
+    /// Share of the probability, 0 to 1.
     pub probability: f64,
 }
 

@@ -394,7 +394,7 @@ impl CheckEstimate for NoCheck {
 pub struct Fitted<M: Locate> {
     /// The surface that is touched, and its sensors.
     pub setup: Setup,
-    /// Its provenance.
+    /// Provenance.
     pub provenance: LocatorProvenance,
     /// The method and what it learnt.
     pub method: M,
@@ -625,7 +625,7 @@ pub enum ReadingError {
     NotFinite {
         /// Which channel, from 1.
         channel: usize,
-        /// Its value.
+        /// Value.
         value: f64,
     },
 }

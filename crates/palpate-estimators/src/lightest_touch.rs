@@ -1,4 +1,4 @@
-//! The lightest touch that is told from noise: the force from which on a contact is found at a given false-alarm rate.
+//! The lightest touch that is distinguished from noise: the force from which on a contact is found at a given false-alarm rate.
 //!
 //! The probability that a contact is found follows from its signal-to-noise ratio, by the rule of `no_contact` ([`crate::status`]).
 

@@ -9,7 +9,7 @@
 //! - the position stays, but for one beyond an edge of the surface where a contact on it explains the reading: it is moved to that edge;
 //! - the 95 % interval is the least that holds the check's and the position. What a learnt method says of its own errors is of contacts like
 //!   those of its presses: how errors change with force and place, the forward way knows better.
-//! - Where it does not, as of surfaces whose readings influence functions do not explain well, a method that knows its errors at positions held out has
+//! - Where it does not, as of surfaces whose readings influence functions do not explain well, a method that knows its errors at held-out positions has
 //!   the shorter intervals. Those stand at contacts like its presses: of the forces that were pressed.
 
 use serde::{Deserialize, Serialize};
@@ -182,7 +182,7 @@ impl ReadingCheck {
         self.own_intervals.is_some()
     }
 
-    /// Its means, in words.
+    /// Means, in words.
     pub fn in_words(&self) -> &'static str {
         match &self.by {
             Forward::Influence(_) => "influence functions of the same recording",

@@ -71,7 +71,7 @@ pub enum SetupError {
     NoSupport {
         /// Which sensor of its group, from 1.
         number: usize,
-        /// Its position.
+        /// Position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -86,7 +86,7 @@ pub enum SetupError {
         number: usize,
         /// Quantity that it measures.
         kind: SensorKind,
-        /// Its position.
+        /// Position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -229,7 +229,7 @@ impl Setup {
         &self.surface
     }
 
-    /// Its sensors, one a channel of a reading.
+    /// Sensors, one a channel of a reading.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
@@ -268,7 +268,7 @@ impl Setup {
         Ok(self)
     }
 
-    /// The same with these sensors instead, whether or not they read something there.
+    /// The same with these sensors instead, whether they read something there.
     ///
     /// # Errors
     /// [`OffSurface`] for the first sensor beside the surface.

@@ -317,7 +317,7 @@ pub fn simulate_loads_watched(
 /// The places of the sensors, the gains and offsets of the channels, and the stream of their noise.
 fn draw_faults(setup: &Setup, seed: u64) -> (Layout, ChannelErrors, Xoshiro256PlusPlus) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    // Places have a stream of their own, so that the noise is the same whether or not sensors are displaced.
+    // Places have a stream of their own, so that the noise is the same whether sensors are displaced.
     let mut places = rng.clone();
     places.jump();
     let placed = displaced(setup.layout(), setup.surface().extent(), &mut places);

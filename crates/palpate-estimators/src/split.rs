@@ -12,7 +12,7 @@ pub struct Split {
     pub judged: Recording,
     /// Offsets at the rows to judge by, to be brought to those that a locator learns; `None` to judge by the readings as they are.
     pub offsets: Option<OffsetCourse>,
-    /// Its origin.
+    /// Origin.
     pub origin: SplitOrigin,
 }
 

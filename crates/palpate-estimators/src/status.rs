@@ -161,7 +161,7 @@ pub(crate) fn learnt_bounds<const N: usize>(
     })
 }
 
-/// Places along a line that readings tell apart.
+/// Places along a line that readings distinguish.
 pub(crate) const LINE_PLACES: usize = 33;
 
 /// Cost in χ² of a contact with so many unknowns, read by so many channels, that could have been at so many places, by the extended
@@ -261,7 +261,7 @@ impl Directions {
     }
 
     /// The same, of noise of so many channels whose |d|² is at most `square` besides. Each term of [`Directions::exceeded`] is the integral
-    /// of a density of the component; what is left of |d|² is χ² of the channels that the term does not use.
+    /// of a density of the component; the remainder of |d|² is χ² of the channels that the term does not use.
     fn exceeded_within(self, u: f64, square: f64, channels: usize) -> f64 {
         const STEPS: usize = 64;
         let most = square.sqrt();

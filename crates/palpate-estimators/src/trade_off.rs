@@ -105,7 +105,7 @@ pub(crate) struct NotExcluded {
 /// Places side by side that a reading does not exclude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stretch {
-    /// Its ends, in metres.
+    /// Ends, in metres.
     pub x_95_m: (f64, f64),
     /// The forces at its places that the reading does not exclude, in newtons.
     pub force_95_n: (f64, f64),
@@ -114,7 +114,7 @@ pub(crate) struct Stretch {
     pub force_n: f64,
     /// Mean squares of place, place and force, and force about these: m², m·N, N².
     pub covariance: [f64; 3],
-    /// Its share of the posterior probability.
+    /// Share of the posterior probability.
     pub probability: f64,
 }
 

@@ -19,7 +19,7 @@ pub struct EventRecord {
 pub enum Event {
     /// The source is there.
     SourceOpened {
-        /// Its name.
+        /// Name.
         name: String,
     },
     /// The source went away, and is looked for again.
@@ -59,7 +59,7 @@ pub enum Event {
         /// Seconds since it was touched.
         seconds: f64,
     },
-    /// A second contact came, or what cannot be told from one.
+    /// A second contact came, or what cannot be distinguished from one.
     OutsideModel,
     /// Contacts beside the first.
     SecondContact {
@@ -69,9 +69,9 @@ pub enum Event {
     },
     /// The state of a channel has changed.
     Channel {
-        /// Its name.
+        /// Name.
         name: String,
-        /// Its state now.
+        /// State now.
         state: ChannelState,
     },
     /// The baseline was taken anew.
@@ -85,12 +85,12 @@ pub enum Event {
     Alarm {
         /// Name of the rule.
         name: String,
-        /// Its text.
+        /// Text.
         text: String,
     },
     /// Somebody's mark.
     Mark {
-        /// Its text.
+        /// Text.
         text: String,
     },
 }

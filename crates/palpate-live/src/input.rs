@@ -39,7 +39,7 @@ pub enum Arrival {
 pub struct Arrived {
     /// The instant at which its last byte was there.
     pub at: Stamp,
-    /// Its kind, with the bytes.
+    /// Kind, with the bytes.
     pub arrival: Arrival,
 }
 
@@ -56,7 +56,7 @@ pub enum Command {
     Alarm {
         /// Name of the rule.
         name: String,
-        /// Its text.
+        /// Text.
         text: String,
     },
 }

@@ -45,7 +45,7 @@ pub struct Rules(Vec<Rule>);
 /// A rule.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// When it acts.
     pub condition: Condition,

@@ -17,9 +17,9 @@ use palpate_numerics::OutOfRange;
 pub struct OffSurface {
     /// Name of what lies there.
     pub what: &'static str,
-    /// Its number in its list, from 1.
+    /// Number in its list, from 1.
     pub number: usize,
-    /// Its position.
+    /// Position.
     pub position: Position,
     /// The surface.
     pub extent: Extent,
@@ -159,7 +159,7 @@ impl Extent {
         }
     }
 
-    /// Its sides, in metres: the length, and the width of a plane; as many as a contact has coordinates.
+    /// Sides, in metres: the length, and the width of a plane; as many as a contact has coordinates.
     pub fn sides_m(&self) -> impl Iterator<Item = f64> + use<> {
         std::iter::once(self.length_m()).chain(self.width_m())
     }

@@ -30,7 +30,7 @@ impl SensorKind {
     /// Every kind, in the order of their declaration, by which tables over kinds are indexed and messages list them.
     pub const ALL: [Self; 5] = [Self::Deflection, Self::Slope, Self::Strain, Self::Reaction, Self::Raw];
 
-    /// Its name in a rig.
+    /// Name in a rig.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Deflection => "deflection",
@@ -78,7 +78,7 @@ pub struct Sensor {
     pub kind: SensorKind,
     /// Position on the surface; without meaning for a raw channel.
     pub position: Position,
-    /// Its name, unique in the layout: "deflection_1", or what the recording calls its channel.
+    /// Name, unique in the layout: "deflection_1", or what the recording calls its channel.
     pub name: String,
     /// The faults of its channel.
     pub channel: ChannelModel,
@@ -468,7 +468,7 @@ pub enum NoiseError {
         kind: SensorKind,
         /// Standard deviation of its noise, in its SI unit.
         noise_sd: f64,
-        /// Its quantisation step, in its SI unit.
+        /// Quantisation step, in its SI unit.
         resolution: f64,
     },
     /// Every channel is dead.

@@ -460,7 +460,7 @@ impl Unit {
         (0..UNITS.len()).map(Self).filter(written)
     }
 
-    /// Its symbol.
+    /// Symbol.
     pub fn symbol(self) -> &'static str {
         self.entry().0
     }

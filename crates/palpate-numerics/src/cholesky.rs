@@ -44,7 +44,7 @@ pub struct NotPositiveDefinite {
     pub row: usize,
     /// Rows of the matrix.
     pub size: usize,
-    /// Its value, which must be greater than 0.
+    /// Value, which must be greater than 0.
     pub pivot: f64,
 }
 

@@ -55,7 +55,7 @@ pub struct NormalPart {
     pub ln_share: f64,
     /// Mean of the distribution that is cut off at both ends.
     pub mean: f64,
-    /// Its variance.
+    /// Variance.
     pub variance: f64,
 }
 

@@ -13,9 +13,9 @@
 pub struct OutOfRange {
     /// Which number.
     pub what: &'static str,
-    /// Its value.
+    /// Value.
     pub value: f64,
-    /// Its bound.
+    /// Bound.
     pub bound: &'static str,
 }
 

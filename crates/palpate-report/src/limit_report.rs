@@ -31,7 +31,7 @@ pub struct LimitReport<'a> {
     pub title: &'a str,
     /// The surface and its sensors.
     pub setup: &'a Setup,
-    /// Its limit.
+    /// Limit.
     pub limit: &'a CramerRaoBound<'a>,
     /// The limit all over the surface for a known force.
     pub known: &'a LimitCurve,
@@ -43,7 +43,7 @@ pub struct LimitReport<'a> {
     pub warnings: &'a [LimitWarning],
     /// Positions for the table.
     pub listed: &'a [Position],
-    /// The lightest touch that is told from noise.
+    /// The lightest touch that is distinguished from noise.
     pub touch: &'a LightestTouch<'a>,
 }
 

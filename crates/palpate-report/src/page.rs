@@ -12,9 +12,9 @@ const STYLE: &str = include_str!("page.css");
 /// A file of a report, for the caller to write.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReportFile {
-    /// Its name in the report's folder: "report.html", "figure-2.svg".
+    /// Name in the report's folder: "report.html", "figure-2.svg".
     pub name: String,
-    /// Its content.
+    /// Content.
     pub bytes: Vec<u8>,
 }
 

@@ -13,7 +13,7 @@ use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_studies::{Arm, ArmOutcome, ArmResults, PreparedStudy, RunFacts, StudyResults};
 
-/// Number of arms that are told apart in a table; more are also drawn side by side.
+/// Number of arms that are distinguished in a table; more are also drawn side by side.
 const FEW_ARMS: usize = 3;
 /// Greatest number of bands that lie over each other in a figure.
 const MOST_BANDS: usize = 2;
@@ -318,7 +318,7 @@ impl<'a> StudyReport<'a> {
         Some(self.study.study.arms.first()?.rig.setup.surface().extent().along_x())
     }
 
-    /// Its length in metres.
+    /// Length in metres.
     pub(crate) fn length_m(&self) -> f64 {
         self.extent().map_or(f64::NAN, |extent| extent.length_m())
     }

@@ -13,7 +13,7 @@ use palpate_mechanics::surface::Extent;
 
 /// Greatest number of single estimates that are drawn; more would hide the track.
 const MOST_POINTS: usize = 60;
-/// Greatest number of points of a line; more cannot be told apart.
+/// Greatest number of points of a line; more cannot be distinguished.
 const MOST_OF_LINE: usize = 2000;
 /// Width of the plot area of a chart, and what there is above and below it, both about: a plane is drawn to scale.
 const PLOT_WIDTH_PX: f64 = 630.0;

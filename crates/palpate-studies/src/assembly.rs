@@ -86,7 +86,7 @@ pub enum AssemblyError {
         wanted: usize,
         /// Arm of the first that is missing.
         arm: String,
-        /// Its seed.
+        /// Seed.
         seed: u64,
     },
     /// No part at all.

@@ -227,7 +227,7 @@ impl ArraySensor {
         Ok(Self { rig, spread, spread_m, presses })
     }
 
-    /// Its bench, with the rig's training positions.
+    /// Bench, with the rig's training positions.
     pub fn rig(&self) -> &Rig {
         &self.rig
     }

@@ -138,16 +138,16 @@ pub struct SetUp {
     pub force: Force,
     /// The method that its layout was asked for by.
     pub layout: Option<&'static str>,
-    /// Its sensors.
+    /// Sensors.
     pub sensors: Vec<SensorPlace>,
 }
 
 /// A sensor in short.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SensorPlace {
-    /// Its kind.
+    /// Kind.
     pub measure: SensorKind,
-    /// Its position along the surface, in millimetres.
+    /// Position along the surface, in millimetres.
     pub position_mm: f64,
 }
 

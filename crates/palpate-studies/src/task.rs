@@ -92,7 +92,7 @@ impl Shard {
         Ok(Self { number, of })
     }
 
-    /// Its number, from 1.
+    /// Number, from 1.
     pub fn number(self) -> u64 {
         self.number
     }

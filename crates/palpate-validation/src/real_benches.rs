@@ -78,9 +78,9 @@ pub struct Results {
 /// A rig as its file has it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RigText {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its text.
+    /// Text.
     pub toml: &'static str,
 }
 

@@ -133,7 +133,7 @@ pub enum Placement {
 }
 
 impl Placement {
-    /// Its name in tables.
+    /// Name in tables.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Existing => "existing",

@@ -25,7 +25,7 @@ const KERNELS: [Kernel; 3] = [Kernel::Matern32, Kernel::Matern52, Kernel::Square
 /// Whitened readings as functions of position.
 pub(super) struct ForwardModel {
     process: GaussianProcess,
-    /// Its correlation: of the kernels that were tried, the one under which the readings are the most probable.
+    /// Correlation: of the kernels that were tried, the one under which the readings are the most probable.
     kernel: Kernel,
     /// The variance of the functions before any press, the sensors' mean.
     signal_variance: f64,

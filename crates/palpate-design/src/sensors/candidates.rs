@@ -16,7 +16,7 @@ const SAME: f64 = 1e-6;
 pub struct PlacedSensor {
     /// Which of the design's offers.
     pub offer: usize,
-    /// Its position.
+    /// Position.
     pub position: Position,
 }
 
@@ -334,7 +334,7 @@ pub(super) fn exclusion(
 }
 
 /// Least distance of a sensor from the mirror image of another where symmetry is forbidden: the spacing, or more than half
-/// the distance of sites, so that sites next to each other are told apart.
+/// the distance of sites, so that sites next to each other are distinguished.
 fn mirror_distance(design: &SensorDesign, extent: Extent) -> f64 {
     let pitch_m = design.sites.distance_m(extent.length_m()).unwrap_or(0.0);
     design.spacing_m.max(0.5 * pitch_m).max(2e-9 * extent.length_m())

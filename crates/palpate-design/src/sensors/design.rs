@@ -54,7 +54,7 @@ pub struct SensorDesign {
 pub struct SensorOffer {
     /// Quantity that it measures; never raw.
     pub kind: SensorKind,
-    /// Its noise and faults.
+    /// Noise and faults.
     pub channel: ChannelModel,
     /// Cost of one; at least 0, in any unit.
     pub cost: f64,
@@ -118,7 +118,7 @@ impl KeepOut {
 pub struct MustHave {
     /// Which of the offers.
     pub offer: usize,
-    /// Its position.
+    /// Position.
     pub position: Position,
 }
 
@@ -137,7 +137,7 @@ pub enum DesignCriterion {
 }
 
 impl DesignCriterion {
-    /// Its name in files and tables.
+    /// Name in files and tables.
     pub const fn name(self) -> &'static str {
         match self {
             Self::MeanLimit => "mean-limit",
@@ -400,7 +400,7 @@ pub enum DesignError {
         list: FixedList,
         /// Quantity that it measures.
         kind: SensorKind,
-        /// Its position.
+        /// Position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -412,7 +412,7 @@ pub enum DesignError {
         list: FixedList,
         /// Quantity that it measures.
         kind: SensorKind,
-        /// Its position.
+        /// Position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -438,7 +438,7 @@ pub enum DesignError {
         list: FixedList,
         /// Quantity that it measures.
         kind: SensorKind,
-        /// Its position.
+        /// Position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -468,7 +468,7 @@ pub enum DesignError {
     /// A method that has no layout to give.
     #[error("the method `{method}` has no layout for these sensors and constraints")]
     NoLayout {
-        /// Its name.
+        /// Name.
         method: &'static str,
     },
     /// More candidates and contacts than fit into memory.

@@ -26,7 +26,7 @@ use sums::{Contacts, Mean, Shrinking, Sums, Without, Worst, folded};
 /// Information on ln W beforehand: of a standard deviation of 1000 times the force, and of 1 time.
 const VAGUE: f64 = 1e-6;
 const ROUGH: f64 = 1.0;
-/// Weight of the mean limit, as a share of the criterion's size, which decides between layouts that the criterion does not tell apart.
+/// Weight of the mean limit, as a share of the criterion's size, which decides between layouts that the criterion does not distinguish.
 const TIE_BREAK: f64 = 1e-3;
 
 /// Rows of all candidates, and the criterion.

@@ -42,7 +42,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// Its name in tables.
+    /// Name in tables.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Even => "even",

@@ -20,7 +20,7 @@ pub(super) struct State {
 pub(super) enum ForceBelief {
     /// Next to nothing, as for every layout that is judged.
     Vague,
-    /// Its order of magnitude. So the first sensors of a layout are chosen: one alone tells nothing while the force is
+    /// Order of magnitude. So the first sensors of a layout are chosen: one alone tells nothing while the force is
     /// wholly unknown.
     Rough,
 }

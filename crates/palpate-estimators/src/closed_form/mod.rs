@@ -124,7 +124,7 @@ impl Fit for ClosedForm {
 pub struct ClosedFormLocator {
     /// The surface.
     pub beam: Beam,
-    /// Its sensors.
+    /// Sensors.
     pub layout: Layout,
     /// The contact's force in newtons, where it is known.
     pub force_n: Option<f64>,

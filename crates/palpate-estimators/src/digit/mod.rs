@@ -164,7 +164,7 @@ const WIDE: f64 = 0.01;
 pub struct DigitLocator {
     /// The finger.
     pub digit: Digit,
-    /// Its gauges.
+    /// Gauges.
     pub layout: Layout,
     /// The contact's force in newtons, where it is known.
     pub force_n: Option<f64>,
@@ -334,7 +334,7 @@ struct Piece {
     chi_squared: f64,
     /// Covariance of position and force: xx, xf, ff.
     covariance: [f64; 3],
-    /// Its share of the posterior probability.
+    /// Share of the posterior probability.
     probability: f64,
     log_weight: f64,
     marginal: Marginal,
@@ -555,7 +555,7 @@ struct Gauge {
     at_m: f64,
     /// Standard deviation of its noise and quantisation: √(σ² + step²/12).
     sd: f64,
-    /// Its reading, a strain.
+    /// Reading, a strain.
     strain: f64,
 }
 
@@ -775,7 +775,7 @@ fn clamped(likelihood: &Likelihood, guess: Guess, stretch: Stretch) -> Guess {
 /// The centre line of a finger, from clamp to tip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DigitShape {
-    /// Its points, equal steps of the finger's length apart; never empty.
+    /// Points, equal steps of the finger's length apart; never empty.
     pub points: Vec<ShapePoint>,
 }
 

@@ -232,7 +232,7 @@ impl Estimator {
 }
 
 impl Method {
-    /// True of a method whose intervals come from errors at positions that were held out, reading by reading.
+    /// True of a method whose intervals come from errors at held-out positions, reading by reading.
     fn knows_its_errors(&self) -> bool {
         matches!(self, Self::GaussianProcess(locator) if locator.widths.is_some())
     }
@@ -607,7 +607,7 @@ pub struct Choice {
     pub tried: Vec<Tried>,
     /// Names of those that were not, with the reason.
     pub left_out: Vec<(&'static str, String)>,
-    /// Greatest change of each channel by the drift that was taken off the readings held out; nothing where the presses tell none.
+    /// Greatest change of each channel by the drift that was taken off the held-out readings; nothing where the presses tell none.
     pub drift: Option<Vec<f64>>,
 }
 
@@ -659,7 +659,7 @@ pub const CHOICE_FOLDS: usize = 5;
 
 /// Chooses the estimator for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds: the least geometric mean of mean error
 /// and interval score. Estimators are tried from the one that is best on most recordings on. In use a drift is tared away, and so it is here:
-/// where the presses tell one, it is taken off the readings held out.
+/// where the presses tell one, it is taken off the held-out readings.
 ///
 /// # Errors
 /// [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason;

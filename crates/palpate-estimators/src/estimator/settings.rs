@@ -13,11 +13,11 @@ use palpate_mechanics::units::format_count;
 /// One setting of an estimator.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// Its key in a rig's `[estimator]`, or a name of its own where a rig cannot change it.
+    /// Key in a rig's `[estimator]`, or a name of its own where a rig cannot change it.
     pub key: &'static str,
-    /// Its name, in words.
+    /// Name, in words.
     pub name: &'static str,
-    /// Its value in words, with its unit.
+    /// Value in words, with its unit.
     pub value: String,
 }
 

@@ -60,7 +60,7 @@ pub struct Calibrated<M: Locate> {
     pub seed: u64,
     /// The locator.
     pub locator: Fitted<M>,
-    /// Its answers to the contacts.
+    /// Answers to the contacts.
     pub evaluation: Evaluation,
 }
 

@@ -117,7 +117,7 @@ pub struct Portion {
 }
 
 impl Portion {
-    /// Its name in tables, in mm: "20_380" for 20–380 mm.
+    /// Name in tables, in mm: "20_380" for 20–380 mm.
     pub fn key(&self) -> String {
         format!("{}_{}", self.from_m * 1e3, self.to_m * 1e3)
     }
@@ -286,7 +286,7 @@ impl Evaluation {
         })
     }
 
-    /// Mean interval score of the 95 % intervals, in metres: narrow intervals that hold the contact are good ones, and the score is least on
+    /// Mean interval score of the 95 % intervals, in metres: narrow intervals that contain the contact are good ones, and the score is least on
     /// average for the true quantiles (Gneiting and Raftery, J. Am. Stat. Assoc. 102, 2007, eq. 43).
     ///
     /// A locator that gives no intervals is judged by the best that can be done of its estimates with one width everywhere: the 95th percentile
@@ -350,7 +350,7 @@ fn sorted_errors_m<'a>(located: impl IntoIterator<Item = &'a Located>) -> Vec<f6
     errors
 }
 
-/// Share of the length at either end, and of the width, where left and right cannot be told apart at usual noise.
+/// Share of the length at either end, and of the width, where left and right cannot be distinguished at usual noise.
 const ENDS: f64 = 1.0 / 80.0;
 /// Largest limit that counts, as a share of the length: the limit is a bound for small errors, and no estimator reaches a larger one.
 const LARGE_LIMIT: f64 = 1.0 / 200.0;

@@ -51,7 +51,7 @@ impl FeatureKind {
 pub struct NoFeatures {
     /// Channels of the recording.
     pub channels: usize,
-    /// Its rows.
+    /// Rows.
     pub rows: usize,
 }
 
@@ -84,11 +84,11 @@ pub struct ChannelScale {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Feature {
-    /// Its source.
+    /// Source.
     pub source: FeatureSource,
-    /// Its mean over the recording.
+    /// Mean over the recording.
     pub centre: f64,
-    /// Its standard deviation over the recording; greater than 0.
+    /// Standard deviation over the recording; greater than 0.
     pub spread: f64,
 }
 

@@ -153,7 +153,7 @@ impl Locate for GaussianProcessLocator {
     type Check = NoCheck;
 
     /// The posterior mean, with the variance of the contact's position: that of the function and the fitted error of a single row, times the square of
-    /// what positions held out have shown.
+    /// what held-out positions have shown.
     fn locate(&self, reading: &[f64]) -> Estimate {
         let features = self.features.apply(reading);
         let (means_m, variances_m2) = self.process.predict(&features);

@@ -1,7 +1,7 @@
-//! The choice of features and hyperparameters: by evidence, and by errors at positions held out.
+//! The choice of features and hyperparameters: by evidence, and by errors at held-out positions.
 //!
 //! The evidence takes the repeats of a position for independent observations of it. Of few positions and many repeats it prefers functions that are
-//! flat around each position and steep between them, far off where nothing was pressed. Errors at positions held out show that; but they are
+//! flat around each position and steep between them, far off where nothing was pressed. Errors at held-out positions show that; but they are
 //! few, and differ by chance. So the evidence decides, unless those errors disagree by a margin.
 
 use ndarray::Array2;
@@ -60,7 +60,7 @@ pub(super) struct Selection<'a> {
 impl Selection<'_> {
     /// The candidate of the greatest evidence, unless the error of another at positions held out is less by [`MARGIN`].
     pub fn best(&self, mut candidates: Vec<Candidate>) -> Result<Candidate, GaussianProcessError> {
-        /// Rows that errors are told from; more would cost time and change little.
+        /// Rows that errors are distinguished from; more would cost time and change little.
         const MOST: usize = 500;
         const MARGIN: f64 = 1.25;
         const FOLDS: usize = 5;

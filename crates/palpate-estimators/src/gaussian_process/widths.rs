@@ -1,4 +1,4 @@
-//! Widths of the 95 % intervals, by errors at positions held out.
+//! Widths of the 95 % intervals, by errors at held-out positions.
 //!
 //! A process has one error for the whole surface. Where sensors see little the truth is further off, elsewhere its intervals are wider than need be, and
 //! all are too wide where errors have long tails. So positions are held out. There z_j = (estimate − truth)/σ_j along coordinate j,
@@ -185,7 +185,7 @@ impl HeldOut {
         Ok(Some(Widths { logarithms, factors, ellipse }))
     }
 
-    /// z over widths that are told by errors at other positions, as those of contacts in use are.
+    /// z over widths that follow from errors at other positions, as those of contacts in use are.
     fn scaled(
         &self,
         known: &Hyperparameters,

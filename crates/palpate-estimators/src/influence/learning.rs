@@ -32,7 +32,7 @@ impl LearntInfluence<'_, '_> {
         self.posterior.mean(parts, &self.remainders.places.row(place))
     }
 
-    /// Its variance, from calibrating with finitely many noisy presses.
+    /// Variance, from calibrating with finitely many noisy presses.
     pub fn variance(&self, place: usize) -> f64 {
         let parts = self.prior.parts(self.places[place]);
         let (row, own) = (self.remainders.places.row(place), self.remainders.own[place]);
@@ -387,7 +387,7 @@ const HIGHEST: [f64; 5] = [0.0, -1.0, 2.0, 0.0, 0.0];
 /// Hyperparameters that are not to be found.
 #[derive(Clone, Copy)]
 struct Told {
-    /// The noise is told by repeats or by the rig.
+    /// The noise follows from repeats or by the rig.
     noise: bool,
     /// Offsets are 0.
     offset: bool,

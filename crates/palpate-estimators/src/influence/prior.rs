@@ -59,7 +59,7 @@ type Beside<'a> = ([Arc<dyn InfluenceFunction + 'a>; 2], f64);
 pub(super) struct Parts {
     /// The influence.
     pub model: f64,
-    /// Its derivatives by the sensor's position along and across, per metre.
+    /// Derivatives by the sensor's position along and across, per metre.
     pub shift: [f64; 2],
 }
 

@@ -7,7 +7,7 @@
 //! (the likelihood ratio, profiled over everything else: Pawitan, *In All Likelihood*, 2001, section 3.4).
 //!
 //! The least for a given v is had without a constraint, as in [`super::bounds`]: the minimum with (v − t)²·ρ² added is the least for its own v.
-//! Minima are those of Levenberg and Marquardt, with unknowns held at the ends of their ranges. A width is told by its square, to which
+//! Minima are those of Levenberg and Marquardt, with unknowns held at the ends of their ranges. A width follows from its square, to which
 //! readings are proportional where it is small, as a share s of the way from the least, a part of the grid, to the widest
 //! at its centre: w² = w_min² + s·(w_max(c)² − w_min²).
 
@@ -97,7 +97,7 @@ impl<'a> EvenLoads<'a> {
         self.best.misfit
     }
 
-    /// One of the loads, in the middle of those that the reading does not tell apart: the likeliest at the posterior median of its centre along each axis,
+    /// One of the loads, in the middle of those that the reading does not distinguish: the likeliest at the posterior median of its centre along each axis,
     /// the prior being flat over the 95 % interval and everything else the likeliest there. (The likeliest of all is as good as drawn by lot where
     /// force and place trade off.)
     pub fn middle_load(&self, number: usize) -> UniformLoad {

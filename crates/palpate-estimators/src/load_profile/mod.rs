@@ -63,7 +63,7 @@ pub struct LoadChannel<'a> {
 pub struct LoadSensors<'a> {
     /// The surface.
     pub extent: Extent,
-    /// Its channels, in the order of a reading.
+    /// Channels, in the order of a reading.
     pub channels: Vec<Option<LoadChannel<'a>>>,
 }
 

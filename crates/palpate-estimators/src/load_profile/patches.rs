@@ -32,13 +32,13 @@ pub struct CentreOfPressure {
 /// A connected part of the surface that carries load.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Patch {
-    /// Its left end, or lower left corner: where the load rises above the share of its highest density.
+    /// Left end, or lower left corner: where the load rises above the share of its highest density.
     pub from: Position,
-    /// Its right end, or upper right corner.
+    /// Right end, or upper right corner.
     pub to: Position,
     /// Centre of its force.
     pub centre: CentreOfPressure,
-    /// Its force in newtons, its flanks below the share included.
+    /// Force in newtons, its flanks below the share included.
     pub force_n: f64,
     /// Standard deviation of the force, by the mixture.
     pub force_sd_n: f64,

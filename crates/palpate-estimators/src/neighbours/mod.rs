@@ -150,9 +150,9 @@ pub struct NeighboursLocator {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Neighbour {
-    /// Its reading's features.
+    /// Reading's features.
     pub features: Vec<f64>,
-    /// Its contact.
+    /// Contact.
     pub position: Position,
 }
 

@@ -287,7 +287,7 @@ pub enum NetworkFitError {
         channel: String,
         /// Name of its divisor.
         what: &'static str,
-        /// Its value.
+        /// Value.
         value: f64,
     },
     /// The recording's channels are not the setup's.
@@ -446,7 +446,7 @@ impl std::fmt::Display for TrainingStatus {
 /// Outcome of a training. Not converging is a status, never an error.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TrainingOutcome {
-    /// Its status.
+    /// Status.
     pub status: TrainingStatus,
     /// Passes over all patterns.
     pub epochs: u32,
@@ -480,9 +480,9 @@ impl TrainingOutcome {
 /// A network's weights, and how they were found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainedNetwork {
-    /// Its shape.
+    /// Shape.
     pub topology: Topology,
-    /// Its weights, in the order that [`Topology`] states.
+    /// Weights, in the order that [`Topology`] states.
     pub weights: Vec<f64>,
     /// Outcome of its training.
     pub outcome: TrainingOutcome,
@@ -509,9 +509,9 @@ impl ChannelScaling {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NetworkParts {
-    /// Its shape.
+    /// Shape.
     pub topology: Topology,
-    /// Its weights, in the order that [`Topology`] states.
+    /// Weights, in the order that [`Topology`] states.
     pub weights: Vec<f64>,
     /// Scaling of each channel.
     pub scaling: Vec<ChannelScaling>,

@@ -243,7 +243,7 @@ impl<'a> Cells<'a> {
 pub(super) struct Field<'a> {
     /// The value, without the spaces and quotes around it.
     pub value: Cow<'a, str>,
-    /// Its place in the line, spaces around it left out.
+    /// Place in the line, spaces around it left out.
     pub span: Range<usize>,
 }
 

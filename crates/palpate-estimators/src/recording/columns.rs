@@ -40,10 +40,10 @@ pub struct Columns {
     /// [`Row::time_s`](super::Row::time_s).
     #[serde(default)]
     pub time: Option<ValueColumn>,
-    /// Column that marks the rows in which nothing touched, if there is one.
+    /// Column that marks the rows that are untouched, if there is one.
     #[serde(default)]
     pub untouched: Option<Column>,
-    /// Times in which nothing touched.
+    /// Times that are untouched.
     #[serde(default)]
     pub untouched_times: Vec<TimeSpan>,
     /// Greatest force, either way, of a row in which nothing touches, in newtons; `None` to find it from the rows.

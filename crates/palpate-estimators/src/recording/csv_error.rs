@@ -225,7 +225,7 @@ pub enum CsvProblem {
     /// No row has a time at which nothing is to have touched.
     #[error("no row has a time within the untouched {span}; the rows are from {from_s} s to {to_s} s")]
     NothingUntouched {
-        /// The times in which nothing touched.
+        /// The times that are untouched.
         span: TimeSpan,
         /// Least time of a row, in seconds.
         from_s: f64,
@@ -249,7 +249,7 @@ pub enum CsvProblem {
         /// The field.
         text: String,
     },
-    /// A date with slashes, in which day and month cannot be told apart.
+    /// A date with slashes, in which day and month cannot be distinguished.
     #[error("`{text}` may have the day first or the month first; write the date as 2026-04-03 or 03.04.2026")]
     SlashedDate {
         /// The field.

@@ -196,7 +196,7 @@ impl<'s> File<'s> {
         Ok(Self { source, content: text, digest, is_utf16 })
     }
 
-    /// Its lines, with their ends, which some older spreadsheets write as carriage returns alone.
+    /// Lines, with their ends, which some older spreadsheets write as carriage returns alone.
     pub fn lines(&self) -> impl Iterator<Item = &[u8]> {
         let end = if self.content.contains(&b'\n') { b'\n' } else { b'\r' };
         self.content.split_inclusive(move |byte| *byte == end)
@@ -339,7 +339,7 @@ impl ContactFields {
         self.nuisances.iter().map(|(field, unit)| cells.number(*field, *unit)).collect()
     }
 
-    /// Whether the row is marked as untouched, or its time is among those in which nothing touched.
+    /// Whether the row is marked as untouched, or its time is among those that are untouched.
     fn is_marked(&self, cells: &Cells, schema: &Schema, time_s: Option<f64>) -> Result<bool, CsvError> {
         let is_time = |time_s| schema.columns.untouched_times.iter().any(|span| span.contains(time_s));
         let marked = self.untouched.map_or(Ok(false), |field| cells.is_marked(field))?;

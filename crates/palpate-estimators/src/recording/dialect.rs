@@ -67,7 +67,7 @@ pub struct Notes {
     pub lines: usize,
     /// The first of them.
     pub first_line: usize,
-    /// Its text, or the beginning of it.
+    /// Text, or the beginning of it.
     pub text: String,
 }
 

@@ -77,12 +77,12 @@ pub struct Recording {
 pub struct Row {
     /// True position of the contact.
     pub position: Position,
-    /// Its force in newtons, positive downward; `None` where nobody measured it, 0 where nothing touched.
+    /// Force in newtons, positive downward; `None` where nobody measured it, 0 where nothing touched.
     pub force_n: Option<f64>,
     /// Coordinates that shape the reading, are known here, and are unknown when a reading is to be located: the depth of indentation and
     /// the temperature, say. In the SI units of their columns and in their order; empty where the recording has no such columns.
     pub nuisances: Vec<f64>,
-    /// Its time in seconds, where the recording has one: since whenever its file counts from, or since its first row where that
+    /// Time in seconds, where the recording has one: since whenever its file counts from, or since its first row where that
     /// has timestamps.
     pub time_s: Option<f64>,
     /// One finite value per channel, in the SI unit of its kind (or raw).
@@ -270,7 +270,7 @@ impl Recording {
         (0..self.channels.len()).map(channel).collect()
     }
 
-    /// Rests: consecutive rows in which nothing touched, by their indices.
+    /// Rests: consecutive rows that are untouched, by their indices.
     pub fn rests(&self) -> Vec<Vec<usize>> {
         let indices: Vec<usize> = (0..self.rows.len()).collect();
         let touches = |row: &usize| self.rows[*row].touches();

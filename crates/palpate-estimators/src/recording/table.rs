@@ -103,7 +103,7 @@ impl Table {
     ///
     /// # Errors
     /// [`CsvError`], with line and column: a row of another length than the first line, an empty file, no rows, bytes that are no text,
-    /// separators that cannot be told apart, a number that may have a decimal comma or thousands.
+    /// separators that cannot be distinguished, a number that may have a decimal comma or thousands.
     pub fn read(
         source: &str,
         bytes: impl Read,

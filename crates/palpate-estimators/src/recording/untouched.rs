@@ -1,4 +1,4 @@
-//! Rows in which nothing touched, as a file or its rig marks them.
+//! Rows that are untouched, as a file or its rig marks them.
 
 use palpate_mechanics::units::{Dimension, Quantity};
 use serde::{Deserialize, Serialize};

@@ -123,7 +123,7 @@ pub enum Coordinates {
 /// Unit of force of load cells and scales, also of those that weigh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceUnit {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
     /// Newtons of one of it.
     pub newtons: f64,

@@ -30,7 +30,7 @@ pub struct MovingContacts {
 /// One contact that moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovingContact {
-    /// Its motion.
+    /// Motion.
     pub motion: Motion,
     /// Its force in newtons, where that is not the one of the rig's presses.
     pub force_n: Option<f64>,

@@ -2,7 +2,7 @@
 //!
 //! A contact that has just come is held possible anywhere near where the reading by itself shows one, with any force up to
 //! many times the one that fits, at any usual speed, on a surface that it has not made swing much. The reading then says
-//! how probable that was, and what is left of it.
+//! how probable that was, and the remainder of it.
 
 use super::TrackerConfig;
 use super::bank::{

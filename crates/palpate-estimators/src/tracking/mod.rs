@@ -52,7 +52,7 @@ pub struct TrackerConfig {
     pub speed_sd_m_per_s: f64,
     /// Drift of an unknown force in a second, as a share of it.
     pub force_drift: f64,
-    /// Rate, a second, at which a contact comes while nothing touches, and goes while something does.
+    /// Rate, a second, at which a contact comes while the surface is untouched, and goes while something does.
     pub changes_per_s: f64,
     /// Rate, a second, at which a contact goes and is at once somewhere else.
     pub jumps_per_s: f64,
@@ -67,7 +67,7 @@ pub struct TrackerConfig {
 /// The first mode of a surface that swings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
-    /// Its natural frequency, in hertz; greater than 0.
+    /// Natural frequency, in hertz; greater than 0.
     pub frequency_hz: f64,
     /// The share of its critical damping, at least 0 and below 1.
     pub damping_ratio: f64,
@@ -148,7 +148,7 @@ pub enum TrackError {
     /// Time does not go on.
     #[error("the reading is of {time_s} s; it must be later than the one before, of {before_s} s")]
     Time {
-        /// Its time, in seconds.
+        /// Time, in seconds.
         time_s: f64,
         /// The time of the one before.
         before_s: f64,

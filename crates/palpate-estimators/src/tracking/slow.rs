@@ -5,13 +5,13 @@
 //!
 //!   y = s + c·z + d + n,  s = h(θ),  τ·ż = s − z,  ḋ = v + w·ξ,  v̇ = −v/τ_v + r·√(2/τ_v)·η
 //!
-//! with ξ and η white. A fresh press reads s, which is what calibration learns; one that is held grows by c·s, and what is left of it fades when it
+//! with ξ and η white. A fresh press reads s, which is what calibration learns; one that is held grows by c·s, and the remainder of it fades when it
 //! has been let go (the standard linear solid: W. N. Findley and others, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976, chapter 5).
 //!
 //! **Creep** needs no contact: between two readings, a = 1 − exp(−T/τ) apart, z goes a of its way to s, so y less drift gives
 //! s = (y − c·(1 − a)·z)/(1 + c·a), channel by channel, and s is what is followed.
 //!
-//! **Drift** is told by what contacts do not explain. Where contacts touch, a drift along ∂h/∂θ cannot be told from their motion: each block's θ is taken for
+//! **Drift** follows from what contacts do not explain. Where contacts touch, a drift along ∂h/∂θ cannot be distinguished from their motion: each block's θ is taken for
 //! unknown altogether, so that only the part across tells of d (a flat prior of θ, as in the consider filter of S. F. Schmidt, Application of
 //! State-Space Methods to Navigation Problems, 1966). The part along is carried on by v, and its doubt is the contacts' doubt: the covariance
 //! of d, brought to θ by least squares, is added to theirs, as it does not average out.

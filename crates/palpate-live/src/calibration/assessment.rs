@@ -1,4 +1,4 @@
-//! Assessment of a calibration: its error at positions held out, and the gain of more presses.
+//! Assessment of a calibration: its error at held-out positions, and the gain of more presses.
 
 use palpate_design::positions::{PositionDesign, next_press};
 use palpate_estimators::evaluation::{Evaluation, cross_validate};
@@ -10,7 +10,7 @@ use palpate_rig::Rig;
 /// Folds of the cross-validation.
 const FOLDS: usize = 5;
 
-/// Errors at positions held out of the fit, in metres.
+/// Errors at held-out positions of the fit, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldOut {
     /// Folds of the cross-validation.

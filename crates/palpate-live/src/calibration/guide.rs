@@ -139,7 +139,7 @@ pub struct Guide {
     /// True where the source repeats readings because it is faster than its sensors: each counts once.
     is_sample_and_hold: bool,
     stretch: Stretch,
-    /// Untouched reading, which follows the drift while nothing touches.
+    /// Untouched reading, which follows the drift while the surface is untouched.
     baseline: Option<Baseline>,
     /// The last untouched reading at rest, which is recorded with the next press.
     untouched: Option<RestingRow>,

@@ -59,7 +59,7 @@ impl JournalError {
 
 /// Name of the column of depths, where the rig has none.
 const DEPTH: &str = "depth_mm";
-/// Seconds between the presses of a file and those that go on with it. The time between two runs is not known; what drifted in it is told by the
+/// Seconds between the presses of a file and those that go on with it. The time between two runs is not known; what drifted in it follows from the
 /// untouched rows of both.
 const BETWEEN_RUNS_S: f64 = 60.0;
 
@@ -200,7 +200,7 @@ impl Journal {
 
     fn save(&self) -> Result<(), JournalError> {
         let mut rows = self.rows.clone();
-        // An untouched row is told from a press by its force, where presses have one.
+        // An untouched row is distinguished from a press by its force, where presses have one.
         if self.columns.force.is_none() || rows.iter().any(|row| row.force_n.is_none()) {
             rows.retain(Row::touches);
         }

@@ -121,7 +121,7 @@ pub enum Motion {
     Lifting,
     /// Its finger is lifted, and it rests.
     Up,
-    /// Its finger presses, and it rests.
+    /// Finger presses, and it rests.
     Down,
 }
 
@@ -188,7 +188,7 @@ impl Machine {
         self.thread.stopping()
     }
 
-    /// Its motion.
+    /// Motion.
     pub fn motion(&self) -> Motion {
         self.motion
     }

@@ -5,10 +5,10 @@ use palpate_mechanics::contact::Position;
 /// A press that is planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Press {
-    /// Its position.
+    /// Position.
     pub position: Position,
     /// Its force in newtons, where it is known.
     pub force_n: Option<f64>,
-    /// Its depth in metres, where a machine presses.
+    /// Depth in metres, where a machine presses.
     pub depth_m: Option<f64>,
 }

@@ -26,7 +26,7 @@ pub enum Doubt {
     Grew,
     /// The touch is much lighter than earlier presses.
     Light {
-        /// Its size in % of an earlier press.
+        /// Size in % of an earlier press.
         percent: f64,
     },
     /// The touch differs from the presses of its place.
@@ -56,7 +56,7 @@ impl fmt::Display for Doubt {
 pub struct TouchReading {
     /// The reading.
     pub reading: Vec<f64>,
-    /// Its deviation from the untouched reading before it.
+    /// Deviation from the untouched reading before it.
     pub deviation: Vec<f64>,
 }
 

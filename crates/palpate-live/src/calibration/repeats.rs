@@ -7,7 +7,7 @@ use palpate_mechanics::contact::Position;
 /// A place of a plan, and how its presses agree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Its position.
+    /// Position.
     pub position: Position,
     /// Presses that were taken there.
     pub taken: usize,

@@ -28,7 +28,7 @@ pub enum CalibrationError {
     /// A press pulls at the load cell.
     #[error("the load cell `{name}` reads {force_n} N in a press; it must read more than 0 N")]
     LoadCell {
-        /// Its name.
+        /// Name.
         name: String,
         /// The force that it reads.
         force_n: f64,
@@ -76,9 +76,9 @@ pub enum Note {
 struct LoadCell {
     name: String,
     limit_n: Option<f64>,
-    /// Its first reading, before the machine moves.
+    /// First reading, before the machine moves.
     first_n: Option<f64>,
-    /// Its last reading.
+    /// Last reading.
     now_n: Option<f64>,
 }
 

@@ -73,11 +73,11 @@ pub struct Messages {
 /// Message of a recording.
 #[derive(Clone, Debug)]
 pub struct RawMessage {
-    /// Its topic, by its place in [`TOPICS`].
+    /// Topic, by its place in [`TOPICS`].
     pub topic: usize,
-    /// Its number.
+    /// Number.
     pub sequence: u32,
-    /// Its time, in ns since 1970.
+    /// Time, in ns since 1970.
     pub unix_ns: u64,
     /// Its JSON.
     pub data: Vec<u8>,

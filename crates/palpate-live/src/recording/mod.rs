@@ -74,7 +74,7 @@ pub enum RecordingError {
     /// A recording is going on, and another cannot be begun.
     #[error("{name} is being recorded; end it first")]
     GoesOn {
-        /// Its name.
+        /// Name.
         name: String,
     },
     /// The file is not MCAP.

@@ -14,7 +14,7 @@ pub struct RecordingSummary {
     pub name: String,
     /// Bytes of the file.
     pub bytes: u64,
-    /// Its first instant, in seconds since 1970-01-01 00:00 UTC; `None` without any.
+    /// First instant, in seconds since 1970-01-01 00:00 UTC; `None` without any.
     pub start_s: Option<f64>,
     /// Seconds from its first instant to its last.
     pub seconds: f64,
@@ -211,7 +211,7 @@ pub enum Recorded {
     Reading {
         /// Which of the session, from 0.
         number: u64,
-        /// Its time, in ns since 1970.
+        /// Time, in ns since 1970.
         unix_ns: u64,
         /// One number a channel, in the units of the head's channels.
         values: Vec<f64>,
@@ -220,7 +220,7 @@ pub enum Recorded {
     Estimate {
         /// The reading that it is of.
         number: u64,
-        /// Its time, in ns since 1970.
+        /// Time, in ns since 1970.
         unix_ns: u64,
         /// The reading that was located, in SI units or raw.
         located: Vec<f64>,
@@ -229,7 +229,7 @@ pub enum Recorded {
     },
     /// An event.
     Event {
-        /// Its time, in ns since 1970.
+        /// Time, in ns since 1970.
         unix_ns: u64,
         /// The event, as its record has it.
         event: Map<String, Value>,
@@ -291,7 +291,7 @@ impl Playback {
         Ok(Self { file, block: 0, messages: Vec::new().into_iter(), passed_over })
     }
 
-    /// Its head: version, source, channels.
+    /// Head: version, source, channels.
     pub fn head(&self) -> &Head {
         &self.file.head
     }

@@ -87,7 +87,7 @@ impl Recorder {
         Ok(Self { to: Some(to), status, thread: Some(thread) })
     }
 
-    /// Its state.
+    /// State.
     pub fn status(&self) -> RecordingStatus {
         lock(&self.status).clone()
     }

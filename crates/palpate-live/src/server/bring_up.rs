@@ -30,7 +30,7 @@ pub enum BringUpError {
     /// A port that is not there.
     #[error("there is no serial port {port}")]
     NoPort {
-        /// Its name.
+        /// Name.
         port: String,
     },
     /// A rate that no port has.
@@ -50,7 +50,7 @@ pub enum BringUpError {
 /// A serial port of this machine.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PortRecord {
-    /// Its path, on Windows its name.
+    /// Path, on Windows its name.
     pub name: String,
     /// What is plugged into it, where that is known.
     pub device: Option<String>,

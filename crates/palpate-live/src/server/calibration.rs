@@ -113,7 +113,7 @@ pub enum CalibratorError {
     /// A press that is to be struck out.
     #[error("there is no press {press}; {presses} were taken")]
     NoSuchPress {
-        /// Its number, from 1.
+        /// Number, from 1.
         press: usize,
         /// Presses that were taken.
         presses: usize,
@@ -274,7 +274,7 @@ struct Running {
     thread: JoinHandle<()>,
     purpose: Purpose,
     by_machine: bool,
-    /// Its thread ends with it.
+    /// Thread ends with it.
     _source: Source,
 }
 
@@ -756,7 +756,7 @@ impl Calibrator {
         calibration.fault().filter(|_| calibration.readings() == 0)
     }
 
-    /// Its state.
+    /// State.
     pub fn record(&self) -> CalibrationRecord {
         let state = self.lock();
         let extent = self.plan.rig.setup.surface().extent();

@@ -44,7 +44,7 @@ pub enum AccessError {
         "the token has {length} characters; it must have at least {SHORTEST_TOKEN}, of which each is a letter, a digit, `-`, `.`, `_` or `~`"
     )]
     Token {
-        /// Its length.
+        /// Length.
         length: usize,
     },
 }

@@ -68,7 +68,7 @@ struct Running {
     /// Returns the fault of a source that brought no reading.
     thread: JoinHandle<Option<String>>,
     switch: RecordingSwitch,
-    /// Its thread ends with it.
+    /// Thread ends with it.
     _source: Source,
 }
 

@@ -9,7 +9,7 @@ use serde::Serialize;
 /// A press that was taken.
 #[derive(Clone, Debug, Serialize)]
 pub struct PressRecord {
-    /// Its number, from 1.
+    /// Number, from 1.
     press: usize,
     x_mm: f64,
     #[serde(skip_serializing_if = "Option::is_none")]

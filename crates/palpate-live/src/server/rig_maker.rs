@@ -170,7 +170,7 @@ pub struct MadeRig {
 pub struct MadeRigRecord {
     /// The rig's file.
     pub file: String,
-    /// Its text.
+    /// Text.
     pub text: String,
     /// The command that calibrates it later.
     pub command: String,

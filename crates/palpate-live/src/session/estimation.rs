@@ -27,7 +27,7 @@ pub enum Estimation {
         /// First natural frequency of a beam on two simple supports, in hertz, whose inertia is reckoned with at the usual damping; without it the surface
         /// is in balance at every reading.
         frequency_hz: Option<f64>,
-        /// Creep of the surface that is taken off; none unless it is said.
+        /// Creep of the surface that is taken off; none by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         creep: Option<CreepConfig>,
     },

@@ -14,7 +14,7 @@ const SATURATED: u32 = 5;
 pub struct ChannelHealth {
     /// Name of its sensor.
     pub name: String,
-    /// Its state.
+    /// State.
     pub state: ChannelState,
     /// Lowest and highest value so far, in its SI unit or raw.
     pub range: [f64; 2],

@@ -41,7 +41,7 @@ pub struct SessionConfig {
 /// Treatment of offsets that have moved since calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TareMode {
-    /// The baseline is found, and followed while nothing touches, where the locator tells untouched readings.
+    /// The baseline is found, and followed while the surface is untouched, where the locator tells untouched readings.
     #[default]
     Auto,
     /// The baseline stays, until somebody tares.

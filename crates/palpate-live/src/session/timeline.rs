@@ -28,7 +28,7 @@ pub struct Timeline {
 /// A stretch without readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gap {
-    /// Its length in seconds.
+    /// Length in seconds.
     pub seconds: f64,
     /// Frames that the board sent in it, where it counts them.
     pub lost_frames: Option<u32>,

@@ -32,9 +32,9 @@ struct Waypoint {
 pub struct ScriptError {
     /// Number of the line, from 1.
     pub line: usize,
-    /// Its text.
+    /// Text.
     pub text: String,
-    /// Its problem.
+    /// Problem.
     pub problem: &'static str,
 }
 

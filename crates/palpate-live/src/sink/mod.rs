@@ -31,7 +31,7 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Its samples.
+    /// Samples.
     pub fn samples(&self) -> impl Iterator<Item = &Sample> {
         self.outputs.iter().filter_map(|output| match output {
             Output::Sample(sample) => Some(sample.as_ref()),
@@ -39,7 +39,7 @@ impl Batch {
         })
     }
 
-    /// Its events.
+    /// Events.
     pub fn events(&self) -> impl Iterator<Item = &EventRecord> {
         self.outputs.iter().filter_map(|output| match output {
             Output::Event(event) => Some(event),
@@ -66,7 +66,7 @@ pub struct StateRecord {
 /// State of a channel as a record, in the unit of its board.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelRecord {
-    /// Its state.
+    /// State.
     pub state: ChannelState,
     /// Lowest and highest value so far.
     pub range: Option<[f64; 2]>,

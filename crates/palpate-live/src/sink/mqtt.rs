@@ -37,7 +37,7 @@ pub struct MqttUrl {
 pub struct MqttUrlError {
     /// The text.
     pub text: String,
-    /// Its problem.
+    /// Problem.
     pub problem: String,
 }
 

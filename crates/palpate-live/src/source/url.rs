@@ -88,7 +88,7 @@ pub enum SourceUrlError {
     Parameter {
         /// The URL.
         text: String,
-        /// Its problem, and the values allowed.
+        /// Problem, and the values allowed.
         problem: String,
     },
 }

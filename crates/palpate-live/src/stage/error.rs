@@ -16,7 +16,7 @@ pub enum StageError {
         quoted(said)
     )]
     Unknown {
-        /// Its words.
+        /// Words.
         said: String,
     },
     /// An answer or a position is not the expected one, so that the machine was stopped.

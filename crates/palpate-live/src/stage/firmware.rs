@@ -121,7 +121,7 @@ pub(super) fn position_mm(line: &str) -> Option<[f64; 3]> {
 /// A status report of GRBL, as `<Idle|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,0.000>`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Status<'a> {
-    /// Its state, without the number behind a colon.
+    /// State, without the number behind a colon.
     pub state: &'a str,
     /// True for a hold whose deceleration has ended.
     pub is_held: bool,

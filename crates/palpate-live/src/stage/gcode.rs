@@ -143,7 +143,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(stage)
     }
 
-    /// Its firmware.
+    /// Firmware.
     pub fn firmware(&self) -> Firmware {
         self.firmware
     }

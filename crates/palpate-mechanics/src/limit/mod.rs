@@ -37,7 +37,7 @@ use zone::Grid;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Force {
-    /// Its value.
+    /// Value.
     Known,
     /// The force is estimated together with the position.
     Unknown,

@@ -54,7 +54,7 @@ pub enum LimitWarning {
         force: Force,
         /// The contact whose twin is nearest.
         at: Position,
-        /// Its twin.
+        /// Twin.
         twin: Position,
         /// Distance of the two readings, in standard deviations.
         distance: f64,

@@ -16,9 +16,9 @@ const FILLED: f64 = 0.9;
 /// A stretch of a line, or a rectangle of a plane around all its positions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Zone {
-    /// Its left or lower left end.
+    /// Left or lower left end.
     pub from: Position,
-    /// Its right or upper right end.
+    /// Right or upper right end.
     pub to: Position,
     /// Share of it where what is said holds; 1 of a stretch of a line.
     pub filled: f64,

@@ -85,9 +85,9 @@ impl dyn ReadingsByContact + '_ {
 pub enum ContactLoad {
     /// A downward unit force: sensors read their influence.
     Force(Position),
-    /// Its derivative by x: sensors read the derivative of their influence along the length, per metre.
+    /// Derivative by x: sensors read the derivative of their influence along the length, per metre.
     ByX(Position),
-    /// Its derivative by y, across the width.
+    /// Derivative by y, across the width.
     ByY(Position),
     /// One on a degree of freedom of [`ReadingsByContact::degrees`].
     Degree(usize),

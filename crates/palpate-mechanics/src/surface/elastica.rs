@@ -37,7 +37,7 @@ pub enum ForceDirection {
 }
 
 impl ForceDirection {
-    /// Its name in a rig.
+    /// Name in a rig.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Normal => "normal",

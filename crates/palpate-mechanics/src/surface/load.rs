@@ -39,12 +39,12 @@ impl UniformLoad {
         }
     }
 
-    /// Its left end, or lower left corner.
+    /// Left end, or lower left corner.
     pub const fn from(&self) -> Position {
         self.from
     }
 
-    /// Its right end, or upper right corner.
+    /// Right end, or upper right corner.
     pub const fn to(&self) -> Position {
         self.to
     }

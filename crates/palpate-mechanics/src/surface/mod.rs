@@ -164,7 +164,7 @@ pub trait InfluenceFunction: Send + Sync {
     /// channel, which no model explains. Off the surface the value has no meaning.
     fn at(&self, contact: Position) -> f64;
 
-    /// Its derivatives by the contact's position along x and along y, in its unit per metre; 0 along y on a
+    /// Derivatives by the contact's position along x and along y, in its unit per metre; 0 along y on a
     /// one-dimensional surface. Where the influence has a kink, some value between those of its two sides.
     fn gradient(&self, contact: Position) -> [f64; 2];
 }

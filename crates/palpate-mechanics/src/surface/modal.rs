@@ -41,19 +41,19 @@ pub enum ModalBeamError {
     /// The density is not a positive, finite number.
     #[error("the density is {density_kg_per_m3} kg/m3; it must be greater than 0 and finite")]
     Density {
-        /// Its value, in kg/m³.
+        /// Value, in kg/m³.
         density_kg_per_m3: f64,
     },
     /// The damping ratio is not one of a beam that swings.
     #[error("the damping ratio is {damping_ratio}; it must be at least 0 and below 1")]
     Damping {
-        /// Its value.
+        /// Value.
         damping_ratio: f64,
     },
     /// The first natural frequency is not a positive, finite number.
     #[error("the first natural frequency is {frequency_hz} Hz; it must be greater than 0 and finite")]
     Frequency {
-        /// Its value, in hertz.
+        /// Value, in hertz.
         frequency_hz: f64,
     },
 }
@@ -248,7 +248,7 @@ fn interpolated(from: Contact, to: Contact, share: f64) -> Contact {
 
 /// A damped oscillator q̈ + 2ζω·q̇ + ω²·q = p over steps of one length.
 ///
-/// While p is linear in time, q_p = A + B·t with B = ṗ/ω² and A = p₀/ω² − 2ζṗ/ω³ solves the equation, and what is left of
+/// While p is linear in time, q_p = A + B·t with B = ṗ/ω² and A = p₀/ω² − 2ζṗ/ω³ solves the equation, and the remainder of
 /// place and velocity swings freely; both are known in closed form, so a step is exact however long it is (N. C. Nigam
 /// and P. C. Jennings, Bull. Seismol. Soc. Am. 59, 1969).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -532,12 +532,12 @@ pub enum PosteriorFault {
         what: &'static str,
         /// Which one, from 1.
         number: usize,
-        /// Its value.
+        /// Value.
         value: f64,
-        /// Its bound.
+        /// Bound.
         bound: &'static str,
     },
-    /// Its covariance does not factor.
+    /// Covariance does not factor.
     #[error("the Gaussian process's covariance cannot be factored: {0}")]
     Singular(#[from] NotPositiveDefinite),
     /// Its variance cannot be computed.

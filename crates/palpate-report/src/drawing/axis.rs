@@ -117,7 +117,7 @@ fn fixed_ends(axis: &Axis) -> Option<(f64, f64)> {
     usable.then_some((low, high))
 }
 
-/// Whether neighbouring ticks between the two could not be told apart.
+/// Whether neighbouring ticks between the two could not be distinguished.
 fn too_narrow(low: f64, high: f64) -> bool {
     high - low <= 1e-9 * low.abs().max(high.abs()) || high - low < SMALLEST
 }

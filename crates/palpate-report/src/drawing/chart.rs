@@ -52,7 +52,7 @@ impl Chart {
 pub struct Series {
     /// Name in the legend; empty keeps the series out of it.
     pub label: String,
-    /// Index into seven colours that colour-blind readers can tell apart (Okabe and Ito): blue, vermilion,
+    /// Index into seven colours that colour-blind readers can distinguish (Okabe and Ito): blue, vermilion,
     /// green, purple, sky blue, orange, black; larger indices start over.
     pub colour: usize,
     /// Shape and data.
@@ -112,7 +112,7 @@ pub enum SeriesKind {
     },
     /// A translucent area between two curves.
     Band {
-        /// Its lower and upper edge at each x. On a logarithmic axis an edge that is not positive lies on the
+        /// Lower and upper edge at each x. On a logarithmic axis an edge that is not positive lies on the
         /// end of the axis.
         points: Vec<BandPoint>,
     },
@@ -187,16 +187,16 @@ pub struct ErrorPoint {
 pub enum Mark {
     /// A dashed vertical line, such as a support.
     VerticalLine {
-        /// Its position.
+        /// Position.
         x: f64,
-        /// Its name; empty for none.
+        /// Name; empty for none.
         label: String,
     },
     /// A dashed horizontal line, such as a tolerance.
     HorizontalLine {
-        /// Its position.
+        /// Position.
         y: f64,
-        /// Its name in the legend; empty for none.
+        /// Name in the legend; empty for none.
         label: String,
     },
     /// A shaded range of x, such as a portion of a beam.
@@ -205,7 +205,7 @@ pub enum Mark {
         low: f64,
         /// The other end.
         high: f64,
-        /// Its name; empty for none.
+        /// Name; empty for none.
         label: String,
     },
 }

@@ -51,7 +51,7 @@ pub struct HeatMap {
 /// One map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatPanel {
-    /// Its name; empty for none.
+    /// Name; empty for none.
     pub name: String,
     /// A value a cell; one that is not finite leaves its cell grey.
     pub values: Vec<f64>,

@@ -22,7 +22,7 @@ pub struct Claim {
     pub holds: bool,
     /// Share of the seeds for which every part holds, 0 to 1.
     pub share_of_seeds: f64,
-    /// Its parts.
+    /// Parts.
     pub parts: Vec<ClaimPart>,
 }
 

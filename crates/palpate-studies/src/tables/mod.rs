@@ -76,7 +76,7 @@ impl TableKind {
         }
     }
 
-    /// Its text among those of both.
+    /// Text among those of both.
     pub fn text(self, texts: &FitRows) -> &str {
         match self {
             Self::Networks => &texts.networks,

@@ -2,7 +2,7 @@
 //!
 //! Symbols as in [`super::search`]. At a known force a chord joins the influences of two neighbouring coarse nodes, times the force.
 //! How close d comes to a chord is a quadratic in the misfits at its ends; how far the curve strays from its chord is known
-//! beforehand, so a valley's lowest misfit is bounded from below without going there. With the force free, a place is told by the
+//! beforehand, so a valley's lowest misfit is bounded from below without going there. With the force free, a place follows from the
 //! direction of d alone: between the directions of f at two neighbouring coarse nodes, the least-squares mixture α·f + β·g of both lies at
 //! t = β/(α + β) of the way from one to the other, and the best force is that of the mixture.
 

@@ -143,7 +143,7 @@ fn refine<const K: usize, const N: usize>(
     let mut here = fit(contacts);
     let free = std::array::from_fn(|i| i > 0);
     for _ in 0..MOST_STEPS {
-        // Damped, where places and forces cannot be told apart.
+        // Damped, where places and forces cannot be distinguished.
         let mut damped = here.information;
         (0..N).for_each(|i| damped[i][i] *= 1.0 + 1e-9);
         let step = Ldl::of_free(&damped, free)?.solve(here.score);

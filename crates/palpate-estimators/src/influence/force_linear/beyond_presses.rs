@@ -114,7 +114,7 @@ impl ForceLinearLocator {
         let whole_m = (0.0, prior.extent.length_m());
         let rounding_m = ROUNDING * whole_m.1;
         let (first_m, last_m) = self.outermost_m(0);
-        // A stretch that is hardly probable is told by nothing else either.
+        // A stretch that is hardly probable follows from nothing else either.
         let probable = || found.stretches.iter().filter(|stretch| stretch.probability >= OTHER_PLACE);
         let (low_m, high_m) = probable().map(|stretch| stretch.x_95_m).reduce(hull).unwrap_or(found.x_95_m);
         let behind_m = whole_m.1 - (axis.start + length_m(axis));

@@ -24,7 +24,7 @@ pub enum DriftCourse {
 impl DriftCourse {
     pub(super) const ALL: [Self; 3] = [Self::Walk, Self::Linear, Self::Smooth];
 
-    /// Covariance of what is left of the drift at two times until the end of the recording: the offset is that of the end.
+    /// Covariance of the remainder of the drift at two times until the end of the recording: the offset is that of the end.
     pub(super) fn covariance(self, a: f64, b: f64) -> f64 {
         /// Of the smooth course.
         const LENGTH: f64 = 0.5;

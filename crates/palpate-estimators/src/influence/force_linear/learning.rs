@@ -1,7 +1,7 @@
 //! From presses of recorded force to the influence functions of a surface without a model.
 //!
 //! Two priors are tried: influence functions that are smooth, and those of point sensors at unknown places ([`Prior::source`]). Length
-//! scales and shares of each are those under which the presses are the most probable; between the two, positions held out decide. What
+//! scales and shares of each are those under which the presses are the most probable; between the two, held-out positions decide. What
 //! the process claims of them is checked, and its variance widened where it is too small. Presses that no function explains are set
 //! aside, and the rest learnt anew.
 
@@ -48,7 +48,7 @@ pub(super) struct Learnt {
     fits: Vec<ChannelFit>,
     /// Places where sensors are looked for, in metres.
     sensors_m: Vec<Vec<f64>>,
-    /// By what factor the variance of the learnt functions is multiplied, so that positions held out are as far off as it says.
+    /// By what factor the variance of the learnt functions is multiplied, so that held-out positions are as far off as it says.
     widening: f64,
     /// Rows that no function explains, from 0, in rising order.
     pub set_aside: Vec<usize>,
@@ -67,7 +67,7 @@ impl Learnt {
             Self::without_outliers(setup, recording, structure, most_presses, noise, watch)
         };
         let Some(learnt) = learn(None)? else { return Ok(None) };
-        // Rows that nothing explains look like noise of their place, and noise of a place like rows that nothing explains: the noise is told by
+        // Rows that nothing explains look like noise of their place, and noise of a place like rows that nothing explains: the noise follows from
         // rows that are none, and rows are set aside by that noise.
         match learnt.noise_by_place(watch)? {
             None => Ok(Some(learnt)),
@@ -279,7 +279,7 @@ struct Found {
     sensors_m: Vec<Vec<f64>>,
 }
 
-/// A prior with its score at positions held out.
+/// A prior with its score at held-out positions.
 struct Judged {
     found: Found,
     /// ln of the probability density of the presses that were held out.

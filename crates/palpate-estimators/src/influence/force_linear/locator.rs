@@ -431,7 +431,7 @@ impl ForceLinearLocator {
         CramerRaoBound::of_responses(extent, (0..self.stored.live.len()).map(channel))
     }
 
-    /// The lightest touch that is told from noise, by its own rule.
+    /// The lightest touch that is distinguished from noise, by its own rule.
     pub fn lightest_touch(&self) -> LightestTouch<'_> {
         let coordinates = if self.stored.y.count > 1 { 2 } else { 1 };
         let detection = Detection {
@@ -538,13 +538,13 @@ impl ForceLinearLocator {
         (0..self.places()).all(|place| taken(place) <= self.detection_bound)
     }
 
-    /// True where an untouched board is told from contacts half as hard as the presses. Without rows of force 0 few presses may leave the
+    /// True where an untouched board is distinguished from contacts half as hard as the presses. Without rows of force 0 few presses may leave the
     /// offsets so open that the readings of such contacts are within the bounds of noise: then no reading is `no_contact`.
     pub fn tells_untouched(&self) -> bool {
         self.tells_untouched
     }
 
-    /// True unless open offsets hide such contacts: at three of four places they are told from noise, or would not be with
+    /// True unless open offsets hide such contacts: at three of four places they are distinguished from noise, or would not be with
     /// offsets that are known either.
     fn offsets_are_told(&self) -> bool {
         const SHARE: f64 = 0.5;

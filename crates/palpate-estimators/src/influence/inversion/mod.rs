@@ -36,7 +36,7 @@ pub(super) trait Explain {
     /// The grid's axes.
     fn axes(&self) -> [Axis; 2];
 
-    /// Its cells.
+    /// Cells.
     fn cells(&self) -> Cells;
 
     /// Lower bounds of what the middles of the cells cost, about, cell by cell.

@@ -217,7 +217,7 @@ fn contact_at<E: Explain>([x, y]: [f64; 2], found: &Explained, reading: &E) -> P
 
 /// Some of the probability: everywhere, and without the margins of the grid.
 ///
-/// An estimate is the mean without the margins, as contacts hardly ever are beyond where presses were made. How sure it is is told by all.
+/// An estimate is the mean without the margins, as contacts hardly ever are beyond where presses were made. How sure it is follows from all.
 #[derive(Clone, Copy, Debug, Default)]
 struct Probable {
     /// The first contact: sums are taken of what others differ from it, as their squares may be far larger than the variance.

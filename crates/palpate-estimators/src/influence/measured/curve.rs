@@ -115,7 +115,7 @@ impl Curve {
     }
 }
 
-/// The node that a polynomial through so many nodes is told from, and what its coefficients of τ, τ² and τ³ have of each node.
+/// The node that a polynomial through so many nodes is distinguished from, and what its coefficients of τ, τ² and τ³ have of each node.
 fn coefficients(nodes: usize) -> (usize, [[f64; 4]; 3]) {
     match nodes {
         1 => (0, [[0.0; 4]; 3]),

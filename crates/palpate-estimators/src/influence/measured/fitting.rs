@@ -1,4 +1,4 @@
-//! From a recording to a locator: presses, regression, noise, how far it misses positions that were held out, table.
+//! From a recording to a locator: presses, regression, noise, how far it misses held-out positions, table.
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
 use super::locator::{MeasuredLocator, NuisanceRole, Stored};

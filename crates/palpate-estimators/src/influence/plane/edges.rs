@@ -83,7 +83,7 @@ impl Edges {
     }
 }
 
-/// Length of what is left of a reading without its parts along two others.
+/// Length of the remainder of a reading without its parts along two others.
 fn part_outside(reading: &[f64], [first, second]: &[Vec<f64>; 2], weights: &[f64]) -> f64 {
     let product =
         |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).zip(weights).map(|((a, b), w)| w * a * b).sum() };

@@ -61,11 +61,11 @@ pub(super) struct Looked {
 /// One of x, y and force that is followed, and its way.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// Its number among the three.
+    /// Number among the three.
     unknown: usize,
     /// −1 downwards, 1 upwards.
     side: f64,
-    /// Its last value at the latest.
+    /// Last value at the latest.
     limit: f64,
 }
 

@@ -89,7 +89,7 @@ fn contact(search: &Search, mode: &Mode, covariance: [f64; 6]) -> ContactEstimat
 /// The surroundings of a minimum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Mode {
-    /// Its share of the probability.
+    /// Share of the probability.
     pub weight: f64,
     /// Mean of x, y and W.
     pub mean: [f64; 3],
@@ -356,7 +356,7 @@ fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
 /// A part of the surface that its middle stands for.
 #[derive(Clone, Copy, Debug)]
 struct Leaf {
-    /// Its probability, but for a factor.
+    /// Probability, but for a factor.
     weight: f64,
     looked: Looked,
     /// Index of the nearest minimum.
@@ -377,7 +377,7 @@ struct Block {
 }
 
 impl Block {
-    /// Its lengths where the greatest force could hold contacts within it, by the best in its middle, or those of elsewhere.
+    /// Lengths where the greatest force could hold contacts within it, by the best in its middle, or those of elsewhere.
     fn length_with(&self, best: &Profiled, greatest_force_n: f64) -> [f64; 2] {
         let is_near = best.force_n > HELD * greatest_force_n;
         // The readings of contacts with the greatest force, as weak as anywhere within, are then weaker than the best's in the middle.
@@ -389,7 +389,7 @@ impl Block {
         }
     }
 
-    /// Its halves along the longer way; `None` where it is short both ways.
+    /// Halves along the longer way; `None` where it is short both ways.
     fn halves(&self, length: [f64; 2]) -> Option<[Self; 2]> {
         let k = usize::from(length[1] > length[0]);
         if length[k].is_nan() || length[k] <= FINE || self.size_m[k] <= LEAST_M {

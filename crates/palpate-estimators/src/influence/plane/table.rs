@@ -51,7 +51,7 @@ impl PlaneTable {
         Self { sensors, length_m, width_m, columns, rows, values: zeros.clone(), variances: zeros }
     }
 
-    /// Places of a contact that are told apart on a plane of this extent: the cells of the coarse search.
+    /// Places of a contact that are distinguished on a plane of this extent: the cells of the coarse search.
     pub(crate) fn places(extent: Extent) -> usize {
         let Self { columns, rows, .. } = Self::empty(0, extent);
         (columns - 1) / 2 * ((rows - 1) / 2)

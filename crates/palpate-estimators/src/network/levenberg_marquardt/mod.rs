@@ -296,7 +296,7 @@ impl OutputScale {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Member {
-    /// Its weights, in the order that [`Topology`] states.
+    /// Weights, in the order that [`Topology`] states.
     pub weights: Vec<f64>,
     /// L of the curvature A = L·Lᵀ of the training objective around the weights: rows of the lower triangle, one after the other.
     pub curvature_factor: Vec<f64>,

@@ -124,7 +124,7 @@ impl Link {
         Ok(Self { way, name, waiting: Vec::new(), received: Vec::new(), unread: 0 })
     }
 
-    /// Its name to whoever connects: the path of a pseudo-terminal, the address of a socket.
+    /// Name to whoever connects: the path of a pseudo-terminal, the address of a socket.
     pub fn name(&self) -> &str {
         &self.name
     }

@@ -15,7 +15,7 @@ use serde::Serialize;
 /// A message that is ready to be published.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RosMessage {
-    /// Its topic.
+    /// Topic.
     pub topic: Topic,
     /// Nanoseconds since 1970-01-01 00:00 UTC: those of the reading, or of the event.
     pub unix_ns: u64,

@@ -8,7 +8,7 @@ use std::str::FromStr;
 pub struct RosUrl {
     /// The router, as Zenoh names it: `tcp/host:7447`.
     pub router: String,
-    /// Domain of ROS, 0 to 232; 0 unless it is said.
+    /// Domain of ROS, 0 to 232; 0 by default.
     pub domain: u8,
     /// Namespace and name of the node, under which the topics are; `palpate` unless it is said.
     pub name: String,
@@ -24,7 +24,7 @@ pub struct RosUrl {
 pub struct RosUrlError {
     /// The text.
     pub text: String,
-    /// Its problem.
+    /// Problem.
     pub problem: &'static str,
 }
 

@@ -201,7 +201,7 @@ const SENSORS: usize = 9;
 pub(super) fn full_scales(spec: &PlateSpec) -> [f64; SensorKind::ALL.len()] {
     let mut coarse = PlateSpec { elements: spec.elements.min(ELEMENTS), ..spec.clone() };
     if spec::check(&coarse).is_err() {
-        // Supports that only the finer mesh can tell apart.
+        // Supports that only the finer mesh can distinguish.
         coarse.elements = spec.elements;
     }
     match Solved::new(&coarse, Watch::NONE) {

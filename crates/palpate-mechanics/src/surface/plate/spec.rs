@@ -64,9 +64,9 @@ pub enum Edge {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointSupport {
-    /// Its position.
+    /// Position.
     pub position: Position,
-    /// Its kind.
+    /// Kind.
     pub kind: PointSupportKind,
 }
 
@@ -162,7 +162,7 @@ pub enum PlateError {
     SupportOffPlate {
         /// Which support, from 1.
         number: usize,
-        /// Its position.
+        /// Position.
         at: Position,
         /// The corner across from (0, 0).
         corner: Position,
@@ -172,7 +172,7 @@ pub enum PlateError {
     Stiffness {
         /// Which support, from 1.
         number: usize,
-        /// Its stiffness, in N/m.
+        /// Stiffness, in N/m.
         value: f64,
     },
     /// A support where the edge is held already.
@@ -193,7 +193,7 @@ pub enum PlateError {
         /// Their position.
         at: Position,
     },
-    /// Two simple supports that the mesh cannot tell apart.
+    /// Two simple supports that the mesh cannot distinguish.
     #[error(
         "simple supports {first} and {second} are {} apart, less than an element of {} × {}; take more elements, or one support",
         format_length_mm(*distance_m), format_length_mm(*side_x_m), format_length_mm(*side_y_m)

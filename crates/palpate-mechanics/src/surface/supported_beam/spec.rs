@@ -15,7 +15,7 @@ pub struct SupportedBeamSpec {
     pub youngs_modulus_pa: f64,
     /// Stretches of one section each, from left to right, which together are the beam.
     pub sections: Vec<BeamSection>,
-    /// Its supports, in any order.
+    /// Supports, in any order.
     pub supports: Vec<BeamSupport>,
 }
 
@@ -23,7 +23,7 @@ pub struct SupportedBeamSpec {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamSection {
-    /// Its end, in metres.
+    /// End, in metres.
     pub to_m: f64,
     /// Width of the section, in metres.
     pub width_m: f64,
@@ -35,9 +35,9 @@ pub struct BeamSection {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamSupport {
-    /// Its position, in metres from the beam's left end.
+    /// Position, in metres from the beam's left end.
     pub at_m: f64,
-    /// Its kind.
+    /// Kind.
     pub kind: BeamSupportKind,
 }
 
@@ -70,7 +70,7 @@ impl BeamSection {
 }
 
 impl BeamSupportKind {
-    /// Its name in a rig.
+    /// Name in a rig.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Simple => "simple",
@@ -277,7 +277,7 @@ pub enum SupportedBeamError {
         number: usize,
         /// End of the section before it, or 0, in metres.
         from_m: f64,
-        /// Its end, in metres.
+        /// End, in metres.
         to_m: f64,
     },
     /// A section reaches beyond the beam.
@@ -289,7 +289,7 @@ pub enum SupportedBeamError {
     SectionBeyond {
         /// Which section.
         number: usize,
-        /// Its end, in metres.
+        /// End, in metres.
         to_m: f64,
         /// The beam's length, in metres.
         length_m: f64,
@@ -315,7 +315,7 @@ pub enum SupportedBeamError {
     SupportOffBeam {
         /// Which support.
         number: usize,
-        /// Its position, in metres.
+        /// Position, in metres.
         at_m: f64,
         /// The beam's length, in metres.
         length_m: f64,
@@ -339,7 +339,7 @@ pub enum SupportedBeamError {
     FreeWithin {
         /// Which support.
         number: usize,
-        /// Its position, in metres.
+        /// Position, in metres.
         at_m: f64,
         /// The beam's length, in metres.
         length_m: f64,
