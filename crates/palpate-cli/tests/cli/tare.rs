@@ -268,7 +268,7 @@ fn held_out_readings_are_judged_without_the_drift_of_the_recording() {
     assert!(tared && told.contains("it is taken off held-out readings"), "{told}");
     println!("mean error {raw_mm:.2} mm, {tared_mm:.2} mm with --tare auto");
     assert!(tared_mm < 0.4 * raw_mm, "{tared_mm} mm, {raw_mm} mm");
-    let (compared_mm, tared, _) = mean_mm(&["compare", "--only", "influence", "--tare", "auto"]);
+    let (compared_mm, tared, _) = mean_mm(&["compare", "--only", "influence force-linear", "--tare", "auto"]);
     assert!(tared && (compared_mm / tared_mm - 1.0).abs() < 1e-9, "{compared_mm} mm, {tared_mm} mm");
     let refused =
         complained(&run(folder.path(), &["evaluate", "rig.toml", "--data", "drift.csv", "--tare", "5"]), 2);
@@ -278,10 +278,9 @@ fn held_out_readings_are_judged_without_the_drift_of_the_recording() {
     let options = ["--data", "drift.csv", "--auto-seconds", "30", "-o", "auto.json"];
     let fit = run(folder.path(), &[&["fit", "auto.toml"][..], &options].concat());
     let chosen = String::from_utf8(fit.stderr).unwrap();
-    assert!(chosen.contains("it is taken off held-out readings\nauto: influence, with"), "{chosen}");
-    let tried: Vec<&str> =
-        chosen.lines().find(|line| line.starts_with("influence ")).unwrap().split(' ').collect();
-    let auto_mm: f64 = tried.iter().skip(1).find(|word| !word.is_empty()).unwrap().parse().unwrap();
+    assert!(chosen.contains("it is taken off held-out readings\nauto: influence force-"), "{chosen}");
+    let tried = chosen.lines().find_map(|line| line.strip_prefix("influence force-linear "));
+    let auto_mm: f64 = tried.unwrap().split_whitespace().next().unwrap().parse().unwrap();
     assert!((auto_mm / tared_mm - 1.0).abs() < 1e-2, "{auto_mm} mm, {tared_mm} mm");
     // A locator is judged as it is asked.
     file("untouched.csv", &board.recording(&[Touch::NONE; 40]));
