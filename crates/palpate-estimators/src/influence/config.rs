@@ -148,9 +148,9 @@ pub enum InfluenceFitError {
         /// The setting.
         what: &'static str,
     },
-    /// Readings are to be linear in forces that the recording does not tell.
+    /// A structure by the force, of a recording without it.
     #[error(
-        "`structure` is \"force-linear\", which needs the force of every row and at least two different forces; rows of force 0 count"
+        "the structures \"force-linear\" and \"force-monotone\" need the force of every row and at least two different forces; rows of force 0 count"
     )]
     NoForces,
     /// A setting that a plane does not have.
