@@ -36,7 +36,7 @@ fn main() {
         let rate = million_a_second(|| decode(&channels, bytes));
         let found = million_a_second(|| find(bytes, form == "binary"));
         println!(
-            "{form:>8}: {rate:.2} million frames/s; found only {found:.2}, {:.1} times as many",
+            "{form:>8}: {rate:.2} million frames/s; search only {found:.2}, {:.1} times as many",
             found / rate
         );
     }
