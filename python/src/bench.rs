@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use palpate::estimators::fit::ReadingError;
-use palpate::estimators::recording::{self, Row};
+use palpate::estimators::recording::{self, Row, Zero};
 use palpate::estimators::recording_check::check_recording;
 use palpate::estimators::setup;
 use palpate::estimators::simulate::{CleanSensors, SimulateError, simulate_contacts_watched};
@@ -255,6 +255,7 @@ impl Setup {
         if let Some(force) = force {
             training = training.with_force(checked_force(&force)?);
         }
+        check_zero(&self.0)?;
         let recording = work::run_quietly(py, |watch| self.0.simulate_watched(&training, seed, watch))?;
         Ok(Recording::new(self.0.clone(), recording))
     }
@@ -284,6 +285,7 @@ impl Setup {
         repeats: usize,
         seed: u64,
     ) -> PyResult<Recording> {
+        check_zero(&self.0)?;
         let positions = training::positions(&positions)?;
         let forces_n = self.forces(force, positions.len())?;
         let contacts: Vec<Contact> = positions
@@ -486,6 +488,7 @@ impl Setup {
         nuisance: Option<&Bound<'py, PyAny>>,
         time: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Recording> {
+        check_zero(&self.0)?;
         let Readings::Many(readings) = arrays::readings_or_none(readings, &self.channels())? else {
             return Err(refused(format!(
                 "readings of one dimension; a recording has the shape (rows, {})",
@@ -610,6 +613,16 @@ impl Setup {
 }
 
 /// Nuisance coordinates, a row each.
+/// Refuses a setup whose readings have another zero than the recorded one: only files are known to have readings as recorded.
+pub fn check_zero(setup: &setup::Setup) -> PyResult<()> {
+    match setup.recording_columns().zero {
+        Zero::None => Ok(()),
+        Zero::Last => Err(refused(
+            "`zero = \"last\"` of [recording] applies to files of readings as recorded: simulate with `palpate simulate`, and read with `read_csv`",
+        )),
+    }
+}
+
 fn nuisance_rows(value: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<Vec<f64>>> {
     let columns = value.py().import("palpate._arrays")?.call_method1("nuisances", (value, rows))?;
     columns.extract()
@@ -749,6 +762,7 @@ impl Recording {
     /// ----------
     /// path : str or path
     fn to_csv(&self, path: PathBuf) -> PyResult<()> {
+        check_zero(&self.setup)?;
         let bytes = self.csv()?;
         write_whole(&path, &bytes)
     }

@@ -3,7 +3,8 @@
 use std::time::Instant;
 
 use palpate::estimators::estimator::{
-    self, CompareOptions, Comparison, compare as compare_all, contenders, take_off_drift,
+    self, CompareOptions, Comparison, UnknownEstimator, compare as compare_all, contenders, select,
+    take_off_drift,
 };
 use palpate::estimators::evaluation::{self, Calibration, ErrorSummary, Split, evaluate_splits, limit_ratio};
 use palpate::estimators::recording;
@@ -145,25 +146,17 @@ pub fn compare<'py>(
         }
     };
     let rows = trials.first().map_or(0, |trial| trial.training.rows.len());
-    let mut contenders = match estimators {
+    let contenders = match estimators {
         Some(estimators) => estimators.iter().map(|estimator| estimator.inner.clone()).collect(),
         None => {
             let own = own.map_or_else(estimator::Estimator::default, |own| own.inner.clone());
             contenders(bench, &own, rows)
         }
     };
-    let is_named =
-        |contender: &estimator::Estimator, only: &str| [contender.kind(), contender.name()].contains(&only);
-    let suits = |only: &&String| contenders.iter().any(|contender| is_named(contender, only));
-    if let Some(unknown) = only.iter().find(|only| !suits(only)) {
-        let mut known: Vec<&str> = contenders.iter().map(|contender| contender.kind()).collect();
-        known.dedup();
+    let contenders = select(contenders, &only).map_err(|UnknownEstimator { name, known }| {
         let known = known.join(", ");
-        return Err(refused(format!(
-            "`only` names \"{unknown}\", which does not suit the bench; it can be: {known}"
-        )));
-    }
-    contenders.retain(|contender| only.is_empty() || only.iter().any(|only| is_named(contender, only)));
+        refused(format!("`only` names \"{name}\", which does not suit the bench; it can be: {known}"))
+    })?;
     // Alone it is refused; among others it is left out.
     if let ([only], Some(trial)) = (&contenders[..], trials.first()) {
         check_memory(memory_limit, only, bench, &trial.training)?;

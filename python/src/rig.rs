@@ -7,7 +7,7 @@ use palpate::estimators::setup;
 use palpate::rig;
 use pyo3::prelude::*;
 
-use crate::bench::{Recording, Setup};
+use crate::bench::{Recording, Setup, check_zero};
 use crate::errors::{io_error, of_rig};
 use crate::estimator::Estimator;
 use crate::training::Training;
@@ -98,6 +98,7 @@ impl Rig {
     /// Recording
     #[pyo3(signature = (*, seed=0))]
     fn simulate(&self, py: Python<'_>, seed: u64) -> PyResult<Recording> {
+        check_zero(&self.inner.setup)?;
         let recording = work::run_quietly(py, |watch| self.inner.simulate_watched(seed, watch))?;
         Ok(Recording::new(self.setup.clone(), recording))
     }

@@ -162,3 +162,17 @@ def test_a_million_bad_calls_leave_memory_flat(locator):
     before = resident_bytes()
     calls(1_000_000)
     assert resident_bytes() - before < 2_000_000
+
+
+def test_readings_without_their_zero_are_refused(tmp_path, examples):
+    text = (examples / "real-finger.toml").read_text() + '\n[recording]\nzero = "last"\n'
+    (tmp_path / "rig.toml").write_text(text)
+    rig = pp.Rig.load(tmp_path / "rig.toml")
+    channels = len(rig.setup.channels)
+    for recorded in (
+        lambda: rig.simulate(),
+        lambda: rig.setup.simulate(pp.even(5), force="1 N"),
+        lambda: rig.setup.recording(np.zeros((2, channels)), [0.01, 0.02], force=[0.0, 1.0]),
+    ):
+        with pytest.raises(pp.PalpateError, match="applies to files of readings as recorded"):
+            recorded()

@@ -134,11 +134,6 @@ fn with_warnings(
     Ok(recording)
 }
 
-/// A simulated recording with the zero of the bench's recordings.
-pub fn zeroed(setup: &Setup, simulated: Recording) -> Result<Recording, Failure> {
-    simulated.zeroed(setup.recording_columns().zero).map_err(|error| Complaint::new(error).into())
-}
-
 /// Says on stderr how the files of a recording write their tables, where that is not plainly.
 pub fn say_dialects(recording: &Recording) {
     recording.provenance.dialects.iter().for_each(|dialect| remark!("{}: {dialect}", dialect.source));

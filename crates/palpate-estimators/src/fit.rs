@@ -268,7 +268,8 @@ fn check_intervals<E: Fit + ?Sized>(
         task.watch.counted("checking intervals", "folds", fold, CHECK_FOLDS)?;
         Ok((estimator.fit_without_interval_check(task)?, 0.0))
     };
-    match hold_out(task.setup, &splits, task.seed, &|| 0.0, task.watch, fit) {
+    let FitTask { setup, seed, watch, .. } = task;
+    match (HoldOutTask { setup, splits: &splits, seed, clock: &|| 0.0, watch }).run(fit) {
         Ok(held_out) => Ok(IntervalCheck::of_estimates(&held_out.estimates, task.setup.surface().extent())),
         Err(HoldOutError::<E::Error>::Fit(error)) if Cancelled::caused(&error) => Err(Cancelled),
         Err(_) => Ok(None),
@@ -288,33 +289,43 @@ pub(crate) enum HoldOutError<E> {
     Reading(ReadingError),
 }
 
-/// Locates what each split judges by, with the locator that `fit` gives for its training part. `fit` takes the number of a split, and gives the
-/// seconds that the fit would have taken longer by itself. `clock` tells seconds since any fixed moment.
-pub(crate) fn hold_out<M: Locate, E>(
-    setup: &Setup,
-    splits: &[Split],
-    seed: u64,
-    clock: &dyn Fn() -> f64,
-    watch: Watch,
-    fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
-) -> Result<HeldOut, HoldOutError<E>> {
-    let mut held_out = HeldOut { estimates: Vec::new(), fitting_s: 0.0, locating_s: 0.0 };
-    for (fold, Split { training, judged, offsets, .. }) in splits.iter().enumerate() {
-        let start = clock();
-        let task = FitTask { setup, recording: training, seed, watch };
-        let (locator, shared_s) = fit(fold, task).map_err(HoldOutError::Fit)?;
-        let fitted = clock();
-        let tared = offsets.as_ref().map(|course| course.tared(judged, locator.method.offsets().as_deref()));
-        let presses = tared.as_ref().unwrap_or(judged).rows.iter().filter(|row| row.touches());
-        for row in presses {
-            let estimate = locator.locate(&row.reading).map_err(HoldOutError::Reading)?;
-            let (truth, force_n) = (row.position, row.force_n);
-            held_out.estimates.push(HeldOutEstimate { truth, force_n, estimate, fold });
+/// Splits whose presses are held out.
+pub(crate) struct HoldOutTask<'a> {
+    pub setup: &'a Setup,
+    pub splits: &'a [Split],
+    pub seed: u64,
+    /// Tells seconds since any fixed moment.
+    pub clock: &'a dyn Fn() -> f64,
+    pub watch: Watch<'a>,
+}
+
+impl HoldOutTask<'_> {
+    /// Locates the judged presses of each split with the locator that `fit` gives for its training part. `fit` receives the number of the split, and returns
+    /// seconds too: those by which the fit would have taken longer alone.
+    pub fn run<M: Locate, E>(
+        &self,
+        fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
+    ) -> Result<HeldOut, HoldOutError<E>> {
+        let Self { setup, splits, seed, clock, watch } = *self;
+        let mut held_out = HeldOut { estimates: Vec::new(), fitting_s: 0.0, locating_s: 0.0 };
+        for (fold, Split { training, judged, offsets, .. }) in splits.iter().enumerate() {
+            let start = clock();
+            let task = FitTask { setup, recording: training, seed, watch };
+            let (locator, shared_s) = fit(fold, task).map_err(HoldOutError::Fit)?;
+            let fitted = clock();
+            let tared =
+                offsets.as_ref().map(|course| course.tared(judged, locator.method.offsets().as_deref()));
+            let presses = tared.as_ref().unwrap_or(judged).rows.iter().filter(|row| row.touches());
+            for row in presses {
+                let estimate = locator.locate(&row.reading).map_err(HoldOutError::Reading)?;
+                let (truth, force_n) = (row.position, row.force_n);
+                held_out.estimates.push(HeldOutEstimate { truth, force_n, estimate, fold });
+            }
+            held_out.fitting_s += fitted - start + shared_s;
+            held_out.locating_s += clock() - fitted;
         }
-        held_out.fitting_s += fitted - start + shared_s;
-        held_out.locating_s += clock() - fitted;
+        Ok(held_out)
     }
-    Ok(held_out)
 }
 
 /// A fitted method.

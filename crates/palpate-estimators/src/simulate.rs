@@ -12,7 +12,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::arrangement::{ArrangementError, Training};
 use crate::imperfections::Schedule;
-use crate::recording::{Provenance, Recording, Row};
+use crate::recording::{NoUntouchedRow, Provenance, Recording, Row};
 use crate::setup::Setup;
 use palpate_mechanics::contact::{Contact, OffSurface, Position};
 use palpate_mechanics::sensing::{ChannelErrors, Layout, LayoutError, Sensor};
@@ -48,6 +48,9 @@ pub enum SimulateError {
     /// A position does not lie on the surface.
     #[error(transparent)]
     OffSurface(#[from] OffSurface),
+    /// The zero of the readings needs untouched rows.
+    #[error("`zero = \"last\"` needs untouched rows, and only a bench with [imperfections] simulates them")]
+    NoUntouchedRow(#[from] NoUntouchedRow),
     /// Whoever watched the work stopped it.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),

@@ -112,6 +112,19 @@ impl Rig {
         Ok(self.setup.simulate_watched(self.training()?, seed, watch)?)
     }
 
+    /// Simulates the presses of a calibration for a fit, watched: [`Rig::simulate`] with the zero that recordings of the rig have.
+    ///
+    /// # Errors
+    /// Those of [`Rig::simulate_watched`], and [`SimulateError::NoUntouchedRow`].
+    pub fn simulate_calibration_watched(
+        &self,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<Recording, RigSimulationError> {
+        let recorded = self.simulate_watched(seed, watch)?;
+        Ok(recorded.zeroed(self.setup.recording_columns().zero).map_err(SimulateError::from)?)
+    }
+
     /// The calibration at the training positions, to be simulated.
     ///
     /// # Errors

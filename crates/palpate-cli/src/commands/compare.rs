@@ -11,7 +11,9 @@ use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
 use crate::tare::{TareOption, tare_splits};
 use crate::target::{Inputs, TargetFolder};
 use crate::{input, output, progress, tables};
-use palpate_estimators::estimator::{self, CompareOptions, Compared, Comparison, Estimator, contenders};
+use palpate_estimators::estimator::{
+    self, CompareOptions, Compared, Comparison, UnknownEstimator, contenders, select,
+};
 use palpate_estimators::evaluation::{Evaluation, ForceSummary, Split, limit_ratio, percentage_error};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Progress, Watch};
@@ -195,18 +197,11 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
 
 fn compare(arguments: &Arguments, rig: &Rig, trials: &[Split]) -> Result<Compared, Failure> {
     let rows = trials.first().map_or(0, |trial| trial.training.rows.len());
-    let mut contenders = contenders(&rig.setup, &rig.estimator, rows);
-    let mut known: Vec<&str> = contenders.iter().map(|contender| contender.kind()).collect();
-    known.dedup();
-    let is_named = |contender: &Estimator, only: &str| [contender.kind(), contender.name()].contains(&only);
-    let suits = |only: &&String| contenders.iter().any(|contender| is_named(contender, only));
-    if let Some(unknown) = arguments.only.iter().find(|only| !suits(only)) {
-        let complaint = Complaint::new(format!("--only {unknown}: no estimator of this kind suits the rig"));
-        return Err(complaint.help(format!("it can be: {}", known.join(", "))).into());
-    }
-    contenders.retain(|contender| {
-        arguments.only.is_empty() || arguments.only.iter().any(|only| is_named(contender, only))
-    });
+    let contenders = contenders(&rig.setup, &rig.estimator, rows);
+    let contenders = select(contenders, &arguments.only).map_err(|UnknownEstimator { name, known }| {
+        let complaint = Complaint::new(format!("--only {name}: no estimator of this kind suits the rig"));
+        complaint.help(format!("it can be: {}", known.join(", ")))
+    })?;
     // Alone it is refused; among others it is left out.
     if let ([only], Some(trial)) = (&contenders[..], trials.first()) {
         let cost = only.fit_cost(&rig.setup, &trial.training);

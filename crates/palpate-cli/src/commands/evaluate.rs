@@ -164,12 +164,9 @@ fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
 fn cross_validated(arguments: &Arguments, rig: Box<Rig>) -> Result<Answers, Failure> {
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
-        None => {
-            let simulated = Observer::of_stages()
-                .watch(|watch| rig.simulate_watched(arguments.seed, watch))
-                .map_err(|error| Failure::of_work(error, simulation_complaint))?;
-            input::zeroed(&rig.setup, simulated)?
-        }
+        None => Observer::of_stages()
+            .watch(|watch| rig.simulate_calibration_watched(arguments.seed, watch))
+            .map_err(|error| Failure::of_work(error, simulation_complaint))?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
     let cost = rig.estimator.fit_cost(&rig.setup, &recording);
@@ -192,7 +189,7 @@ fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Fail
             warn_of_training_data(&locator, &recording);
             recording
         }
-        None => input::zeroed(&locator.setup, simulated(&locator, arguments.seed)?)?,
+        None => simulated(&locator, arguments.seed)?,
     };
     let recording = tared_recording(&arguments.tare, &locator, recording)?;
     let evaluation = Observer::of_stages()

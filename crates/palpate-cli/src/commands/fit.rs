@@ -51,12 +51,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
         None => {
-            let simulated = Observer::of_stages().watch(|watch| rig.simulate_watched(arguments.seed, watch));
-            let simulated = simulated.map_err(|error| {
+            let simulated =
+                Observer::of_stages().watch(|watch| rig.simulate_calibration_watched(arguments.seed, watch));
+            simulated.map_err(|error| {
                 let about = |error| Complaint::about(&arguments.rig, error);
                 Failure::of_work(error, |error| about(error).help("--data names a recording to fit"))
-            })?;
-            input::zeroed(&rig.setup, simulated)?
+            })?
         }
     };
     let cost = cost(&rig, &recording, arguments);

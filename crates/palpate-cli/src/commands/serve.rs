@@ -339,14 +339,14 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
     let recording = match &arguments.data {
         Some(data) => input::read_recording(&rig.setup, data)?,
         None => {
-            let simulated = Observer::of_stages().watch(|watch| rig.simulate_watched(arguments.seed, watch));
-            let simulated = simulated.map_err(|error| {
+            let simulated =
+                Observer::of_stages().watch(|watch| rig.simulate_calibration_watched(arguments.seed, watch));
+            simulated.map_err(|error| {
                 let about = |error| Complaint::about(path, error);
                 Failure::of_work(error, |error| {
                     about(error).help("--data names a recording to fit; --calibrate makes one in the browser")
                 })
-            })?;
-            input::zeroed(&rig.setup, simulated)?
+            })?
         }
     };
     let needed = rig.estimator.positions_needed();

@@ -2,7 +2,7 @@
 
 use crate::support::board::{Board, RIG, Touch};
 use crate::support::command::{complained, folder, run, said};
-use crate::support::examples::MOVING_LOAD;
+use crate::support::examples::{MOVING_LOAD, NOISY_BEAM, REAL_FINGER};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -374,4 +374,26 @@ fn a_calibration_by_the_latest_zero_is_used_by_it() {
     let moved = judged(folder.path(), &touches, &[]);
     println!("fresh {fresh:?}, moved {moved:?}");
     assert!(moved.0 < 1.15 * fresh.0 + 0.1 && moved.1 > 0.95, "{fresh:?} {moved:?}");
+}
+
+#[test]
+fn simulated_calibrations_have_the_zero_of_the_rig() {
+    let zero = "\n[recording]\nzero = \"last\"\n";
+    let finger = folder(format!("{REAL_FINGER}{zero}"));
+    let median_mm = |arguments: &[&str]| {
+        let json: serde_json::Value = serde_json::from_str(&said(&run(finger.path(), arguments))).unwrap();
+        let errors = json["errors"].get(0).or(json["estimators"].get(0)).unwrap();
+        errors["error_mm"]["median"].as_f64().unwrap()
+    };
+    said(&run(finger.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    let evaluated_mm = median_mm(&["evaluate", "locator.json", "--json"]);
+    let compare = ["compare", "rig.toml", "--only", "influence", "--calibrations", "1", "--json"];
+    let compared_mm = median_mm(&compare);
+    // One bench: its median error without a zero is more than twice as large.
+    assert!((0.7..1.4).contains(&(evaluated_mm / compared_mm)), "{evaluated_mm} mm, {compared_mm} mm");
+    let clean = folder(format!("{NOISY_BEAM}{zero}"));
+    for verb in [&["fit", "rig.toml", "-o", "never.json"][..], &["compare", "rig.toml"]] {
+        let words = complained(&run(clean.path(), verb), 2);
+        assert!(words.contains("only a bench with [imperfections]"), "{words}");
+    }
 }

@@ -40,6 +40,32 @@ pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator>
     contenders
 }
 
+/// Names that suit no contender.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no estimator `{name}` suits the bench; it can be: {}", known.join(", "))]
+pub struct UnknownEstimator {
+    /// The name.
+    pub name: String,
+    /// Kinds of the contenders.
+    pub known: Vec<&'static str>,
+}
+
+/// The contenders that `only` names by kind or by [`Estimator::name`]; all of them where it is empty.
+///
+/// # Errors
+/// [`UnknownEstimator`] for a name that is none of theirs.
+pub fn select(mut contenders: Vec<Estimator>, only: &[String]) -> Result<Vec<Estimator>, UnknownEstimator> {
+    let is_named = |contender: &Estimator, name: &str| [contender.kind(), contender.name()].contains(&name);
+    if let Some(name) = only.iter().find(|name| !contenders.iter().any(|contender| is_named(contender, name)))
+    {
+        let mut known: Vec<&'static str> = contenders.iter().map(Estimator::kind).collect();
+        known.dedup();
+        return Err(UnknownEstimator { name: name.clone(), known });
+    }
+    contenders.retain(|contender| only.is_empty() || only.iter().any(|name| is_named(contender, name)));
+    Ok(contenders)
+}
+
 /// How estimators are compared.
 #[derive(Clone, Copy)]
 pub struct CompareOptions<'a> {
@@ -65,7 +91,7 @@ pub struct Compared {
 /// Fits each estimator to the training part of every trial, and locates what that judges by; one that does not suit is left out.
 ///
 /// ```
-/// use palpate_estimators::estimator::{CompareOptions, Estimator, compare, contenders};
+/// use palpate_estimators::estimator::{CompareOptions, Estimator, compare, contenders, select};
 /// use palpate_estimators::{arrangement::Training, evaluation::Split, setup::Setup};
 /// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
 /// use palpate_numerics::watch::Watch;
@@ -73,8 +99,8 @@ pub struct Compared {
 /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
 /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
 /// let trials = Split::by_folds(&setup.simulate(&Training::even(10).repeated(3), 0)?, 5)?;
-/// let mut contenders = contenders(&setup, &Estimator::default(), 24);
-/// contenders.retain(|contender| matches!(contender.kind(), "influence" | "neighbours"));
+/// let all = contenders(&setup, &Estimator::default(), 24);
+/// let contenders = select(all, &["influence".to_owned(), "neighbours".to_owned()])?;
 /// let options = CompareOptions { seed: 0, clock: &|| 0.0, refuse: &|_, _| None, watch: Watch::NONE };
 /// let compared = compare(&setup, contenders, &trials, options)?;
 /// assert_eq!(compared.comparisons[0].estimator.kind(), "influence");

@@ -16,7 +16,7 @@ pub use crate::tracking::{
     Across, Creep, Drift, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig,
 };
 pub use crate::tried::Tried;
-pub use compare::{CompareOptions, Compared, Comparison, compare, contenders};
+pub use compare::{CompareOptions, Compared, Comparison, UnknownEstimator, compare, contenders, select};
 pub use cost::FitCost;
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
 pub use memory::{MemoryExceeded, MemoryLimit, MemoryLimitError, Size};
@@ -206,7 +206,7 @@ estimators! {
     "centroid" Centroid(Centroid) CentroidLocator, CentroidFitError;
 }
 
-/// True of kinds that go from a reading to a position and do not know what a contact reads: these have a [`ReadingCheck`].
+/// True of kinds that map a reading to a position without a model of readings: these have a [`ReadingCheck`].
 pub(crate) fn is_learnt(kind: &str) -> bool {
     matches!(kind, "network" | "network-lm" | "gaussian-process" | "neighbours" | "centroid")
 }
@@ -232,7 +232,7 @@ impl Estimator {
 }
 
 impl Method {
-    /// True of a method whose intervals come from errors at held-out positions, reading by reading.
+    /// True of a method with intervals from errors at held-out positions, reading by reading.
     fn knows_its_errors(&self) -> bool {
         matches!(self, Self::GaussianProcess(locator) if locator.widths.is_some())
     }
@@ -296,7 +296,7 @@ impl Estimator {
         }
     }
 
-    /// Share of untouched readings that its locators may take for a contact; `None` where they tell none, or where that is left to the choice.
+    /// False-alarm rate of its locators; `None` where they have no `no_contact`, and of `auto`.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         match self {
             Self::Influence(config) => Some(config.false_alarm_rate),
@@ -321,7 +321,7 @@ impl Default for Estimator {
     }
 }
 
-/// A locator of any estimator: what files hold.
+/// A locator of any estimator, as in files.
 pub type Locator = Fitted<Method>;
 
 impl Locate for Method {
@@ -352,13 +352,13 @@ impl<M: Locate> Fitted<M>
 where
     Method: From<M>,
 {
-    /// The same locator as one of any estimator.
+    /// Converts the locator into one of any estimator.
     pub fn into_locator(self) -> Locator {
         self.map(Method::from)
     }
 }
 
-/// A locator that does not know what its surface reads untouched.
+/// A locator without an untouched reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "a locator of kind `{kind}`, fitted to a recording without rows of force 0, does not know what its surface reads untouched"
@@ -399,7 +399,7 @@ impl Locator {
         }
     }
 
-    /// The shape that the surface has by an estimate, at `steps` + 1 points; `None` for a method that does not tell it.
+    /// Shape of the surface under an estimated contact, at `steps` + 1 points; `None` for a method without shapes.
     pub fn shape(&self, estimate: &Estimate, steps: usize) -> Option<DigitShape> {
         match &self.method {
             Method::Digit(digit) => Some(digit.shape(&estimate.contact, steps)),
@@ -449,7 +449,7 @@ impl Locator {
     /// recording's rows without contact, or nothing at all where a model says what a contact adds.
     ///
     /// # Errors
-    /// [`NoBaseline`] where none of them is known.
+    /// [`NoBaseline`] without all of them.
     pub fn untouched_reading(&self) -> Result<Vec<f64>, NoBaseline> {
         let offsets = match &self.method {
             Method::Influence(influence) => influence.offsets(),
@@ -485,7 +485,7 @@ impl Locator {
     /// ```
     ///
     /// # Errors
-    /// [`NoBaseline`] where calibration does not tell what the surface reads untouched.
+    /// [`NoBaseline`] where the calibration has no untouched reading.
     pub fn tare(&self) -> Result<Tare<Vec<f64>>, NoBaseline> {
         let tare = Tare::new(self.untouched_reading()?);
         let channels = self.layout().len();
@@ -517,12 +517,12 @@ impl Locator {
         tare.follow(reading, tared, |tared| self.locate(tared).unwrap_or_else(|_| self.anywhere()))
     }
 
-    /// Share of untouched readings that may be taken for a contact; `None` of a method that tells no untouched reading.
+    /// False-alarm rate; `None` of a method without `no_contact`.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         self.method.false_alarm_rate().or_else(|| self.check.as_ref()?.false_alarm_rate())
     }
 
-    /// True of a locator whose estimates have a force: one that is known, or that it tells.
+    /// True of a locator with forces in its estimates, known or estimated.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, fit::Fit, network::Network, influence::Influence, setup::Setup};
@@ -563,7 +563,7 @@ impl Locator {
         }
     }
 
-    /// Its setup with the noise that it has learnt, where it has, and channels that it does not use dead.
+    /// Setup with the learnt noise, if there is one, and with unused channels dead.
     ///
     /// # Errors
     /// [`SetupError`] for noise that no sensor has.
@@ -581,7 +581,7 @@ impl Locator {
         Ok(setup)
     }
 
-    /// The weights of a network; nothing for another method.
+    /// The weights of a network; empty for another method.
     pub fn weights(&self) -> &[f64] {
         match &self.method {
             Method::Network(network) => &network.parts().weights,
@@ -607,7 +607,7 @@ pub struct Choice {
     pub tried: Vec<Tried>,
     /// Names of those that were not, with the reason.
     pub left_out: Vec<(&'static str, String)>,
-    /// Greatest change of each channel by the drift that was taken off the held-out readings; nothing where the presses tell none.
+    /// Greatest change of each channel by the drift that was subtracted from the held-out readings; `None` without a drift.
     pub drift: Option<Vec<f64>>,
 }
 
@@ -633,8 +633,8 @@ pub struct TimeLimit<'a> {
 /// Reason of an estimator that [`TimeLimit`] leaves out.
 const NOT_IN_TIME: &str = "it was not done in time";
 
-/// Brings the readings that splits hold out from the offsets of their time to those that the locators of their folds learn, where the
-/// other presses tell a drift; the greatest change of each channel, or `None` where no split has one.
+/// Tares the held-out readings of splits by the drift that the other presses show. Returns the greatest change of each channel, or `None` where
+/// no split has a drift.
 ///
 /// # Errors
 /// [`InfluenceFitError`] where a split's presses cannot be learnt from, and when the watch stopped it.
@@ -659,7 +659,7 @@ pub const CHOICE_FOLDS: usize = 5;
 
 /// Chooses the estimator for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds: the least geometric mean of mean error
 /// and interval score. Estimators are tried from the one that is best on most recordings on. In use a drift is tared away, and so it is here:
-/// where the presses tell one, it is taken off the held-out readings.
+/// where the presses show one, it is subtracted from the held-out readings.
 ///
 /// # Errors
 /// [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason;
@@ -687,7 +687,7 @@ pub fn choose(task: FitTask, limit: Option<TimeLimit>) -> Result<Choice, FitErro
     {
         Ok(drift) => drift.flatten(),
         Err(error) if Cancelled::caused(&error) => return Err(stopped(None)),
-        // Presses that tell no influence functions tell no drift; when that estimator is tried, it says why.
+        // Without influence functions there is no drift; when that estimator is tried, its error has the reason.
         Err(_) => {
             splits.iter_mut().for_each(|split| split.offsets = None);
             None
@@ -762,7 +762,7 @@ pub struct Tracking {
 /// A locator by which moving contacts cannot be followed, or not in that way.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotTrackable {
-    /// It cannot say how probable a reading is at a contact.
+    /// It has no likelihood of readings.
     #[error("a moving contact is followed by an influence locator of a surface with a model; this one is of kind `{kind}`{}", if *measured { ", on a measured surface" } else { "" })]
     Kind {
         /// The locator's kind.
@@ -788,7 +788,7 @@ impl Locator {
     /// Likelihood for a tracker of this configuration.
     ///
     /// # Errors
-    /// [`NotTrackable`] for a locator whose method has no likelihood, or for a swing of a surface whose modes are not known.
+    /// [`NotTrackable`] for a method without a likelihood, or for a swing of a surface without known modes.
     pub fn tracking(&self, config: &TrackerConfig) -> Result<Tracking, NotTrackable> {
         if config.swing.is_some() && !matches!(self.setup.surface(), SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);

@@ -1,8 +1,8 @@
 //! Splits on which several estimators are tried: learnt methods share the reading check of each.
 
 use super::{Estimator, FitError, Locator, is_learnt};
-use crate::evaluation::{EvaluationError, Split, TimedEvaluation, evaluate_splits_by};
-use crate::fit::FitTask;
+use crate::evaluation::{EvaluationError, Split, TimedEvaluation, evaluate_held_out};
+use crate::fit::{FitTask, HoldOutTask};
 use crate::reading_check::ReadingCheck;
 use crate::setup::Setup;
 use palpate_numerics::watch::Watch;
@@ -35,7 +35,8 @@ impl<'a> TrialSplits<'a> {
         watch: Watch,
     ) -> Result<TimedEvaluation, EvaluationError<FitError>> {
         let fit = |split: usize, task: FitTask<'_>| self.fit(estimator, split, task);
-        evaluate_splits_by(self.setup, self.splits, self.seed, self.clock, watch, fit)
+        let Self { setup, splits, seed, clock, .. } = *self;
+        evaluate_held_out(&HoldOutTask { setup, splits, seed, clock, watch }, fit)
     }
 
     /// The locator of a split, and the seconds that its check took before.

@@ -3,7 +3,7 @@
 use super::{Evaluation, EvaluationError, Split, SplitOrigin};
 use crate::arrangement::{Training, all_over};
 use crate::fit::{Fit, FitTask, Fitted, Locate, SeedList};
-use crate::recording::{Provenance, Recording};
+use crate::recording::{NoUntouchedRow, Provenance, Recording, Zero};
 use crate::setup::Setup;
 use crate::simulate::{
     Press, PressedBench, SimulateError, contacts_at, simulate_at_watched, simulate_contacts_watched,
@@ -84,7 +84,8 @@ pub fn simulate_use_all_over_watched(
     let with_share =
         |(position, share): (&Position, &f64)| Contact { position: *position, force_n: share * force_n };
     let contacts: Vec<Contact> = positions.iter().zip(shares.iter().cycle()).map(with_share).collect();
-    simulate_use_watched(setup, calibration, &contacts, seed, watch)
+    let touches = simulate_use_watched(setup, calibration, &contacts, seed, watch)?;
+    Ok(touches.zeroed(setup.recording_columns().zero)?)
 }
 
 impl Calibration {
@@ -184,6 +185,9 @@ impl Calibration {
         if self.touched.imperfections().is_some() {
             return self.simulate_in_time(seed, watch);
         }
+        if self.pressed.recording_columns().zero == Zero::Last {
+            return Err(NoUntouchedRow.into());
+        }
         let all: Vec<Contact> = presses.chain(self.contacts()?).collect();
         let rows: Vec<usize> = (0..all.len()).collect();
         let (pressed, touched) = rows.split_at(self.presses.len());
@@ -201,9 +205,11 @@ impl Calibration {
     fn simulate_in_time(&self, seed: u64, watch: Watch) -> Result<Split, SimulateError> {
         let presses = Press::from_rows(&contacts_at(&self.pressed, &self.presses)?);
         let mut bench = PressedBench::new(&self.pressed, &presses, seed, watch)?;
-        let training = bench.record(&presses, self.placement_sd_m, watch)?;
+        let zero = self.pressed.recording_columns().zero;
+        let training = bench.record(&presses, self.placement_sd_m, watch)?.zeroed(zero)?;
         bench.pause();
-        let judged = bench.record(&Press::from_rows(&self.contacts()?), None, watch)?.touched().into_owned();
+        let judged = bench.record(&Press::from_rows(&self.contacts()?), None, watch)?.zeroed(zero)?;
+        let judged = judged.touched().into_owned();
         Ok(Split { training, judged, offsets: None, origin: SplitOrigin::Calibration })
     }
 

@@ -10,7 +10,7 @@ pub use palpate_numerics::{median, percentile};
 
 use crate::batch::{BatchError, BatchOptions};
 use crate::estimate_record::ContactRecord;
-use crate::fit::{Fit, FitTask, Fitted, HeldOut, HoldOutError, Locate, ReadingError, hold_out};
+use crate::fit::{Fit, FitTask, Fitted, HeldOut, HoldOutError, HoldOutTask, Locate, ReadingError};
 use crate::interval_check::{HeldOutEstimate, widen_by_other_folds};
 use crate::load_profile::Cells;
 use crate::recording::{Recording, Row, TooFewPositions};
@@ -439,20 +439,17 @@ pub fn evaluate_splits<E: Fit>(
     watch: Watch,
 ) -> Result<TimedEvaluation, EvaluationError<E::Error>> {
     let fit = |_, task: FitTask| Ok((estimator.fit_without_interval_check(task)?, 0.0));
-    evaluate_splits_by(setup, splits, seed, clock, watch, fit)
+    evaluate_held_out(&HoldOutTask { setup, splits, seed, clock, watch }, fit)
 }
 
-/// The same with the locators of `fit`, which takes the number of a split, and gives seconds that a fit would have taken longer by itself.
-pub(crate) fn evaluate_splits_by<M: Locate, E: std::error::Error>(
-    setup: &Setup,
-    splits: &[Split],
-    seed: u64,
-    clock: &dyn Fn() -> f64,
-    watch: Watch,
+/// Evaluates the locators that `fit` gives for splits; see [`HoldOutTask::run`].
+pub(crate) fn evaluate_held_out<M: Locate, E: std::error::Error>(
+    task: &HoldOutTask,
     fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
 ) -> Result<TimedEvaluation, EvaluationError<E>> {
+    let HoldOutTask { setup, splits, .. } = *task;
     let extent = setup.surface().extent();
-    let held_out = hold_out(setup, splits, seed, clock, watch, fit).map_err(|error| match error {
+    let held_out = task.run(fit).map_err(|error| match error {
         HoldOutError::Fit(error) => EvaluationError::Fit(error),
         HoldOutError::Reading(error) => error.into(),
     })?;

@@ -12,6 +12,7 @@ pub const NOISY_BEAM: &str = include_str!("../../../../../examples/noisy-beam.to
 pub const PAPER: &str = include_str!("../../../../../examples/paper.toml");
 pub const PLATE: &str = include_str!("../../../../../examples/plate.toml");
 pub const PRESSURE_MAP: &str = include_str!("../../../../../examples/pressure-map.toml");
+pub const REAL_FINGER: &str = include_str!("../../../../../examples/real-finger.toml");
 pub const SENSOR_DESIGN: &str = include_str!("../../../../../examples/sensor-design.toml");
 pub const TRAINING_POSITIONS: &str = include_str!("../../../../../examples/training-positions.toml");
 pub const TWO_MOVING_LOADS: &str = include_str!("../../../../../examples/two-moving-loads.toml");
