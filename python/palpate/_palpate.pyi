@@ -54,6 +54,7 @@ class Setup:
         *sensors: Sensors | RawChannels,
         force: Quantity | None = None,
         greatest_force: Quantity | None = None,
+        force_range: Sequence[Quantity] | None = None,
         columns: Columns | Mapping[str, Any] | None = None,
     ) -> Setup: ...
     @staticmethod

@@ -192,6 +192,7 @@ def setup_toml(
     sensors: Sequence[Sensors | RawChannels],
     force: Quantity | None,
     greatest_force: Quantity | None,
+    force_range: Sequence[Quantity] | None,
     columns: Columns | Mapping[str, Any] | None,
 ) -> str:
     """The sections of a rig that say what a setup is."""
@@ -206,7 +207,7 @@ def setup_toml(
         if not isinstance(group, Sensors):
             raise TypeError(f"sensors are of the type {type(group).__name__}; deflection(8) and its like make them")
         text += group._toml("[[sensors]]")
-    text += _Contact(force, greatest_force)._toml("[contact]")
+    text += _Contact(force, greatest_force, force_range)._toml("[contact]")
     if isinstance(columns, Mapping):
         columns = Columns(**columns)
     if names and (columns is None or columns.channels is None):
@@ -220,3 +221,4 @@ def setup_toml(
 class _Contact(Section):
     force: Quantity | None = key("N")
     greatest_force: Quantity | None = key("N")
+    force_range: Sequence[Quantity] | None = key("N")

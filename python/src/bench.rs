@@ -38,6 +38,9 @@ use crate::work;
 ///     Force of the contacts in newtons or with a unit, where it is known and one for all.
 /// greatest_force : float or str, optional
 ///     The greatest that an unknown force can be, on a surface with a model; ten times that of the presses where nothing is said.
+/// force_range : pair of float or str, optional
+///     Least and greatest force of contacts of unknown force: 1 in 200 is lighter, none is harder. Without it a decade either side of the presses, where
+///     readings are proportional to the force.
 /// columns : Columns or mapping, optional
 ///     Columns of recordings by their roles, where they are not as palpate writes them.
 ///
@@ -58,16 +61,18 @@ pub struct Setup(pub Arc<setup::Setup>);
 #[pymethods]
 impl Setup {
     #[new]
-    #[pyo3(signature = (surface, *sensors, force=None, greatest_force=None, columns=None))]
+    #[pyo3(signature = (surface, *sensors, force=None, greatest_force=None, force_range=None, columns=None))]
     fn new(
         surface: Bound<'_, PyAny>,
         sensors: Bound<'_, PyTuple>,
         force: Option<Bound<'_, PyAny>>,
         greatest_force: Option<Bound<'_, PyAny>>,
+        force_range: Option<Bound<'_, PyAny>>,
         columns: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let module = surface.py().import("palpate._sensors")?;
-        let text = module.call_method1("setup_toml", (surface, sensors, force, greatest_force, columns))?;
+        let arguments = (surface, sensors, force, greatest_force, force_range, columns);
+        let text = module.call_method1("setup_toml", arguments)?;
         Ok(Self(Arc::new(sections::setup(&text.extract::<String>()?)?)))
     }
 

@@ -4,9 +4,9 @@ use numpy::ndarray::ArrayView1;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, ToPyArray};
 use palpate::estimators::estimate_record::ContactRecord;
 use palpate::estimators::estimator::{self, ContactEstimate, Mode, Status, Uncertainty};
+use palpate::estimators::force_prior::force_interval_95_n;
 use palpate::mechanics::contact::Position;
 use palpate::mechanics::surface::Extent;
-use palpate::numerics::normal_interval_95;
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -367,7 +367,7 @@ impl Estimates {
                 let sd_n = variances[variances.len() - 1].sqrt();
                 match (own[0].is_nan(), sd_n > 0.0 && sd_n.is_finite() && !force_n.is_nan()) {
                     (false, _) => [own[0], own[1]],
-                    (true, true) => normal_interval_95(*force_n, sd_n).into(),
+                    (true, true) => force_interval_95_n(*force_n, sd_n).into(),
                     (true, false) => [UNKNOWN; 2],
                 }
             })

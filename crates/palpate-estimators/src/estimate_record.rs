@@ -1,8 +1,8 @@
 //! An estimate as files and streams have it: in millimetres and newtons, without what was not estimated.
 
+use crate::force_prior::force_interval_95_n;
 use palpate_core::{ContactEstimate, Estimate, Mode};
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::normal_interval_95;
 use serde::Serialize;
 
 /// The word for an estimate near an end, of a force that is not known.
@@ -118,7 +118,7 @@ impl ContactRecord {
     /// `None` of a force that is known, not estimated, or not told at all.
     pub fn force_interval_95_n(&self) -> Option<[f64; 2]> {
         let normal =
-            || self.force_n.zip(self.sd_force_n).map(|(at_n, sd_n)| normal_interval_95(at_n, sd_n).into());
+            || self.force_n.zip(self.sd_force_n).map(|(at_n, sd_n)| force_interval_95_n(at_n, sd_n).into());
         self.force_95_n.or_else(normal)
     }
 }

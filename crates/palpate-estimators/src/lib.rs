@@ -35,6 +35,7 @@ pub mod features;
 pub mod fit;
 #[cfg(test)]
 mod fixtures;
+pub mod force_prior;
 pub mod gaussian_process;
 mod held_out;
 pub mod imperfections;
@@ -44,6 +45,7 @@ pub mod lightest_touch;
 pub mod likelihood;
 pub mod load_profile;
 mod locator_fault;
+mod model_offsets;
 pub mod neighbours;
 pub mod network;
 pub mod offset_course;

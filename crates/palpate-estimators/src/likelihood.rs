@@ -1,5 +1,7 @@
 //! Likelihood of a reading under contacts, as a filter over time needs it of a locator.
 
+use crate::force_prior::ForceRange;
+use crate::untouched_drift::UntouchedDrift;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -40,11 +42,17 @@ pub trait Likelihood: Send + Sync {
     /// True for a reading within the residue that touches leave on an untouched surface.
     fn is_residue(&self, reading: &[f64]) -> bool;
 
+    /// Drift of the channels that the untouched rows of the calibration show.
+    fn untouched_drift(&self) -> Option<&UntouchedDrift>;
+
     /// Extent of the surface.
     fn extent(&self) -> Extent;
 
     /// The force of every contact in newtons, where it is known exactly.
     fn known_force_n(&self) -> Option<f64>;
+
+    /// Range of the forces of contacts where they are not known; `None` where they are.
+    fn force_range(&self) -> Option<ForceRange>;
 
     /// The most contacts that may touch at once.
     fn most_contacts(&self) -> usize;

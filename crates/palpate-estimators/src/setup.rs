@@ -5,6 +5,7 @@ use std::io::Read;
 use serde::{Deserialize, Serialize};
 
 use crate::arrangement::inner_grid;
+use crate::force_prior::ForceRange;
 use crate::imperfections::Imperfections;
 use crate::recording::{self, Columns, CsvError, Recording, Schema};
 use palpate_mechanics::contact::{OffSurface, Position};
@@ -27,6 +28,8 @@ pub struct Setup {
     force_n: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     greatest_force_n: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    force_range: Option<ForceRange>,
     columns: Option<Columns>,
     #[serde(skip_serializing_if = "Option::is_none")]
     imperfections: Option<Imperfections>,
@@ -41,6 +44,8 @@ struct Unchecked {
     force_n: Option<f64>,
     #[serde(default)]
     greatest_force_n: Option<f64>,
+    #[serde(default)]
+    force_range: Option<ForceRange>,
     columns: Option<Columns>,
     #[serde(default)]
     imperfections: Option<Imperfections>,
@@ -50,8 +55,9 @@ impl TryFrom<Unchecked> for Setup {
     type Error = SetupError;
 
     fn try_from(unchecked: Unchecked) -> Result<Self, SetupError> {
-        let Unchecked { surface, layout, force_n, greatest_force_n, columns, imperfections } = unchecked;
-        let setup = Self { columns, ..Self::new(surface) };
+        let Unchecked { surface, layout, force_n, greatest_force_n, force_range, columns, imperfections } =
+            unchecked;
+        let setup = Self { columns, force_range, ..Self::new(surface) };
         let setup = setup.with_layout(layout)?.with_force(force_n)?.with_greatest_force(greatest_force_n)?;
         match imperfections {
             Some(imperfections) => setup.with_imperfections(imperfections),
@@ -181,6 +187,7 @@ impl Setup {
             layout: Layout::default(),
             force_n: None,
             greatest_force_n: None,
+            force_range: None,
             columns: None,
             imperfections: None,
         }
@@ -239,9 +246,14 @@ impl Setup {
         self.force_n
     }
 
-    /// The greatest force of contacts of unknown force in newtons, greater than 0, where it was said.
+    /// The greatest force of contacts of unknown force in newtons, greater than 0, where it is stated, by itself or as the end of a range.
     pub fn greatest_force_n(&self) -> Option<f64> {
-        self.greatest_force_n
+        self.force_range.map(|range| range.ends_n().1).or(self.greatest_force_n)
+    }
+
+    /// Range of the forces of contacts of unknown force, where it is stated.
+    pub fn force_range(&self) -> Option<ForceRange> {
+        self.force_range
     }
 
     /// Roles of a recording's columns; `None` for the columns that palpate itself writes.
@@ -380,6 +392,12 @@ impl Setup {
     /// Imperfections of its simulations; `None` where they have the faults of the channels alone.
     pub fn imperfections(&self) -> Option<&Imperfections> {
         self.imperfections.as_ref()
+    }
+
+    /// The setup whose contacts of unknown force have forces in this range; `None` for what the calibration tells.
+    #[must_use]
+    pub fn with_force_range(self, force_range: Option<ForceRange>) -> Self {
+        Self { force_range, ..self }
     }
 
     /// Knowledge of the contact force.

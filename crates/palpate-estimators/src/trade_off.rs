@@ -27,9 +27,6 @@ use palpate_numerics::{bisect, hull, normal_cdf, normal_interval_95};
 
 use crate::status::OTHER_PLACE;
 
-/// Forces beyond so many times the hardest press of the calibration are excluded, unless the bench gives a bound of its own.
-pub(crate) const PRIOR_FORCES: f64 = 10.0;
-
 /// A contact farther than so many standard deviations from both ends is described by a normal distribution.
 const CLEAR_OF_ENDS: f64 = 12.0;
 

@@ -16,6 +16,9 @@ pub struct UntouchedDrift {
     pub last: Vec<f64>,
     /// Range of each channel's untouched readings.
     pub range: Vec<f64>,
+    /// Standard deviation of each channel's random walk after a second, in its unit; none where the rows have no times.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub walk_per_root_s: Vec<f64>,
 }
 
 impl UntouchedDrift {
@@ -37,7 +40,16 @@ impl UntouchedDrift {
             let values = || rests.iter().flatten().map(|row| recording.rows[*row].reading[channel]);
             values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
         };
-        Some(Self { last: levels.last()?.clone(), range: (0..channels).map(range).collect() })
+        let walks = recording.times_s().map(|times_s| {
+            let rest_times_s: Vec<f64> =
+                rests.iter().map(|rest| mean(rest.iter().map(|row| times_s[*row]))).collect();
+            (0..channels).map(|channel| walk_per_root_s(&course(channel), &rest_times_s)).collect()
+        });
+        Some(Self {
+            walk_per_root_s: walks.unwrap_or_default(),
+            last: levels.last()?.clone(),
+            range: (0..channels).map(range).collect(),
+        })
     }
 
     /// Largest change of each channel after the last rest that counts as more drift: the range of the recording. Disabled channels may change by any
@@ -55,6 +67,15 @@ impl UntouchedDrift {
         LocatorFault::check_count("last untouched channels", channels, self.last.len())?;
         LocatorFault::check_count("ranges of untouched channels", channels, self.range.len())?;
         LocatorFault::check_numbers("last untouched reading", &self.last, |_| true, "a finite number")?;
+        if !self.walk_per_root_s.is_empty() {
+            LocatorFault::check_count("walks of untouched channels", channels, self.walk_per_root_s.len())?;
+        }
+        LocatorFault::check_numbers(
+            "walk of untouched readings",
+            self.walk_per_root_s.iter().copied(),
+            |walk| walk >= 0.0,
+            "finite and at least 0",
+        )?;
         LocatorFault::check_numbers(
             "range of untouched readings",
             &self.range,
@@ -75,6 +96,20 @@ fn is_drifting(values: &[f64], share: f64) -> bool {
     let steps: f64 = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
     let bound = 2.0 + normal_quantile(share) * (4.0 * (n - 2.0) / (n * n - 1.0)).sqrt();
     squares > 0.0 && steps < bound * squares
+}
+
+/// Standard deviation w of a random walk after a second, by values in the order of time; 0 where they show none.
+///
+/// White noise of variance σ² on a walk has the mean square D_k = 2·σ² + w²·T_k of the changes over k values, T_k being their mean duration, so two lags tell
+/// it: w² = (D_k − D₁)/(T_k − T₁). The longer lag is a quarter of the values, over which three changes overlap nowhere.
+fn walk_per_root_s(values: &[f64], times_s: &[f64]) -> f64 {
+    let over = |lag: usize| {
+        let changes = values.iter().zip(&values[lag..]).map(|(before, after)| (after - before).powi(2));
+        let durations_s = times_s.iter().zip(&times_s[lag..]).map(|(before_s, after_s)| after_s - before_s);
+        [mean(changes), mean(durations_s)]
+    };
+    let ([short, short_s], [long, long_s]) = (over(1), over((values.len() / 4).max(2)));
+    if long > short && long_s > short_s { ((long - short) / (long_s - short_s)).sqrt() } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -114,9 +149,31 @@ mod tests {
 
     #[test]
     fn a_drift_is_as_large_as_the_range_of_the_untouched_rows() {
-        let UntouchedDrift { last, range } = UntouchedDrift::of_recording(&recording(20, 2.0, 1)).unwrap();
+        let UntouchedDrift { last, range, .. } =
+            UntouchedDrift::of_recording(&recording(20, 2.0, 1)).unwrap();
         assert!(last[0].abs() < 3.0 && (last[1] - 38.0).abs() < 3.0, "{last:?}");
         assert!(range[0] < 6.0 && (range[1] - 38.0).abs() < 6.0, "{range:?}");
+    }
+
+    #[test]
+    fn a_walk_has_its_standard_deviation_after_a_second() {
+        for walk in [0.5, 3.0] {
+            let squares = (0..40).map(|seed| {
+                let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+                let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+                let mut at = 0.0;
+                let values: Vec<f64> = (0..60)
+                    .map(|_| {
+                        at += 2.0 * walk * normal();
+                        at + normal()
+                    })
+                    .collect();
+                let times_s: Vec<f64> = (0..60).map(|i| 4.0 * f64::from(i)).collect();
+                walk_per_root_s(&values, &times_s).powi(2)
+            });
+            let found = mean(squares).sqrt();
+            assert!((found / walk - 1.0).abs() < 0.3, "{found} beside {walk}");
+        }
     }
 
     #[test]

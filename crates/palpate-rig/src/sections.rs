@@ -115,10 +115,14 @@ impl RigSections {
         check_force(force, &surface)?;
         let greatest_force_n =
             contact.as_ref().map_or(Ok(None), |contact| contact.greatest_force_n(&surface))?;
+        let force_range = contact.as_ref().map_or(Ok(None), |contact| contact.force_range(&surface))?;
         let columns = recording.as_ref().map(|keys| keys.build(&layout, surface.extent())).transpose()?;
         let setup = Setup::new(surface).with_layout(layout).map_err(SetupError::from).and_then(|setup| {
             let force_n = force.map(|force| force.si);
-            Ok(setup.with_force(force_n)?.with_greatest_force(greatest_force_n)?)
+            Ok(setup
+                .with_force(force_n)?
+                .with_greatest_force(greatest_force_n)?
+                .with_force_range(force_range))
         });
         let setup = setup.map_err(|error| RigProblem::Setup(error).without_place())?;
         let setup = self.with_imperfections(setup)?;

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 
 use palpate_estimators::arrangement::{Arrangement, ArrangementError, Training};
+use palpate_estimators::force_prior::ForceRange;
 use palpate_mechanics::surface::{Digit, Extent, SurfaceSpec, UniformLoad};
 use palpate_mechanics::units::format_length_mm;
 
@@ -21,9 +22,37 @@ pub(crate) struct ContactKeys {
     pub force: Option<At<Positive<Force>>>,
     /// The greatest that an unknown force can be, on a surface with a model; ten times that of the presses by default.
     pub greatest_force: Option<At<Positive<Force>>>,
+    /// Least and greatest force of contacts of unknown force: 1 in 200 is lighter, none is harder; a decade either side of the presses unless said otherwise.
+    pub force_range: Option<At<ForceRangeKeys>>,
 }
 
+/// Least and greatest force.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(expecting = "a list of 2 forces, the least and the greatest, such as [\"0.5 N\", \"10 N\"]")]
+pub(crate) struct ForceRangeKeys(Positive<Force>, Positive<Force>);
+
 impl ContactKeys {
+    /// Range of unknown forces, where it is stated.
+    pub fn force_range(&self, surface: &SurfaceSpec) -> Result<Option<ForceRange>, RigError> {
+        let Some(range) = &self.force_range else { return Ok(None) };
+        if self.force.is_some() {
+            return Err(range.place.unused("`force`, by which the force is known"));
+        }
+        if let SurfaceSpec::Digit(_) = surface {
+            return Err(range.place.unused("a digit, whose model bounds the force"));
+        }
+        if let Some(greatest) = &self.greatest_force {
+            return Err(greatest.place.unused("`force_range`, whose upper end it is"));
+        }
+        let ForceRangeKeys(least, greatest) = **range;
+        let built = ForceRange::new(least.si, greatest.si);
+        built.map(Some).map_err(|_| {
+            range
+                .place
+                .refuse_as(format!("{} N to {} N", least.si, greatest.si), "from a lesser to a greater force")
+        })
+    }
+
     /// The greatest force in newtons, where it is said.
     pub fn greatest_force_n(&self, surface: &SurfaceSpec) -> Result<Option<f64>, RigError> {
         let Some(greatest) = &self.greatest_force else { return Ok(None) };
@@ -33,7 +62,7 @@ impl ContactKeys {
         match surface {
             SurfaceSpec::Digit(_) => Err(greatest.place.unused("a digit, whose model bounds the force")),
             surface if surface.model().is_none() => {
-                Err(greatest.place.unused("a `measured` surface, which knows forces by its presses only"))
+                Err(greatest.place.unused("a `measured` surface; give `force_range`"))
             }
             _ => Ok(Some(greatest.si)),
         }

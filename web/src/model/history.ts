@@ -112,7 +112,9 @@ export class History {
     const force = placed ? sample.force_n : sample.status === "no_contact" ? 0 : NaN;
     const half = Z_95 * (sample.sd_force_n ?? NaN);
     set(FORCE, force);
-    set(FORCE_LOW, placed ? (sample.force_95_n?.[0] ?? (force ?? NaN) - half) : NaN);
+    // Contacts press: the interval of a force that presses ends at 0.
+    const low = (force ?? NaN) - half;
+    set(FORCE_LOW, placed ? (sample.force_95_n?.[0] ?? ((force ?? NaN) >= 0 ? Math.max(low, 0) : low)) : NaN);
     set(FORCE_HIGH, placed ? (sample.force_95_n?.[1] ?? (force ?? NaN) + half) : NaN);
     for (let i = 0; i < this.channels; i++) set(FIRST_CHANNEL + i, sample.reading[i]);
     return row;

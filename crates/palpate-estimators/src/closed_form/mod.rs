@@ -9,13 +9,15 @@ mod polynomial;
 use serde::{Deserialize, Serialize};
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
+use crate::force_prior::DECADE;
+use crate::model_offsets::{less_offsets, offsets_of};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::spread::{About, spread_bound, spread_score};
 use crate::status::{
     FalseAlarmRate, LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, misfit_bound, unknowns,
 };
-use crate::trade_off::{Contacts, Force, PRIOR_FORCES, interval_on_line_95, is_near_end};
+use crate::trade_off::{Contacts, Force, interval_on_line_95, is_near_end};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
@@ -102,9 +104,11 @@ impl Fit for ClosedForm {
         if let Some(kind) = setup.layout().kinds().into_iter().find(|kind| *kind == SensorKind::Raw) {
             return Err(ClosedFormFitError::NotModelled { kind });
         }
+        let (offsets, layout) = offsets_of(recording, setup.layout());
         let locator = ClosedFormLocator {
             beam: *beam,
-            layout: setup.layout().clone(),
+            layout,
+            offsets,
             force_n: setup.force_n(),
             greatest_force_n: if setup.force_n().is_none() {
                 greatest_force_n(setup, recording)
@@ -134,6 +138,9 @@ pub struct ClosedFormLocator {
     /// Share of untouched readings that may be taken for a contact.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
+    /// Offset of each channel, in its SI unit; none where no untouched row told them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub offsets: Vec<f64>,
 }
 
 impl ClosedFormLocator {
@@ -255,7 +262,12 @@ impl Locate for ClosedFormLocator {
         self.knows_noise().then_some(self.false_alarm_rate)
     }
 
+    fn offsets(&self) -> Option<Vec<f64>> {
+        (!self.offsets.is_empty()).then(|| self.offsets.clone())
+    }
+
     fn locate(&self, reading: &[f64]) -> Estimate {
+        let reading = &*less_offsets(reading, &self.offsets);
         let channels = self.seeing();
         let (weights, noise) = self.weights(&channels);
         let whitened: Vec<f64> = channels.iter().zip(&weights).map(|(i, w)| w * reading[*i]).collect();
@@ -295,6 +307,10 @@ impl Locate for ClosedFormLocator {
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         LocatorFault::check_count("sensors", setup.layout().len(), self.layout.len())?;
+        if !self.offsets.is_empty() {
+            LocatorFault::check_count("offsets", self.layout.len(), self.offsets.len())?;
+        }
+        LocatorFault::check_numbers("offset", self.offsets.iter().copied(), |_| true, "a finite number")?;
         let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);
         let on_beam = |x: f64| self.beam.contains(Position::along(x));
         LocatorFault::check_numbers("sensor position", places, on_beam, "on the beam")?;
@@ -319,7 +335,7 @@ const NEGLIGIBLE: f64 = 24.0;
 /// The greatest force of contacts of unknown force: as it was said, or a multiple of a recording's hardest press; `None` where there is neither.
 fn greatest_force_n(setup: &Setup, recording: &Recording) -> Option<f64> {
     let hardest = recording.rows.iter().filter_map(|row| row.force_n).fold(0.0, f64::max);
-    setup.greatest_force_n().or((hardest > 0.0).then_some(PRIOR_FORCES * hardest))
+    setup.greatest_force_n().or((hardest > 0.0).then_some(DECADE * hardest))
 }
 
 /// Squared residuals that differ by less than this share of the reading are the same in double precision.

@@ -233,3 +233,44 @@ fn two_scales_hold_a_contact_at_the_edge_in_its_own_interval() {
         }
     }
 }
+
+#[test]
+fn offsets_are_those_of_untouched_rows_and_else_as_uncertain_as_the_rig_states() {
+    let setup = setup(&even(SensorKind::Strain, 8), 1e-6, None);
+    let offsets: Vec<f64> = (0..8).map(|c| 1e-3 * f64::from(c - 4)).collect();
+    let row = |force_n: f64| Row {
+        position: Position::along(0.13),
+        force_n: Some(force_n),
+        nuisances: Vec::new(),
+        time_s: None,
+        reading: {
+            let functions =
+                setup.layout().sensors().iter().map(|s| BEAM.influence_function(s.kind, s.position));
+            functions
+                .zip(&offsets)
+                .map(|(f, offset)| offset + force_n * f.at(Position::along(0.13)))
+                .collect()
+        },
+    };
+    let rows = std::iter::repeat_n(row(0.0), 4).chain([row(3.0)]).collect();
+    let recording = Recording::new(setup.layout(), "bridges", rows);
+    let locator = ClosedForm::default().fit(&setup, &recording).unwrap().into_locator();
+    let contact = locator.locate(&row(3.0).reading).unwrap().contact;
+    assert!((contact.position.x_m - 0.13).abs() < 1e-6, "{contact:?}");
+    let untouched = locator.untouched_reading().unwrap();
+    assert!(untouched.iter().zip(&offsets).all(|(a, b)| (a - b).abs() < 1e-15), "{untouched:?}");
+    assert_eq!(crate::estimator::Locator::from_json(&locator.to_json().unwrap()).unwrap(), locator);
+
+    let width_m = |offset_error: f64| {
+        let mut setup = setup.clone();
+        setup
+            .edit_sensors(|sensors| sensors.iter_mut().for_each(|s| s.channel.offset_error = offset_error))
+            .unwrap();
+        let locator = ClosedForm::default().fit(&setup, &recording.touched()).unwrap();
+        let reading: Vec<f64> =
+            row(3.0).reading.iter().zip(&offsets).map(|(value, own)| value - own).collect();
+        let (low_m, high_m) = locator.locate(&reading).unwrap().contact.uncertainty.unwrap().x_95_m;
+        high_m - low_m
+    };
+    assert!(width_m(20e-6) > 5.0 * width_m(0.0));
+}

@@ -13,6 +13,7 @@ use std::f64::consts::TAU;
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::likelihood::ContactFit;
+use crate::model_offsets::{less_offsets, offsets_of};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::simulate::CleanSensors;
@@ -123,15 +124,17 @@ impl Fit for DigitEstimator {
     type Method = DigitLocator;
     type Error = DigitFitError;
 
-    fn fit_method(&self, FitTask { setup, .. }: FitTask) -> Result<DigitLocator, DigitFitError> {
+    fn fit_method(&self, FitTask { setup, recording, .. }: FitTask) -> Result<DigitLocator, DigitFitError> {
         let SurfaceSpec::Digit(digit) = setup.surface() else { return Err(DigitFitError::NotADigit) };
         if let Some(kind) = setup.layout().kinds().into_iter().find(|kind| *kind != SensorKind::Strain) {
             return Err(DigitFitError::NotAGauge { kind });
         }
         let force_n = setup.force_n();
+        let (offsets, layout) = offsets_of(recording, setup.layout());
         let locator = DigitLocator {
             digit: *digit,
-            layout: setup.layout().clone(),
+            layout,
+            offsets,
             force_n,
             theory: self.theory,
             false_alarm_rate: self.false_alarm_rate,
@@ -173,6 +176,9 @@ pub struct DigitLocator {
     /// Share of untouched readings that may be taken for a contact.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
+    /// Offset of each channel, in its SI unit; none where no untouched row told them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub offsets: Vec<f64>,
 }
 
 impl DigitLocator {
@@ -274,8 +280,12 @@ impl Locate for DigitLocator {
         Some(self.false_alarm_rate)
     }
 
+    fn offsets(&self) -> Option<Vec<f64>> {
+        (!self.offsets.is_empty()).then(|| self.offsets.clone())
+    }
+
     fn locate(&self, reading: &[f64]) -> Estimate {
-        let gauges = gauges(&self.layout, reading);
+        let gauges = gauges(&self.layout, reading, &less_offsets(reading, &self.offsets));
         let size: f64 = gauges.iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum();
         let none_saturated = gauges.len() == self.living().count();
         let rule =
@@ -297,6 +307,10 @@ impl Locate for DigitLocator {
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         LocatorFault::check_count("gauges", setup.layout().len(), self.layout.len())?;
+        if !self.offsets.is_empty() {
+            LocatorFault::check_count("offsets", self.layout.len(), self.offsets.len())?;
+        }
+        LocatorFault::check_numbers("offset", self.offsets.iter().copied(), |_| true, "a finite number")?;
         let others = self.layout.kinds().into_iter().filter(|kind| *kind != SensorKind::Strain).count();
         LocatorFault::check_count("sensors that are no gauges", 0, others)?;
         let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);
@@ -568,17 +582,18 @@ struct Stretch {
 }
 
 /// The gauges of a reading from clamp to tip, without dead and saturated ones.
-fn gauges(layout: &Layout, reading: &[f64]) -> Vec<Gauge> {
-    let inside = |(sensor, strain): &(&Sensor, f64)| {
-        !sensor.channel.dead && sensor.channel.range.is_none_or(|(low, high)| low < *strain && *strain < high)
+fn gauges(layout: &Layout, reading: &[f64], strains: &[f64]) -> Vec<Gauge> {
+    // Converters saturate by what they read, offset and strain.
+    let inside = |((sensor, read), _): &((&Sensor, &f64), f64)| {
+        !sensor.channel.dead && sensor.channel.range.is_none_or(|(low, high)| low < **read && **read < high)
     };
-    let gauge = |(sensor, strain): (&Sensor, f64)| Gauge {
+    let gauge = |((sensor, _), strain): ((&Sensor, &f64), f64)| Gauge {
         at_m: sensor.position.x_m,
         sd: sensor.channel.reading_sd(),
         strain,
     };
     let mut gauges: Vec<Gauge> =
-        layout.sensors().iter().zip(reading.iter().copied()).filter(inside).map(gauge).collect();
+        layout.sensors().iter().zip(reading).zip(strains.iter().copied()).filter(inside).map(gauge).collect();
     gauges.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
     gauges
 }

@@ -239,10 +239,12 @@ impl Method {
 }
 
 impl Estimator {
-    /// The rows that a method learns from: those without contact teach offset and noise, which only influence functions have.
+    /// The rows that a method learns from: those without contact teach offset and noise, which methods that go from a reading to a position do not have.
     fn learnt_from<'a>(&self, recording: &'a Recording) -> Cow<'a, Recording> {
         match self {
-            Self::Influence(_) | Self::Auto => Cow::Borrowed(recording),
+            Self::Influence(_) | Self::ClosedForm(_) | Self::Digit(_) | Self::Auto => {
+                Cow::Borrowed(recording)
+            }
             _ => recording.touched(),
         }
     }
@@ -453,7 +455,9 @@ impl Locator {
     pub fn untouched_reading(&self) -> Result<Vec<f64>, NoBaseline> {
         let offsets = match &self.method {
             Method::Influence(influence) => influence.offsets(),
-            Method::ClosedForm(_) | Method::Digit(_) => Some(vec![0.0; self.setup.layout().len()]),
+            Method::ClosedForm(_) | Method::Digit(_) => {
+                self.method.offsets().or_else(|| Some(vec![0.0; self.setup.layout().len()]))
+            }
             _ => None,
         };
         let of_model = || self.setup.surface().model().map(|_| vec![0.0; self.setup.layout().len()]);
@@ -793,14 +797,16 @@ impl Locator {
         if config.swing.is_some() && !matches!(self.setup.surface(), SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);
         }
-        let scatter = self.untouched_scatter.clone();
+        let (scatter, drift) = (self.untouched_scatter.clone(), self.untouched_drift.clone());
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
-                let likelihood = BeamLikelihood::new(beam).with_untouched_scatter(scatter);
+                let likelihood =
+                    BeamLikelihood::new(beam).with_untouched_scatter(scatter).with_untouched_drift(drift);
                 Ok(Tracking { likelihood: Arc::new(likelihood) })
             }
             Method::Influence(InfluenceLocator::Plane(plane)) => {
-                let likelihood = PlateLikelihood::new(plane).with_untouched_scatter(scatter);
+                let likelihood =
+                    PlateLikelihood::new(plane).with_untouched_scatter(scatter).with_untouched_drift(drift);
                 Ok(Tracking { likelihood: Arc::new(likelihood) })
             }
             method => Err(NotTrackable::Kind {

@@ -2,8 +2,8 @@
 
 use super::config::ForceBelief;
 use crate::fit::LocatorFault;
+use crate::force_prior::{DECADE, ForceRange};
 use crate::status::FalseAlarmRate;
-use crate::trade_off::PRIOR_FORCES;
 use serde::{Deserialize, Serialize};
 
 /// Offsets, noise and reference force of the channels, learnt besides their influence functions, and how rarely their noise is to be
@@ -22,6 +22,9 @@ pub(super) struct Channels {
     /// Greatest force of contacts of unknown force, in newtons, where it was said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub greatest_force_n: Option<f64>,
+    /// Least force of contacts of unknown force, in newtons, where it was said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least_force_n: Option<f64>,
     /// Share of untouched readings that may be taken for a contact.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
@@ -35,7 +38,14 @@ impl Channels {
 
     /// The greatest force of contacts of unknown force, in newtons: as it was said, or a multiple of the calibration's.
     pub fn greatest_force_n(&self) -> f64 {
-        self.greatest_force_n.unwrap_or(PRIOR_FORCES * self.reference_force_n)
+        self.greatest_force_n.unwrap_or(DECADE * self.reference_force_n)
+    }
+
+    /// Range of the forces of contacts of unknown force: as it was stated, or a decade either side of the calibration's.
+    pub fn force_range(&self) -> Option<ForceRange> {
+        let greatest_n = self.greatest_force_n();
+        let of_calibration = || (self.reference_force_n / DECADE).min(greatest_n / DECADE);
+        ForceRange::new(self.least_force_n.unwrap_or_else(of_calibration), greatest_n).ok()
     }
 
     /// The same without channel `channel` (from 0); `None` when no channel would be left.
@@ -72,6 +82,13 @@ impl Channels {
             "greater than 0",
         );
         greatest?;
+        let least = LocatorFault::check_numbers(
+            "least force",
+            self.least_force_n,
+            |force| force > 0.0,
+            "greater than 0",
+        );
+        least?;
         let force = if force.is_usable() { 1.0 } else { f64::NAN };
         numbers("belief about the force", &[force], |_| true, "greater than 0")
     }

@@ -7,8 +7,9 @@
 use super::channels::Channels;
 use super::config::{Influence, InfluenceFitError, InfluenceSource};
 use super::prior::{Hyperparameters, Mean, Parts, Prior, Remainders};
+use super::untouched_rows::UntouchedRows;
 use crate::fit::FitTask;
-use crate::recording::{Recording, is_one_force};
+use crate::recording::{Recording, Row, is_one_force};
 use crate::thinning::thinned;
 use ndarray::{Array1, Array2, ArrayView1};
 use palpate_mechanics::contact::Position;
@@ -56,7 +57,8 @@ pub(super) fn learn(
     let surface = task.setup.surface().model().ok_or(InfluenceFitError::NoModel)?;
     let layout = task.setup.layout();
     check_sensors(layout)?;
-    let presses = Presses::average(task.recording)?.thinned(MOST_LEARNT);
+    let untouched = UntouchedRows::of_recording(task.recording);
+    let presses = Presses::of_recording(task.recording, untouched.as_ref())?;
     let needed = match (source, surface.extent().dimensions()) {
         (InfluenceSource::Recording, 1) => 3,
         // A plane's simplest curved surface has six numbers.
@@ -68,11 +70,12 @@ pub(super) fn learn(
         return Err(InfluenceFitError::TooFewPositions { needed, found });
     }
     let mut channels = Channels {
-        offsets: vec![0.0; layout.len()],
+        offsets: untouched.map_or_else(|| vec![0.0; layout.len()], |untouched| untouched.mean),
         noise_sd: vec![1.0; layout.len()],
         dead: layout.sensors().iter().map(|sensor| sensor.channel.dead).collect(),
         reference_force_n: presses.mean_force_n(),
         greatest_force_n: task.setup.greatest_force_n(),
+        least_force_n: task.setup.force_range().map(|range| range.ends_n().0),
         false_alarm_rate,
     };
     let learning = Learning { source, surface, layout, presses: &presses, places };
@@ -130,13 +133,14 @@ impl<'a> Learning<'a> {
             SensorPresses::new(prior.clone(), presses, s, noise, kept, &remainders.presses)
         };
         let all: Vec<usize> = (0..pressed.len()).collect();
-        let few: Vec<usize> = thinned(pressed.len(), MOST_PRESSES).collect();
+        let few = presses.few();
         let searched: Vec<SensorPresses> =
             priors.iter().zip(living).map(|sensor| with(sensor, &few)).collect();
         let noise_is_told = living.iter().all(|s| presses.noise_variance(layout, *s).is_some());
         // A reaction of presses of one force may be an offset as well as an influence, which no support holds at 0 everywhere.
-        let has_one_force = is_one_force(presses.presses.iter().map(|press| press.force_n));
-        let is_reaction_alone = mean == Mean::Zero && kind == SensorKind::Reaction && has_one_force;
+        let has_one_force = is_one_force(presses.touching().map(|press| press.force_n));
+        let offset_is_open = has_one_force && !presses.is_untouched();
+        let is_reaction_alone = mean == Mean::Zero && kind == SensorKind::Reaction && offset_is_open;
         let told = Told { noise: noise_is_told, offset: is_reaction_alone };
         let mut hyper = most_probable(&searched, mean, surface.length_m(), told, watch)?;
         if source == InfluenceSource::Mechanics {
@@ -148,7 +152,7 @@ impl<'a> Learning<'a> {
             let posterior = sensor
                 .posterior(hyper)
                 .map_err(|problem| InfluenceFitError::Singular { sensor: s + 1, problem })?;
-            channels.offsets[s] = posterior.offset();
+            channels.offsets[s] += posterior.offset();
             channels.noise_sd[s] = sensor.noise_variance(&hyper).sqrt();
             take(s, &LearntInfluence { posterior, prior, remainders: &remainders, places })?;
         }
@@ -156,12 +160,12 @@ impl<'a> Learning<'a> {
     }
 }
 
-/// Presses at one position with one force.
+/// Presses at one position with one force, or the untouched rows, whose force is 0.
 #[derive(Clone, Debug, PartialEq)]
 struct Press {
     pub position: Position,
     pub force_n: f64,
-    /// Number of readings that were averaged.
+    /// Variance of the noise of a reading over that of the mean: the number of readings that were averaged, or less where their offsets are uncertain.
     pub count: f64,
     /// Their mean, a value a sensor.
     pub mean: Vec<f64>,
@@ -181,30 +185,50 @@ struct Presses {
 const STATED_FREEDOM: f64 = 20.0;
 
 impl Presses {
-    /// Averages repeats.
+    /// The presses of a recording, no more than can be learnt from, and its untouched rows as one of force 0, by which the offsets of all are known.
     ///
     /// # Errors
     /// [`InfluenceFitError::NoForce`] for a row whose force nobody knows, or is not greater than 0.
-    pub fn average(recording: &Recording) -> Result<Self, InfluenceFitError> {
-        let sensors = recording.channels.len();
-        let mut rows: Vec<(Position, f64, &[f64])> = Vec::with_capacity(recording.rows.len());
-        for (i, row) in recording.rows.iter().enumerate() {
+    pub fn of_recording(
+        recording: &Recording,
+        untouched: Option<&UntouchedRows>,
+    ) -> Result<Self, InfluenceFitError> {
+        let Some(untouched) = untouched else {
+            let rows: Vec<(Row, f64)> = recording.rows.iter().map(|row| (row.clone(), 1.0)).collect();
+            return Ok(Self::average(&rows)?.thinned(MOST_LEARNT));
+        };
+        let mut presses = Self::average(&untouched.tared_presses(recording))?.thinned(MOST_LEARNT);
+        presses.scatter.iter_mut().zip(&untouched.scatter).for_each(|(sum, scatter)| *sum += scatter);
+        presses.freedom += untouched.freedom;
+        if let Some(Press { position, mean, .. }) = presses.presses.last() {
+            let (position, mean) = (*position, vec![0.0; mean.len()]);
+            presses.presses.push(Press { position, force_n: 0.0, count: untouched.count, mean });
+        }
+        Ok(presses)
+    }
+
+    /// Averages repeats of rows, each with the variance of its reading over that of the noise.
+    fn average(recording: &[(Row, f64)]) -> Result<Self, InfluenceFitError> {
+        let sensors = recording.first().map_or(0, |(row, _)| row.reading.len());
+        let mut rows: Vec<(Position, f64, &[f64], f64)> = Vec::with_capacity(recording.len());
+        for (i, (row, variance)) in recording.iter().enumerate() {
             let force_n = row.force_n.filter(|force_n| *force_n > 0.0);
             let force_n = force_n.ok_or(InfluenceFitError::NoForce { row: i + 1 })?;
-            rows.push((row.position, force_n, &row.reading));
+            rows.push((row.position, force_n, &row.reading, *variance));
         }
         rows.sort_by(|a, b| a.0.cmp_by_x_then_y(&b.0).then(a.1.total_cmp(&b.1)));
         let mut presses = Vec::new();
         let (mut scatter, mut freedom) = (vec![0.0; sensors], 0.0);
         for group in rows.chunk_by(|a, b| a.0 == b.0 && a.1 == b.1) {
             let count = group.len() as f64;
-            let column = |s: usize| group.iter().map(move |(_, _, reading)| reading[s]);
+            let column = |s: usize| group.iter().map(move |(_, _, reading, _)| reading[s]);
             let mean: Vec<f64> = (0..sensors).map(|s| column(s).sum::<f64>() / count).collect();
             for (s, scatter) in scatter.iter_mut().enumerate() {
                 *scatter += column(s).map(|value| (value - mean[s]).powi(2)).sum::<f64>();
             }
             freedom += count - 1.0;
-            presses.push(Press { position: group[0].0, force_n: group[0].1, count, mean });
+            let known = group.iter().map(|(.., variance)| variance).sum::<f64>() / count;
+            presses.push(Press { position: group[0].0, force_n: group[0].1, count: count / known, mean });
         }
         Ok(Self { presses, scatter, freedom })
     }
@@ -215,14 +239,30 @@ impl Presses {
         Self { presses, ..self }
     }
 
+    /// Indices of those that the search looks at: the untouched rows are always among them.
+    fn few(&self) -> Vec<usize> {
+        let touching = self.touching().count();
+        thinned(touching, MOST_PRESSES).chain(touching..self.presses.len()).collect()
+    }
+
+    /// Those in which something touched.
+    fn touching(&self) -> impl Iterator<Item = &Press> {
+        self.presses.iter().filter(|press| press.force_n > 0.0)
+    }
+
+    /// True where the untouched surface was recorded too.
+    fn is_untouched(&self) -> bool {
+        self.presses.iter().any(|press| press.force_n == 0.0)
+    }
+
     /// Number of positions, whatever the force.
     pub fn distinct_positions(&self) -> usize {
         self.presses.chunk_by(|a, b| a.position == b.position).count()
     }
 
-    /// The mean force, in newtons.
+    /// The mean force of presses, in newtons.
     pub fn mean_force_n(&self) -> f64 {
-        mean(self.presses.iter().map(|press| press.force_n))
+        mean(self.touching().map(|press| press.force_n))
     }
 
     /// The variance of a sensor's noise from its repeats and the noise that its rig states, or `None` where neither
@@ -483,8 +523,12 @@ fn climb(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::{Provenance, Row};
+    use crate::recording::Provenance;
     use palpate_mechanics::sensing::SensorKind;
+
+    fn average(rows: &[(f64, f64, f64)]) -> Result<Presses, InfluenceFitError> {
+        Presses::of_recording(&recording(rows), None)
+    }
 
     fn recording(rows: &[(f64, f64, f64)]) -> Recording {
         let rows = rows.iter().map(|(x_m, force_n, value)| Row {
@@ -512,7 +556,7 @@ mod tests {
     fn few_presses_have_all_forces_and_places() {
         let forces_n = [1.5, 3.0, 6.0];
         let presses = (0..120).flat_map(|i| forces_n.map(|force_n| (0.003 * f64::from(i), force_n, 1.0)));
-        let few = Presses::average(&recording(&presses.collect::<Vec<_>>())).unwrap().thinned(120);
+        let few = average(&presses.collect::<Vec<_>>()).unwrap().thinned(120);
         assert_eq!((few.presses.len(), few.distinct_positions()), (120, 120));
         let of_force = |force_n: f64| few.presses.iter().filter(|press| press.force_n == force_n).count();
         assert!(forces_n.iter().all(|force_n| of_force(*force_n) >= 20), "{few:?}");
@@ -521,7 +565,7 @@ mod tests {
     #[test]
     fn repeats_are_averaged_and_their_scatter_kept() {
         let rows = [(0.1, 3.0, 1.0), (0.2, 3.0, 5.0), (0.1, 3.0, 3.0), (0.1, 2.0, 9.0)];
-        let presses = Presses::average(&recording(&rows)).unwrap();
+        let presses = average(&rows).unwrap();
         let found: Vec<_> =
             presses.presses.iter().map(|p| (p.position.x_m, p.force_n, p.count, p.mean[0])).collect();
         assert_eq!(found, [(0.1, 2.0, 1.0, 9.0), (0.1, 3.0, 2.0, 2.0), (0.2, 3.0, 1.0, 5.0)]);
@@ -534,13 +578,13 @@ mod tests {
 
     #[test]
     fn a_press_without_force_is_refused() {
-        let error = Presses::average(&recording(&[(0.1, 3.0, 1.0), (0.2, -1.0, 1.0)])).unwrap_err();
+        let error = average(&[(0.1, 3.0, 1.0), (0.2, -1.0, 1.0)]).unwrap_err();
         assert_eq!(error, InfluenceFitError::NoForce { row: 2 });
     }
 
     #[test]
     fn nothing_is_known_of_noise_without_repeats() {
-        let presses = Presses::average(&recording(&[(0.1, 3.0, 1.0)])).unwrap();
+        let presses = average(&[(0.1, 3.0, 1.0)]).unwrap();
         assert_eq!(presses.noise_variance(&Layout::even(SensorKind::Deflection, 1, 0.4), 0), None);
     }
 }

@@ -47,12 +47,11 @@ impl Equations {
         self
     }
 
-    /// With what is expected of the last unknown: a normal density of this mean and precision.
-    pub fn with_expected(mut self, unknown: f64, [mean, precision]: [f64; 2]) -> Self {
-        let off = unknown - mean;
-        self.misfit += off * off * precision;
-        self.right[2] -= off * precision;
-        self.information[2][2] += precision;
+    /// With a prior of the last unknown, −2·ln of its density being the square of a residual: by the residual and its slope.
+    pub fn with_prior(mut self, [residual, slope]: [f64; 2]) -> Self {
+        self.misfit += residual * residual;
+        self.right[2] -= residual * slope;
+        self.information[2][2] += slope * slope;
         self
     }
 }

@@ -16,6 +16,7 @@ mod moments;
 mod noise;
 mod plane;
 mod prior;
+mod untouched_rows;
 
 pub use at_nodes::InfluencesAtNodes;
 pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scratch};
@@ -72,9 +73,9 @@ impl Fit for Influence {
                 return Ok(InfluenceLocator::ForceLinear(Box::new(fitted)));
             }
         }
-        let touched = task.recording.touched();
-        let task = FitTask { recording: &touched, ..task };
         if task.setup.surface().model().is_none() {
+            let touched = task.recording.touched();
+            let task = FitTask { recording: &touched, ..task };
             let fitted = MeasuredInfluence::default().fit_method(task)?;
             return Ok(InfluenceLocator::Measured(Box::new(fitted)));
         }
@@ -114,8 +115,8 @@ impl Influence {
         )
     }
 
-    /// Offsets of the channels at the rows of `asked`, told by the task's presses where these drift; `None` of a surface with a model,
-    /// of rows without times or forces or with a nuisance coordinate, and where the presses tell no drift or read no multiple of the force.
+    /// Offsets of the channels at the rows of `asked`, told by the task's presses where these drift, of a surface with a model by its untouched rows;
+    /// `None` of rows without times or forces or with a nuisance coordinate, and where the presses tell no drift or read no multiple of the force.
     ///
     /// # Errors
     /// [`InfluenceFitError`] where influence functions cannot be learnt, or the watch stopped it.
@@ -123,7 +124,10 @@ impl Influence {
         task: FitTask,
         asked: &Recording,
     ) -> Result<Option<OffsetCourse>, InfluenceFitError> {
-        if task.setup.surface().model().is_some() || has_nuisance(task.recording) {
+        if task.setup.surface().model().is_some() {
+            return Ok(untouched_rows::offset_course(task.recording, asked));
+        }
+        if has_nuisance(task.recording) {
             return Ok(None);
         }
         Ok(force_linear::offset_course(task, asked)?)

@@ -9,6 +9,7 @@ use super::gaussian::{Gaussian, Transition};
 use crate::likelihood::{ContactFit, Geometry, LineLikelihood};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::surface::modal::Oscillator;
+use palpate_numerics::normal_between;
 use palpate_numerics::small::Matrix;
 use std::f64::consts::PI;
 
@@ -180,8 +181,13 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         fit: &ContactFit<K>,
         about: &[f64; K],
     ) -> Option<(Self, f64)> {
-        let results: [(Gaussian<N>, f64); M] =
-            self.members.map(|member| member.updated(fit, about, &observed.entries));
+        let results: [(Gaussian<N>, f64); M] = self.members.map(|member| {
+            let (after, evidence) = member.updated(fit, about, &observed.entries);
+            // A normal distribution that is cut off at bounds has the evidence of the whole one, times its share within the bounds after the reading
+            // over that before.
+            let shares = observed.log_share_of_forces(&after) - observed.log_share_of_forces(&member);
+            (after, evidence + shares)
+        });
         let (best, weights) = reweighted(&self.shares, &results);
         let sum: f64 = weights.iter().sum();
         let after =
@@ -210,6 +216,20 @@ fn reweighted<const N: usize, const M: usize>(
 }
 
 impl<const K: usize> ObservedEntries<K> {
+    /// ln of the share of a belief whose forces are within their bounds, one by one.
+    fn log_share_of_forces<const N: usize>(&self, belief: &Gaussian<N>) -> f64 {
+        let of_entry = |(k, entry): (usize, usize)| {
+            let (least, most) = self.bounds[k];
+            let variance = belief.covariance[entry][entry];
+            if self.is_place[k] || least == f64::NEG_INFINITY || variance <= 0.0 {
+                return 0.0;
+            }
+            let (mean, sd) = (belief.mean[entry], variance.sqrt());
+            normal_between((least - mean) / sd, (most - mean) / sd).ln_share
+        };
+        self.entries.into_iter().enumerate().map(of_entry).sum()
+    }
+
     fn held(&self, k: usize, value: f64) -> f64 {
         let (least, most) = self.bounds[k];
         value.max(least).min(most)
@@ -243,7 +263,7 @@ pub(super) const fn contacts(numbers: usize) -> usize {
 }
 
 /// Entries of a state on a line that a reading observes: u, then place and force of each contact, K = 1 + 2·C numbers.
-pub(super) fn observed_on_line<const K: usize>(length_m: f64) -> ObservedEntries<K> {
+pub(super) fn observed_on_line<const K: usize>(length_m: f64, greatest_n: f64) -> ObservedEntries<K> {
     ObservedEntries {
         entries: std::array::from_fn(|k| match k {
             0 => U,
@@ -253,7 +273,7 @@ pub(super) fn observed_on_line<const K: usize>(length_m: f64) -> ObservedEntries
         bounds: std::array::from_fn(|k| match k {
             0 => (f64::NEG_INFINITY, f64::INFINITY),
             k if k % 2 == 1 => (0.0, length_m),
-            _ => (0.0, f64::INFINITY),
+            _ => (0.0, greatest_n),
         }),
         is_place: std::array::from_fn(|k| k % 2 == 1),
     }
@@ -461,11 +481,11 @@ pub(super) const ACROSS: usize = 3;
 pub(super) const FORCE: usize = 6;
 
 /// Entries of a contact on a plane that a reading observes: x, y and W.
-pub(super) fn observed_on_plane(extent: Extent) -> ObservedEntries<3> {
+pub(super) fn observed_on_plane(extent: Extent, greatest_n: f64) -> ObservedEntries<3> {
     let [length_m, width_m] = sides_m(extent);
     ObservedEntries {
         entries: [ALONG, ACROSS, FORCE],
-        bounds: [(0.0, length_m), (0.0, width_m), (0.0, f64::INFINITY)],
+        bounds: [(0.0, length_m), (0.0, width_m), (0.0, greatest_n)],
         is_place: [true, true, false],
     }
 }

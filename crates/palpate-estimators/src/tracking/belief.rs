@@ -77,27 +77,33 @@ impl Belief {
     /// After a reading, and the logarithm of how probable it was; `None` where that is too little for numbers.
     pub fn updated(&self, observation: Observation) -> Option<(Self, f64)> {
         let extent = observation.likelihood.extent();
-        let length_m = extent.length_m();
+        let (length_m, greatest_n) = (extent.length_m(), observation.greatest_force_n());
         match (self, observation.likelihood.geometry()) {
             (Self::Nothing(bank), _) => {
                 let expand =
                     |about: &[f64; 1]| observation.likelihood.fit_nothing(observation.whitened, about[0]);
-                let updated = bank.updated(&observed_on_line(length_m), expand, None);
+                let updated = bank.updated(&observed_on_line(length_m, greatest_n), expand, None);
                 updated.map(|(bank, evidence)| (Self::Nothing(bank), evidence))
             }
             (Self::One(bank), Geometry::Line(line)) => {
-                let updated =
-                    bank.updated(&observed_on_line(length_m), |about| observation.fit_one(line, about), None);
+                let updated = bank.updated(
+                    &observed_on_line(length_m, greatest_n),
+                    |about| observation.fit_one(line, about),
+                    None,
+                );
                 updated.map(|(bank, evidence)| (Self::One(bank), evidence))
             }
             (Self::Two(bank), Geometry::Line(line)) => {
-                let updated =
-                    bank.updated(&observed_on_line(length_m), |about| observation.fit_two(line, about), None);
+                let updated = bank.updated(
+                    &observed_on_line(length_m, greatest_n),
+                    |about| observation.fit_two(line, about),
+                    None,
+                );
                 updated.map(|(bank, evidence)| (Self::Two(Box::new(bank)), evidence))
             }
             (Self::OnPlane(bank), Geometry::Plane(plane)) => {
                 let expand = |about: &[f64; 3]| observation.fit_on_plane(plane, about);
-                let updated = bank.updated(&observed_on_plane(extent), expand, None);
+                let updated = bank.updated(&observed_on_plane(extent, greatest_n), expand, None);
                 updated.map(|(bank, evidence)| (Self::OnPlane(Box::new(bank)), evidence))
             }
             // Contacts of a line are not believed in on a plane, nor the other way round.
@@ -161,6 +167,11 @@ impl Moments {
 }
 
 impl Observation<'_> {
+    /// The greatest force of a contact, in newtons; infinite where the force is known.
+    pub fn greatest_force_n(&self) -> f64 {
+        self.likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1)
+    }
+
     pub fn fit_one(&self, line: &dyn LineLikelihood, about: &[f64; 3]) -> ContactFit<3> {
         let [mode_n, x_m, force_n] = *about;
         line.fit_one(self.whitened, contact_at(x_m, force_n), self.swings.then_some(mode_n))

@@ -1,8 +1,10 @@
 //! Contacts that a reading can have come from.
 //!
-//! A contact that has just come is held possible anywhere near where the reading by itself shows one, with any force up to
-//! many times the one that fits, at any usual speed, on a surface that it has not made swing much. The reading then says
-//! how probable that was, and the remainder of it.
+//! A new contact has a wide prior about the places that explain the reading by itself, with any usual speed, on a surface that
+//! hardly swings. The reading then gives its probability and its posterior.
+//!
+//! Its force has the [prior](crate::force_prior) of all estimators. About the force W that fits, a log-normal distribution ln W ~ N(μ, s²) has the density
+//! e^(−q²/2)/(√(2π)·s·W) with q = (ln W − μ)/s: that of a normal distribution with the standard deviation s·W at its mean, times e^(−q²/2).
 
 use super::TrackerConfig;
 use super::bank::{
@@ -11,6 +13,7 @@ use super::bank::{
 };
 use super::belief::{Belief, Observation};
 use super::gaussian::Gaussian;
+use crate::force_prior::ForcePrior;
 use crate::likelihood::{ContactFit, LineLikelihood, PlaneLikelihood};
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::{Contact, Position};
@@ -23,8 +26,6 @@ use std::f64::consts::PI;
 const WIDEST: f64 = 1.0 / 40.0;
 /// The most parts of a valley.
 const MOST_PARTS: f64 = 16.0;
-/// A force that is not known lies anywhere between 0 and this many times the one that explains a reading.
-const FORCES: f64 = 10.0;
 /// The first mode's force is this share, as a standard deviation, off its balance under a contact that has just come.
 const IMBALANCE: f64 = 0.02;
 
@@ -33,6 +34,8 @@ pub(super) struct BirthModel<'a, L: ?Sized> {
     pub likelihood: &'a L,
     pub observation: Observation<'a>,
     pub config: &'a TrackerConfig,
+    /// Prior of the force of a contact; `None` where it is known.
+    pub force_prior: Option<&'a ForcePrior>,
     pub single: &'a Estimate,
 }
 
@@ -43,7 +46,7 @@ struct BirthComponent {
     /// Covariance of the place in m²: xx, xy, yy; on a line xx alone.
     covariance_m2: [f64; 3],
     variance_n2: f64,
-    /// Prior probability of its place: the share of all places that it stands for.
+    /// Prior probability: the share of all places that it stands for, and the density of its force over that of a normal distribution about it.
     prior: f64,
 }
 
@@ -65,9 +68,19 @@ impl<L: ?Sized> BirthModel<'_, L> {
     ) -> Option<BirthComponent> {
         let known_n = self.observation.likelihood.known_force_n();
         let force_n = known_n.unwrap_or(force_n);
-        let variance_n2 = if known_n.is_some() { 0.0 } else { (FORCES * force_n).powi(2) / 12.0 };
+        if force_n.is_nan() || force_n <= 0.0 {
+            return None;
+        }
+        let [force_n, variance_n2, density] = match self.force_prior {
+            Some(force_prior) if known_n.is_none() => {
+                let force_n = force_n.min(force_prior.ends_n().1);
+                let [residual, slope] = force_prior.residual(force_n);
+                [force_n, slope.powi(-2), (-0.5 * residual * residual).exp()]
+            }
+            _ => [force_n, 0.0, 1.0],
+        };
         let contact = Contact { position, force_n };
-        (force_n > 0.0).then_some(BirthComponent { contact, covariance_m2, variance_n2, prior })
+        Some(BirthComponent { contact, covariance_m2, variance_n2, prior: density * prior })
     }
 
     /// A contact whose position has the variance of one anywhere on the surface, l²/12.
@@ -115,7 +128,11 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         let born: Bank<6, 1> = Bank::uniform(self.augmented(&Gaussian::<2>::default(), component));
         let start = [self.balance_n(component.contact), position.x_m, force_n];
         let expand = |about: &[f64; 3]| self.observation.fit_one(self.likelihood, about);
-        let (bank, evidence) = born.updated(&observed_on_line(self.length_m()), expand, Some(start))?;
+        let (bank, evidence) = born.updated(
+            &observed_on_line(self.length_m(), self.observation.greatest_force_n()),
+            expand,
+            Some(start),
+        )?;
         Some((evidence + component.prior.ln(), Belief::One(Bank::uniform(bank.members[0]))))
     }
 
@@ -137,7 +154,11 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         let mode_n = self.balance_n(first) + self.balance_n(second);
         let start = [mode_n, first.position.x_m, first.force_n, second.position.x_m, second.force_n];
         let expand = |about: &[f64; 5]| self.observation.fit_two(self.likelihood, about);
-        born.updated(&observed_on_line(self.length_m()), expand, Some(start))
+        born.updated(
+            &observed_on_line(self.length_m(), self.observation.greatest_force_n()),
+            expand,
+            Some(start),
+        )
     }
 
     /// A belief whose state is augmented by a contact, under which the first mode is nearly in balance: u grows by W·φ(x) and its unrest.
@@ -248,7 +269,8 @@ impl BirthModel<'_, dyn PlaneLikelihood + '_> {
         belief.covariance[FORCE][FORCE] = component.variance_n2;
         let born: Bank<PLANE_NUMBERS, 1> = Bank::uniform(belief);
         let expand = |about: &[f64; 3]| self.observation.fit_on_plane(self.likelihood, about);
-        let observed = observed_on_plane(self.observation.likelihood.extent());
+        let observed =
+            observed_on_plane(self.observation.likelihood.extent(), self.observation.greatest_force_n());
         let (bank, evidence) = born.updated(&observed, expand, Some([x_m, y_m, force_n]))?;
         Some((evidence + component.prior.ln(), Belief::OnPlane(Box::new(Bank::uniform(bank.members[0])))))
     }

@@ -32,12 +32,13 @@ mod tracker;
 pub use slow::{Creep, Drift};
 pub use tracker::{SmoothTracker, Tracker};
 
+use crate::force_prior::force_interval_95_n;
 use crate::likelihood::{CalibrationVariance, Likelihood};
 use belief::Moments;
 use palpate_core::{ContactEstimate, Estimate, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::{bisect, clamped_interval, normal_cdf, normal_interval_95};
+use palpate_numerics::{NORMAL_95, bisect, clamped_interval, normal_cdf, normal_interval_95};
 
 /// Configuration of a tracker: how contacts come, move and go, and how the surface swings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,7 +59,7 @@ pub struct TrackerConfig {
     pub jumps_per_s: f64,
     /// First mode of the surface, where that is known; else it is taken to be in balance.
     pub swing: Option<Swing>,
-    /// Drift of the channels, where it is followed; else there is none.
+    /// Drift of the channels; where none is stated, one is followed if the untouched rows of the calibration show it.
     pub drift: Option<Drift>,
     /// Creep of the surface, where that is known; else there is none.
     pub creep: Option<Creep>,
@@ -184,7 +185,7 @@ impl Tracked {
 
     /// The 95 % interval of the force, in newtons: [`force_95_n`](Self::force_95_n), or that of a normal distribution.
     pub fn force_interval_95_n(&self) -> (f64, f64) {
-        self.force_95_n.unwrap_or_else(|| normal_interval_95(self.force_n, self.sd[2]))
+        self.force_95_n.unwrap_or_else(|| force_interval_95_n(self.force_n, self.sd[2]))
     }
 
     /// The contacts of beliefs with as many of them, each with its weight, the most probable first.
@@ -213,6 +214,7 @@ impl Tracked {
         let contacts: Vec<_> = belief.iter().map(Moments::contact).collect();
         let left = likelihood.calibration_variance(&contacts);
         let extent = likelihood.extent();
+        let greatest_n = likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1);
         let tracked = |(moments, left): (&Moments, CalibrationVariance)| {
             let [xx, xy, yy] = left.position_m2;
             let [x_m, speed_m_per_s, force_n, y_m, speed_across] = moments.mean;
@@ -229,14 +231,44 @@ impl Tracked {
                 }
             };
             let x_95_m = clamped_interval(normal_interval_95(x_m, sd[0]), extent.length_m());
-            let force_95_n = (left.force_n2 > force && force_n > 0.0).then(|| {
-                let (low, high) = normal_interval_95(0.0, sd[2] / force_n);
-                (force_n * low.exp(), force_n * high.exp())
-            });
+            let force_95_n = force_interval_n(force_n, sd[2], left.force_n2 > force, greatest_n);
             Self { x_m, speed_m_per_s, force_n, sd, x_95_m, force_95_n, across: extent.width_m().map(across) }
         };
         belief.iter().zip(left).map(tracked).collect()
     }
+}
+
+impl Tracked {
+    /// Adds variances of the place, xx, xy and yy, and of the force, on a surface of this extent under contacts of no more than a greatest force.
+    fn widen(&mut self, [xx, xy, yy, force]: [f64; 4], extent: Extent, greatest_n: f64) {
+        let wider = |at_m: f64, (low_m, high_m): (f64, f64), variance: f64, side_m: f64| {
+            let half = |own_m: f64| (own_m * own_m + NORMAL_95 * NORMAL_95 * variance).sqrt();
+            clamped_interval((at_m - half(at_m - low_m), at_m + half(high_m - at_m)), side_m)
+        };
+        // Nothing is known less than of a uniform distribution.
+        let at_most = |variance: f64, side: f64| variance.sqrt().min(side / 12f64.sqrt());
+        self.x_95_m = wider(self.x_m, self.x_95_m, xx, extent.length_m());
+        self.sd[0] = at_most(self.sd[0].powi(2) + xx, extent.length_m());
+        self.sd[2] = at_most(self.sd[2].powi(2) + force, greatest_n);
+        self.force_95_n = force_interval_n(self.force_n, self.sd[2], self.force_95_n.is_some(), greatest_n);
+        if let (Some(across), Some(width_m)) = (&mut self.across, extent.width_m()) {
+            across.y_95_m = wider(across.y_m, across.y_95_m, yy, width_m);
+            across.sd[0] = at_most(across.sd[0].powi(2) + yy, width_m);
+            across.covariance_m2 += xy;
+        }
+    }
+}
+
+/// The 95 % interval of a force whose logarithm is normal where it trades off against the place, or that ends at the greatest force; `None` of a force that is
+/// normal.
+fn force_interval_n(force_n: f64, sd_n: f64, trades_off: bool, greatest_n: f64) -> Option<(f64, f64)> {
+    let most_n = greatest_n.max(force_n);
+    if trades_off && force_n > 0.0 {
+        let (low, high) = normal_interval_95(0.0, sd_n / force_n);
+        return Some((force_n * low.exp(), (force_n * high.exp()).min(most_n)));
+    }
+    let (low_n, high_n) = force_interval_95_n(force_n, sd_n);
+    (high_n > most_n).then_some((low_n, most_n))
 }
 
 /// The most probable contact of a plane, with the covariance about it of all that are held possible.

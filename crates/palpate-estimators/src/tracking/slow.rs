@@ -21,11 +21,11 @@
 
 use super::Tracked;
 use crate::likelihood::{Likelihood, Linearisation};
+use crate::untouched_drift::UntouchedDrift;
 use ndarray::{Array1, Array2, s};
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::{Ldl, Matrix, dot, form};
-use palpate_numerics::{Cholesky, NORMAL_95, clamped_interval, push_rest};
+use palpate_numerics::{Cholesky, push_rest};
 
 /// Drift that a tracker reckons with, in standard deviations of each channel's noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +36,16 @@ pub struct Drift {
     pub rates_per_s: [f64; 3],
     /// Correlation time of the rate, in seconds.
     pub rate_s: f64,
+}
+
+impl Drift {
+    /// The drift whose greatest walk is at least this many standard deviations of the noise after a second.
+    pub(super) fn up_to(walk_per_root_s: f64) -> Self {
+        let mut drift = Self::default();
+        let [.., greatest] = &mut drift.walks_per_root_s;
+        *greatest = greatest.max(walk_per_root_s);
+        drift
+    }
 }
 
 impl Default for Drift {
@@ -124,8 +134,23 @@ impl SlowState {
     ) -> Self {
         let noise = noise(likelihood, channels);
         let count = noise.len();
+        let shown = likelihood.untouched_drift();
+        let in_noise = |values: &[f64]| -> Vec<f64> {
+            noise
+                .iter()
+                .map(|(channel, noise)| values.get(*channel).copied().unwrap_or(0.0) / noise.abs())
+                .collect()
+        };
+        let follow = |shown: &UntouchedDrift| {
+            Drift::up_to(in_noise(&shown.walk_per_root_s).into_iter().fold(0.0, f64::max))
+        };
+        // As of an offset that is anywhere in the range with the same probability.
+        let within = |shown: &UntouchedDrift| {
+            in_noise(&shown.range).iter().map(|range| range / 12f64.sqrt()).collect()
+        };
+        let offset_sd: Vec<f64> = shown.map_or_else(|| vec![1.0; count], within);
         Self {
-            drift: drift.map(|config| DriftFilter::new(config, count)),
+            drift: drift.or_else(|| shown.map(follow)).map(|config| DriftFilter::new(config, &offset_sd)),
             creep: creep.map(|creep| (creep, vec![0.0; count])),
             noise,
             block: Block::default(),
@@ -187,15 +212,9 @@ impl SlowState {
         );
     }
 
-    /// Adds the doubt that the drift leaves to that of the contacts.
-    pub fn widen(&self, likelihood: &dyn Likelihood, tracked: &mut [Tracked]) {
-        let Some(drift) = &self.drift else { return };
-        let contacts: Vec<Contact> = tracked.iter().map(contact_of).collect();
-        let added = drift.covariance_of_contacts(&likelihood.linearised(&contacts));
-        for (k, one) in tracked.iter_mut().enumerate() {
-            let of = |i: usize, j: usize| added[3 * k + i][3 * k + j];
-            widen(one, [of(0, 0), of(0, 1), of(1, 1), of(2, 2)], likelihood.extent());
-        }
+    /// Covariance of the drift, in the noise's; `None` where it is not followed.
+    pub fn drift_covariance(&self) -> Option<&Array2<f64>> {
+        self.drift.as_ref().map(|drift| &drift.covariance)
     }
 
     /// The baseline that readings are brought to has moved by so much in each channel.
@@ -206,7 +225,7 @@ impl SlowState {
         if is_new {
             self.block = Block::default();
             // Another baseline, which its readings' noise is in.
-            *drift = DriftFilter::new(drift.config, self.noise.len());
+            *drift = DriftFilter::new(drift.config, &vec![1.0; self.noise.len()]);
             self.creep.iter_mut().for_each(|(_, states)| states.fill(0.0));
         } else {
             drift.move_by(&moved);
@@ -242,22 +261,6 @@ fn contact_of(tracked: &Tracked) -> Contact {
     Contact { position: Position { x_m: tracked.x_m, y_m }, force_n: tracked.force_n }
 }
 
-/// Adds variances xx, xy, yy of the place and of the force.
-fn widen(tracked: &mut Tracked, [xx, xy, yy, force]: [f64; 4], extent: Extent) {
-    let wider = |at_m: f64, (low_m, high_m): (f64, f64), variance: f64, side_m: f64| {
-        let half = |own_m: f64| (own_m * own_m + NORMAL_95 * NORMAL_95 * variance).sqrt();
-        clamped_interval((at_m - half(at_m - low_m), at_m + half(high_m - at_m)), side_m)
-    };
-    tracked.x_95_m = wider(tracked.x_m, tracked.x_95_m, xx, extent.length_m());
-    tracked.sd[0] = (tracked.sd[0].powi(2) + xx).sqrt();
-    tracked.sd[2] = (tracked.sd[2].powi(2) + force).sqrt();
-    if let (Some(across), Some(width_m)) = (&mut tracked.across, extent.width_m()) {
-        across.y_95_m = wider(across.y_m, across.y_95_m, yy, width_m);
-        across.sd[0] = (across.sd[0].powi(2) + yy).sqrt();
-        across.covariance_m2 += xy;
-    }
-}
-
 impl Block {
     fn is_full(&self, time_s: f64) -> bool {
         time_s - self.start_s >= BLOCK_S
@@ -283,9 +286,12 @@ impl Block {
 }
 
 impl DriftFilter {
-    fn new(config: Drift, channels: usize) -> Self {
+    /// A filter of offsets that are, at first, within so many standard deviations of the noise, and at least one.
+    fn new(config: Drift, offset_sd: &[f64]) -> Self {
+        let channels = offset_sd.len();
+        let variance = |i: usize| offset_sd[i].powi(2).max(1.0);
         let model = |walk: f64, rate: f64| {
-            let variance = |i: usize| if i < channels { 1.0 } else { rate * rate };
+            let variance = |i: usize| if i < channels { variance(i) } else { rate * rate };
             let covariance = Array2::from_diag(&Array1::from_iter((0..2 * channels).map(variance)));
             Model { walk, rate, log_weight: 0.0, mean: Array1::zeros(2 * channels), covariance }
         };
@@ -296,7 +302,7 @@ impl DriftFilter {
             time_s: None,
             offset: Array1::zeros(channels),
             rate: Array1::zeros(channels),
-            covariance: Array2::eye(channels),
+            covariance: Array2::from_diag(&Array1::from_iter((0..channels).map(variance))),
         }
     }
 
@@ -369,35 +375,45 @@ impl DriftFilter {
             self.covariance.scaled_add(share / sum, &own);
         }
     }
+}
 
-    /// A⁻¹·Jᵀ·P·J·A⁻¹ with A = JᵀJ, J the derivatives by the contacts' unknowns and P the covariance of d.
-    fn covariance_of_contacts(&self, at: &Linearisation) -> Matrix<6> {
-        let (mut a, mut b) = ([[0.0; 6]; 6], [[0.0; 6]; 6]);
-        let mut added = [[0.0; 6]; 6];
-        let columns: Vec<&[f64]> = at.derivatives.iter().map(Vec::as_slice).take(6).collect();
-        for (j, right) in columns.iter().enumerate() {
-            let spread: Vec<f64> = self
-                .covariance
-                .rows()
-                .into_iter()
-                .map(|row| row.iter().zip(*right).map(|(own, right)| own * right).sum())
-                .collect();
-            for (i, left) in columns.iter().enumerate() {
-                a[i][j] = dot(left, right);
-                b[i][j] = dot(left, &spread);
-            }
-        }
-        let free = std::array::from_fn(|i| i < columns.len() && a[i][i] > 0.0);
-        if let Some(factors) = Ldl::of_free(&a, free) {
-            let inverse = factors.inverse();
-            for i in 0..6 {
-                for j in 0..6 {
-                    added[i][j] = form(&inverse[i], &b, &inverse[j]);
-                }
-            }
-        }
-        added
+/// Adds the uncertainty that a drift of this covariance leaves to that of the contacts.
+pub(super) fn widen(covariance: &Array2<f64>, likelihood: &dyn Likelihood, tracked: &mut [Tracked]) {
+    let contacts: Vec<Contact> = tracked.iter().map(contact_of).collect();
+    let greatest_n = likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1);
+    let added = covariance_of_contacts(covariance, &likelihood.linearised(&contacts));
+    for (k, one) in tracked.iter_mut().enumerate() {
+        let of = |i: usize, j: usize| added[3 * k + i][3 * k + j];
+        one.widen([of(0, 0), of(0, 1), of(1, 1), of(2, 2)], likelihood.extent(), greatest_n);
     }
+}
+
+/// A⁻¹·Jᵀ·P·J·A⁻¹ with A = JᵀJ, J the derivatives by the contacts' unknowns and P the covariance of d.
+fn covariance_of_contacts(covariance: &Array2<f64>, at: &Linearisation) -> Matrix<6> {
+    let (mut a, mut b) = ([[0.0; 6]; 6], [[0.0; 6]; 6]);
+    let mut added = [[0.0; 6]; 6];
+    let columns: Vec<&[f64]> = at.derivatives.iter().map(Vec::as_slice).take(6).collect();
+    for (j, right) in columns.iter().enumerate() {
+        let spread: Vec<f64> = covariance
+            .rows()
+            .into_iter()
+            .map(|row| row.iter().zip(*right).map(|(own, right)| own * right).sum())
+            .collect();
+        for (i, left) in columns.iter().enumerate() {
+            a[i][j] = dot(left, right);
+            b[i][j] = dot(left, &spread);
+        }
+    }
+    let free = std::array::from_fn(|i| i < columns.len() && a[i][i] > 0.0);
+    if let Some(factors) = Ldl::of_free(&a, free) {
+        let inverse = factors.inverse();
+        for i in 0..6 {
+            for j in 0..6 {
+                added[i][j] = form(&inverse[i], &b, &inverse[j]);
+            }
+        }
+    }
+    added
 }
 
 impl Model {
@@ -460,12 +476,13 @@ impl Model {
 mod tests {
     use super::*;
     use crate::likelihood::CalibrationVariance;
+    use palpate_mechanics::surface::Extent;
 
     /// A channel by itself, without a rate: the steady variance of a random walk in noise is (√(q² + 4·q·r) − q)/2.
     #[test]
     fn a_walk_s_variance_is_that_of_the_steady_filter() {
         let (walk, noise, every_s) = (0.3, 0.05, 0.2);
-        let mut filter = DriftFilter::new(Drift { walks_per_root_s: [walk; 3], ..Drift::default() }, 1);
+        let mut filter = DriftFilter::new(Drift { walks_per_root_s: [walk; 3], ..Drift::default() }, &[1.0]);
         let model = &mut filter.models[0];
         model.covariance[[1, 1]] = 0.0;
         model.rate = 0.0;
@@ -482,7 +499,7 @@ mod tests {
     #[test]
     fn one_long_step_is_many_short_ones() {
         let start = || {
-            let filter = DriftFilter::new(Drift::default(), 2);
+            let filter = DriftFilter::new(Drift::default(), &[1.0; 2]);
             let mut model = filter.models[8].clone();
             model.mean.iter_mut().enumerate().for_each(|(i, mean)| *mean = 0.1 * (i + 1) as f64);
             model
@@ -500,7 +517,7 @@ mod tests {
 
     #[test]
     fn a_line_is_found_by_its_rate_and_carried_on() {
-        let mut filter = DriftFilter::new(Drift::default(), 3);
+        let mut filter = DriftFilter::new(Drift::default(), &[1.0; 3]);
         let likelihood = Nothing(3);
         let mut offset = [0.0; 3];
         for i in 0..600_u32 {
@@ -582,6 +599,10 @@ mod tests {
             false
         }
 
+        fn untouched_drift(&self) -> Option<&UntouchedDrift> {
+            None
+        }
+
         fn single_estimate(&self, _: &[f64]) -> palpate_core::Estimate {
             unreachable!("no tracker asks")
         }
@@ -591,6 +612,10 @@ mod tests {
         }
 
         fn known_force_n(&self) -> Option<f64> {
+            None
+        }
+
+        fn force_range(&self) -> Option<crate::force_prior::ForceRange> {
             None
         }
 

@@ -5,6 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::sync::Arc;
 
+mod drift;
 mod on_plane;
 
 use super::*;

@@ -3,9 +3,11 @@
 use super::bank::Step;
 use super::belief::{Belief, Moments, Observation};
 use super::birth::BirthModel;
-use super::slow::SlowState;
+use super::slow::{SlowState, widen};
 use super::{Track, TrackError, Tracked, TrackerConfig};
+use crate::force_prior::ForcePrior;
 use crate::likelihood::{Geometry, Likelihood};
+use ndarray::Array2;
 use palpate_core::{Estimate, Status};
 use palpate_numerics::watch::{Cancelled, Watch};
 use std::sync::Arc;
@@ -43,6 +45,8 @@ const UNSEEN: f64 = 9.0;
 pub struct Tracker {
     likelihood: Arc<dyn Likelihood>,
     config: TrackerConfig,
+    /// Prior of the force of contacts; `None` where it is known.
+    force_prior: Option<ForcePrior>,
     hypotheses: Vec<Hypothesis>,
     time_s: Option<f64>,
     next_id: u64,
@@ -78,6 +82,7 @@ impl Tracker {
     /// A tracker that has seen nothing.
     pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
         Self {
+            force_prior: likelihood.force_range().map(ForcePrior::from),
             likelihood,
             config,
             hypotheses: Vec::new(),
@@ -129,7 +134,9 @@ impl Tracker {
             if self.config.swing.is_none() || track.contacts.is_empty() {
                 slow.learn(&*likelihood, &whitened, &track.contacts, probability);
             }
-            slow.widen(&*likelihood, &mut track.contacts);
+            if let Some(covariance) = slow.drift_covariance() {
+                widen(covariance, &*likelihood, &mut track.contacts);
+            }
         }
         self.whitened = whitened;
         self.time_s = Some(time_s);
@@ -147,7 +154,8 @@ impl Tracker {
     /// Drift and creep, where they are followed.
     fn slow(&mut self, channels: usize) -> Option<&mut SlowState> {
         let TrackerConfig { drift, creep, .. } = self.config;
-        if self.slow.is_none() && (drift.is_some() || creep.is_some()) {
+        let drifts = drift.is_some() || self.likelihood.untouched_drift().is_some();
+        if self.slow.is_none() && (drifts || creep.is_some()) {
             self.slow = Some(SlowState::new(&*self.likelihood, channels, drift, creep));
         }
         self.slow.as_mut()
@@ -245,13 +253,13 @@ impl Tracker {
         observation: Observation,
         single: &Estimate,
     ) -> Vec<(f64, Belief)> {
-        let config = &self.config;
+        let (config, force_prior) = (&self.config, self.force_prior.as_ref());
         let weighted = |(evidence, belief): (f64, Belief)| {
             (if belief.contacts() == 1 { log_births.one } else { log_births.two } + evidence, belief)
         };
         match self.likelihood.geometry() {
             Geometry::Line(likelihood) => {
-                let births = BirthModel { likelihood, observation, config, single };
+                let births = BirthModel { likelihood, observation, config, force_prior, single };
                 let mut born: Vec<_> = births.first_contacts().into_iter().map(weighted).collect();
                 for hypothesis in &self.hypotheses {
                     if let Belief::One(bank) = &hypothesis.belief {
@@ -264,7 +272,7 @@ impl Tracker {
                 born
             }
             Geometry::Plane(likelihood) => {
-                let births = BirthModel { likelihood, observation, config, single };
+                let births = BirthModel { likelihood, observation, config, force_prior, single };
                 births.first_contacts().into_iter().map(weighted).collect()
             }
         }
@@ -341,12 +349,19 @@ pub struct SmoothTracker {
     tracks: Vec<Track>,
     /// The hypotheses with contacts at each reading, by their ids.
     past: Vec<Vec<(u64, Belief)>>,
+    /// Covariance of the drift after each reading; empty where none is followed.
+    drift_covariances: Vec<Array2<f64>>,
 }
 
 impl SmoothTracker {
     /// A tracker that has seen nothing.
     pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
-        Self { tracker: Tracker::new(likelihood, config), tracks: Vec::new(), past: Vec::new() }
+        Self {
+            tracker: Tracker::new(likelihood, config),
+            tracks: Vec::new(),
+            past: Vec::new(),
+            drift_covariances: Vec::new(),
+        }
     }
 
     /// Takes the next reading; see [`Tracker::follow`].
@@ -368,6 +383,8 @@ impl SmoothTracker {
         // The one that is shown comes first.
         remembered.sort_by_key(|(_, belief)| belief.contacts() != track.contacts.len());
         self.past.push(remembered);
+        self.drift_covariances
+            .extend(self.tracker.slow.as_ref().and_then(SlowState::drift_covariance).cloned());
         self.tracks.push(track);
         Ok(())
     }
@@ -398,8 +415,12 @@ impl SmoothTracker {
             let last = || self.past[k].first().cloned();
             later = if number > 0 { lasting.or_else(last) } else { None };
             let moments = later.as_ref().map(|(_, belief)| belief.moments());
-            smoothed[k].contacts = moments
-                .map_or_else(Vec::new, |moments| Tracked::from_belief(&moments, &*self.tracker.likelihood));
+            let likelihood = &*self.tracker.likelihood;
+            let contacts = &mut smoothed[k].contacts;
+            *contacts = moments.map_or_else(Vec::new, |moments| Tracked::from_belief(&moments, likelihood));
+            if let Some(covariance) = self.drift_covariances.get(k) {
+                widen(covariance, likelihood, contacts);
+            }
         }
         Ok(smoothed)
     }

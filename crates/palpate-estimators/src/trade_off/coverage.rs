@@ -1,10 +1,10 @@
 //! Coverage of contacts by their distance from the end of the paper's beam.
 
-use super::PRIOR_FORCES;
 use crate::arrangement::Training;
 use crate::closed_form::ClosedForm;
 use crate::fit::{Fit, FitTask, Locate, NoCheck};
 use crate::fixtures::{Covered, Example, paper, readings};
+use crate::force_prior::DECADE;
 use crate::influence::{Influence, InfluenceSource};
 use crate::simulate::clean_reading;
 use palpate_core::Status;
@@ -78,7 +78,7 @@ fn print_and_check(
             if !good(place)
                 || force < *allowed_percent.start()
                 || row.outside > 0
-                || row.greatest_n > PRIOR_FORCES * 3.0
+                || row.greatest_n > DECADE * 3.0
             {
                 wrong.push(format!("{force_n} N at {place_mm} mm: {row:?}"));
             }

@@ -3,6 +3,7 @@
 use crate::calibration::{PlanError, Statements, Weights, plan};
 use crate::source::{SourceUrl, SourceUrlError};
 use crate::whole_file;
+use palpate_estimators::force_prior::ForceRange;
 use palpate_rig::{Rig, RigError};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
@@ -375,6 +376,13 @@ fn point(place_mm: &[f64]) -> String {
     }
 }
 
+/// Range of forces that contacts have by the presses alone, as the rig's file has it.
+fn pressed_range(form: &RigForm) -> Option<String> {
+    let forces_n = form.force_n.into_iter().chain(form.second_force_n);
+    let (least_n, greatest_n) = ForceRange::of_presses(forces_n)?.ends_n();
+    Some(format!("[\"{least_n} N\", \"{greatest_n} N\"]"))
+}
+
 /// Text of the rig's file.
 fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> {
     let quoted = |text: &str| toml::Value::from(text).to_string();
@@ -400,6 +408,10 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
     line(format!("\n[recording]\nchannels = [{}]", names.join(", ")));
     if let Some(force) = force.as_ref().filter(|_| form.force_is_known) {
         line(format!("\n[contact]\nforce = {force}  # of every contact"));
+    } else if let Some(range) = pressed_range(form) {
+        line(format!(
+            "\n# [contact]\n# force_range = {range}  # where forces in use are known better than this"
+        ));
     }
     line("\n[training]".to_owned());
     match (form.width_mm, form.places.as_slice()) {
@@ -497,6 +509,12 @@ mod tests {
         assert!(made.record.command.ends_with("--second-force '4 N'"), "{}", made.record.command);
         // Every other of the 10 places is pressed with the second weight too.
         assert_eq!(plan(&made.rig, made.statements.weights(None), &[], &[]).unwrap().len(), 20 + 10);
+        // Forces in use are a decade either side of these, unless the comment is made a line.
+        assert_eq!(made.rig.setup.force_range(), None);
+        let stated =
+            made.record.text.replace("# [contact]", "[contact]").replace("# force_range", "force_range");
+        let range = Rig::from_toml(&stated).unwrap().setup.force_range().unwrap();
+        assert_eq!(range.ends_n(), (0.3, 30.0));
         let plane = RigForm {
             width_mm: Some(120.0),
             places: vec![5, 3],

@@ -310,11 +310,13 @@ impl FirstRig {
             );
             toml.line(&format!("{key} = \"{}\"", side.size), &guess);
         }
+        toml.text.push('\n');
+        toml.comment("[contact]");
         if self.roles.force.is_none() {
-            toml.text.push('\n');
-            toml.comment("[contact]");
             toml.line("# force = \"3 N\"", "where every contact, also in use, has one known force");
         }
+        let range = "forces in use, where not from a tenth to ten times those of the presses";
+        toml.line("# force_range = [\"0.5 N\", \"10 N\"]", range);
     }
 
     fn write_recording(&self, toml: &mut Toml) {

@@ -11,9 +11,11 @@ use super::locator::BeamLocator;
 use super::multi_contact::{contact_fit, first_mode};
 use super::table::InfluenceTable;
 use crate::fit::Locate;
+use crate::force_prior::ForceRange;
 use crate::likelihood::{
     CalibrationVariance, ContactFit, Geometry, Likelihood, LineLikelihood, Linearisation,
 };
+use crate::untouched_drift::UntouchedDrift;
 use crate::untouched_scatter::UntouchedScatter;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
@@ -28,6 +30,7 @@ pub struct BeamLikelihood {
     /// g of the channels in use.
     first_mode: Vec<f64>,
     untouched_scatter: Option<UntouchedScatter>,
+    untouched_drift: Option<UntouchedDrift>,
 }
 
 impl BeamLikelihood {
@@ -35,13 +38,19 @@ impl BeamLikelihood {
     pub fn new(locator: &BeamLocator) -> Self {
         let table = &locator.search().table;
         let first_mode = (0..table.sensors).map(|s| share_of_first_mode(table, s)).collect();
-        Self { locator: locator.clone(), first_mode, untouched_scatter: None }
+        Self { locator: locator.clone(), first_mode, untouched_scatter: None, untouched_drift: None }
     }
 
     /// The same, by which readings within a scatter are residue of a touch.
     #[must_use]
     pub fn with_untouched_scatter(self, untouched_scatter: Option<UntouchedScatter>) -> Self {
         Self { untouched_scatter, ..self }
+    }
+
+    /// The likelihood of a surface whose untouched rows drift.
+    #[must_use]
+    pub fn with_untouched_drift(self, untouched_drift: Option<UntouchedDrift>) -> Self {
+        Self { untouched_drift, ..self }
     }
 
     /// f, f′ and v of the channels in use.
@@ -176,12 +185,20 @@ impl Likelihood for BeamLikelihood {
         self.untouched_scatter.as_ref().is_some_and(|scatter| scatter.contains(reading))
     }
 
+    fn untouched_drift(&self) -> Option<&UntouchedDrift> {
+        self.untouched_drift.as_ref()
+    }
+
     fn extent(&self) -> Extent {
         Extent::line(self.table().length_m).expect("a table is longer than 0")
     }
 
     fn known_force_n(&self) -> Option<f64> {
         self.locator.force().known_n()
+    }
+
+    fn force_range(&self) -> Option<ForceRange> {
+        self.known_force_n().is_none().then(|| self.locator.channels().force_range())?
     }
 
     fn most_contacts(&self) -> usize {

@@ -1,4 +1,5 @@
 mod batch;
+mod offsets;
 mod reference;
 
 use super::*;

@@ -84,7 +84,7 @@ impl ForceLinearLocator {
         };
         let contacts = Contacts {
             length_m: length_m(axis),
-            force: self.known_response_n().map_or(Force::AtMost(self.stored.hardest_n), Force::Known),
+            force: self.known_response_n().map_or(Force::AtMost(self.force_prior.ends_n().1), Force::Known),
             widening: CALIBRATED,
             reference_force_n: self.stored.mean_force_n,
             // The likelihood of few presses is widened already.
@@ -103,12 +103,13 @@ impl ForceLinearLocator {
 
     /// The hardest force that is looked for.
     fn hardest_n(&self) -> f64 {
-        self.stored.prior.force_of_response(self.stored.hardest_n, 0.0).0
+        self.stored.prior.force_of_response(self.force_prior.ends_n().1, 0.0).0
     }
 
     /// The intervals of place and force on the surface; none of a force that is known.
     fn on_surface(&self, axis: Axis, found: &NotExcluded) -> ((f64, f64), Option<(f64, f64)>) {
-        let Stored { hardest_n, prior, .. } = &self.stored;
+        let Stored { prior, .. } = &self.stored;
+        let (_, hardest_n) = self.force_prior.ends_n();
         /// Of the surface's length.
         const ROUNDING: f64 = 1e-9;
         let whole_m = (0.0, prior.extent.length_m());
@@ -128,7 +129,7 @@ impl ForceLinearLocator {
             return (if is_beyond_grid { whole_m } else { (low_m, high_m) }, None);
         }
         let told = probable().map(|stretch| stretch.force_95_n).reduce(hull);
-        let (least_n, most_n) = told.filter(|_| !is_before && !is_behind).unwrap_or((0.0, *hardest_n));
+        let (least_n, most_n) = told.filter(|_| !is_before && !is_behind).unwrap_or((0.0, hardest_n));
         let force_n = |response_n: f64| prior.force_of_response(response_n, 0.0).0;
         ((low_m, high_m), Some((force_n(least_n), force_n(most_n))))
     }

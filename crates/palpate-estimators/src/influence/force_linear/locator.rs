@@ -7,6 +7,7 @@ use super::prior::{Prior, Source};
 use super::scan::Scan;
 use super::shared_errors::own_shares;
 use crate::fit::{Locate, LocatorFault, NoCheck};
+use crate::force_prior::{ForcePrior, ForceRange};
 use crate::influence::at_nodes::InfluencesAtNodes;
 use crate::influence::config::Structure;
 use crate::influence::grid::{Axis, check_axes, greatest_distances};
@@ -91,8 +92,11 @@ pub(super) struct Stored {
     /// Mean and standard deviation of φ of the presses, in newtons.
     pub mean_force_n: f64,
     pub force_sd_n: f64,
-    /// The hardest contact that is looked for, in newtons.
+    /// φ up to which the [`Scan`] bounds costs as they are, in newtons; the hardest contact where there is no range.
     pub hardest_n: f64,
+    /// Range of the forces of contacts; `None` where these are expected to be as hard as the presses, as in files without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_range: Option<ForceRange>,
     /// The squared residual, in variances, from which on no contact explains a reading.
     pub residual_limit: f64,
     /// The score of a [spread](crate::spread) from which on no contact at a point explains a reading.
@@ -133,8 +137,8 @@ fn is_one(value: &f64) -> bool {
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct ForceLinearLocator {
     pub(super) stored: Stored,
-    /// Expected φ of a contact, and its precision.
-    pub(super) expected: [f64; 2],
+    /// Prior of φ.
+    pub(super) force_prior: ForcePrior,
     /// f, v and β, eight channels side by side.
     pub(super) layers: Layers,
     /// ω.
@@ -164,7 +168,7 @@ pub struct Scatter {
     pub sd: Vec<(usize, f64)>,
 }
 
-/// Contacts are expected to have forces that spread this many times as far as those of the presses.
+/// Without a range contacts are expected to have forces that spread this many times as far as those of the presses.
 const FORCE_SPREAD: f64 = 2.0;
 /// Layers of f, v and β.
 pub(super) const VALUES: usize = 0;
@@ -175,10 +179,7 @@ pub(super) const LAYERS: usize = 3;
 impl Stored {
     pub fn into_locator(self) -> ForceLinearLocator {
         let mut locator = ForceLinearLocator {
-            expected: match self.known_force_n {
-                None => [self.mean_force_n, (FORCE_SPREAD * self.force_sd_n).powi(-2)],
-                Some(_) => [0.0; 2],
-            },
+            force_prior: self.force_prior(),
             layers: Layers::new([self.x, self.y], LAYERS, self.live.len(), |place, layer, channel| {
                 let Tables { values, variances, covariances, .. } = &self.functions;
                 [values, variances, covariances][layer][place * self.live.len() + channel]
@@ -197,6 +198,21 @@ impl Stored {
         locator.scan = locator.new_scan();
         locator.bound_noise();
         locator
+    }
+
+    /// Prior of φ by the range of forces, or by the presses.
+    fn force_prior(&self) -> ForcePrior {
+        match self.force_range {
+            Some(range) => {
+                let (least_n, greatest_n) = range.ends_n();
+                ForcePrior::log_normal(self.prior.response_n(least_n), self.prior.response_n(greatest_n))
+            }
+            None => ForcePrior::Normal {
+                mean_n: self.mean_force_n,
+                precision: (FORCE_SPREAD * self.force_sd_n).powi(-2),
+                greatest_n: self.hardest_n,
+            },
+        }
     }
 
     /// r of each channel in use.
@@ -491,7 +507,8 @@ impl ForceLinearLocator {
         let own = self.stored.own_shares();
         // The greatest eigenvalue of the errors' correlation is no more than this.
         let together = 1.0 + self.stored.shared_errors.iter().map(|loading| loading * loading).sum::<f64>();
-        Scan::new(self.places(), live, self.expected, self.known_response_n(), |place, c| {
+        let expected = self.force_prior.normal_part();
+        Scan::new(self.places(), live, expected, self.known_response_n(), |place, c| {
             let Place { values, variances, covariances } = self.place(place);
             let open = self.stored.functions.offset_variances[c];
             let noise = self.noise() * self.noise_at(self.node(place));

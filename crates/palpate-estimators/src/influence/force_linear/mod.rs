@@ -35,7 +35,7 @@ use crate::fit::FitTask;
 use crate::offset_course::OffsetCourse;
 use crate::recording::Recording;
 use crate::status::FalseAlarmRate;
-use force_prior::ForcePrior;
+use force_prior::PressForces;
 use learning::Learnt;
 use locator::{Stored, Tables};
 use palpate_mechanics::surface::Extent;
@@ -91,7 +91,7 @@ fn fit_condensed(
         })
         .collect();
     let functions = learnt.functions(&places_m, watch)?;
-    let force = ForcePrior::of_presses(presses, prior);
+    let force = PressForces::new(presses, prior, setup.force_range());
     let positions_m = presses.positions_m();
     let outermost_m = |k: usize| {
         let coordinates = || positions_m.iter().map(|position_m| position_m[k]);
@@ -110,6 +110,7 @@ fn fit_condensed(
         mean_force_n: force.mean_n,
         force_sd_n: force.sd_n,
         hardest_n: force.hardest_n,
+        force_range: force.range,
         residual_limit: f64::INFINITY,
         spread_limit: None,
         prior: prior.clone(),

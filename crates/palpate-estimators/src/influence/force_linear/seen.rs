@@ -3,16 +3,17 @@
 //! With d the reading less the offsets and f the influences at a place, both over the noise, channel k errs by
 //! S_k(F) = 1 + r_k·w_k(F), w_k(F) = ω_k + 2F·β_k + F²·v_k: noise, and the variances ω of the offset and v of the influence with their covariance β, as the
 //! presses leave them open. r_k is the share of that which the channel has for itself; g_k = u_k·√w_k are errors that all channels share
-//! ([`super::shared_errors`]). For a force F that is as likely as any other between 0 and the hardest looked for,
+//! ([`super::shared_errors`]). For a force with the [prior](crate::force_prior) p(F),
 //!
-//! p(a | d) ∝ ∫ |V|^(−½)·exp(−½·(d − F·f)ᵀ·V⁻¹·(d − F·f)) dF, V = diag(S) + g·gᵀ,
+//! p(a | d) ∝ ∫ p(F)·|V|^(−½)·exp(−½·(d − F·f)ᵀ·V⁻¹·(d − F·f)) dF, V = diag(S) + g·gᵀ,
 //!
-//! where the noise differs by place its multiplier m(a) in the place of the 1, V taken at the force of the least misfit. Where the response
+//! where the noise differs by place its multiplier m(a) in the place of the 1, V taken at the mean of the force there. Where the response
 //! to the force is not linear, F stands for φ(F), and the estimate is turned back. The determinant belongs there: between presses, where v
 //! is large, everything would explain a reading otherwise. From few presses ln p is divided by a number of channels whose errors count as
 //! those of one.
 
 use super::locator::{COVARIANCES, ForceLinearLocator, LAYERS, Stored, VALUES, VARIANCES};
+use crate::force_prior::ForceIntegral;
 use crate::influence::grid::Axis;
 use crate::influence::inversion::{
     Cells, Explain, Explained, Inversion, Limits, Look, Slopes, ToldForce, look_at_cells,
@@ -23,7 +24,7 @@ use crate::recording::Recording;
 use crate::spread::{About, spread_bound, spread_score};
 use crate::status::{learnt_bounds, misfit_bound};
 use palpate_core::Estimate;
-use palpate_numerics::{SharedError, normal_between, simd, with_shared_error};
+use palpate_numerics::{SharedError, simd, with_shared_error};
 
 impl ForceLinearLocator {
     /// A reading, less offsets and over the noise, ready to be explained.
@@ -233,7 +234,25 @@ impl Explain for Seen<'_> {
     }
 
     fn scan(&self, looks: &mut Vec<Look>) {
-        look_at_cells(&self.locator.scan, &self.reading, self.locator.stored.live.len(), looks);
+        let ForceLinearLocator { scan, stored, force_prior, .. } = self.locator;
+        let live = stored.live.len();
+        look_at_cells(scan, &self.reading, live, looks);
+        if self.range().is_none() {
+            return;
+        }
+        let Some(mut best) = looks.iter().copied().min_by(|a, b| a.cost.total_cmp(&b.cost)) else { return };
+        let scale = stored.hardest_n / best.latent;
+        if scale < 1.0 {
+            // The bounds hold for φ up to the hardest. With variances noise + φ²·v, the misfit of a reading of a greater φ is at least that of the
+            // reading brought to the hardest, as the noise grows with φ there.
+            let scaled: Vec<Lanes> = self.reading.iter().map(|lanes| lanes.map(|d| scale * d)).collect();
+            look_at_cells(scan, &scaled, live, looks);
+            looks.iter_mut().for_each(|look| look.latent /= scale);
+            best = looks.iter().copied().min_by(|a, b| a.cost.total_cmp(&b.cost)).unwrap_or(best);
+        }
+        let square: f64 = self.reading.as_flattened().iter().map(|d| d * d).sum();
+        let signal = force_prior.signal_cost(square - best.misfit);
+        looks.iter_mut().for_each(|look| look.cost += signal);
     }
 
     /// Of few presses variances change too much from place to place.
@@ -247,7 +266,7 @@ impl Explain for Seen<'_> {
 
     /// Of φ.
     fn range(&self) -> Option<(f64, f64)> {
-        self.locator.known_response_n().is_none().then_some((0.0, self.locator.stored.hardest_n))
+        self.locator.known_response_n().is_none().then(|| self.locator.force_prior.ends_n())
     }
 
     fn weigh(&mut self, [x, y, response_n]: Unknowns) {
@@ -269,7 +288,7 @@ impl Explain for Seen<'_> {
     }
 
     fn equations(&mut self, [x, y, response_n]: Unknowns) -> Equations {
-        let ForceLinearLocator { layers, expected, .. } = self.locator;
+        let ForceLinearLocator { layers, force_prior, .. } = self.locator;
         layers.interpolate_slopes([x, y], VALUES..VALUES + 1, &mut self.slopes);
         let of_group = |g: usize| {
             let [f, along, across] = &self.slopes[g];
@@ -282,7 +301,10 @@ impl Explain for Seen<'_> {
             let errors = self.shared.iter().enumerate().map(|(g, shared)| (of_group(g), *shared));
             equations = equations.with_shared_errors(errors);
         }
-        if self.range().is_some() { equations.with_expected(response_n, *expected) } else { equations }
+        match self.range() {
+            Some(_) => equations.with_prior(force_prior.residual(response_n)),
+            None => equations,
+        }
     }
 
     fn spread(&mut self, at: Unknowns) -> f64 {
@@ -312,7 +334,7 @@ impl Explain for Seen<'_> {
         let margin = x.margin_cost(place[0]) + y.margin_cost(place[1]);
         self.locator.layers.interpolate(place, 0..LAYERS, &mut self.between);
         self.noise = self.locator.noise_at(place);
-        let Some((least_n, hardest_n)) = self.range() else {
+        if self.range().is_none() {
             let Weighed { dd, fd, ff, log_determinant } = self.weighed(latent);
             let misfit = (dd + latent * (latent * ff - 2.0 * fd)).max(0.0);
             return Explained {
@@ -321,31 +343,19 @@ impl Explain for Seen<'_> {
                 latent,
                 latent_variance: 0.0,
             };
-        };
-        // Least squares of φ by the weights of the last one, with what is expected of it.
-        let [expected_n, precision] = self.locator.expected;
-        let told = |Weighed { fd, ff, .. }: Weighed| (fd + expected_n * precision, ff + precision);
-        let response_n = (0..STEPS).fold(latent, |response_n, _| {
-            let (fd, ff) = told(self.weighed(response_n));
-            if ff > 0.0 { (fd / ff).clamp(least_n, hardest_n) } else { least_n }
-        });
-        let weighed = self.weighed(response_n);
-        let misfit = (weighed.dd + response_n * (response_n * weighed.ff - 2.0 * weighed.fd)).max(0.0);
-        // The density of φ: normal about that of the least squares, cut off at 0 and at the hardest.
-        let (fd, ff) = told(weighed);
-        if ff.is_nan() || ff <= 0.0 {
-            return Explained { misfit, cost: f64::INFINITY, latent: response_n, latent_variance: 0.0 };
         }
-        let (free_n, sd_n) = (fd / ff, ff.sqrt().recip());
-        let part = normal_between((least_n - free_n) / sd_n, (hardest_n - free_n) / sd_n);
-        // The misfit was taken at φ within the bounds; the integral is relative to the free one.
-        let with_expected = misfit + (response_n - expected_n).powi(2) * precision;
-        let free_misfit = with_expected - (response_n - free_n).powi(2) * ff;
+        let prior = &self.locator.force_prior;
+        let response_n = (0..STEPS).fold(latent, |response_n, _| {
+            let Weighed { fd, ff, .. } = self.weighed(response_n);
+            prior.estimate_n(fd, ff)
+        });
+        let Weighed { dd, fd, ff, log_determinant } = self.weighed(response_n);
+        let ForceIntegral { cost, mean_n, variance_n2 } = prior.integrate(fd, ff);
         Explained {
-            misfit,
-            cost: free_misfit + weighed.log_determinant - 2.0 * (part.ln_share + sd_n.ln()) + margin,
-            latent: free_n + sd_n * part.mean,
-            latent_variance: part.variance * sd_n * sd_n,
+            misfit: (dd + response_n * (response_n * ff - 2.0 * fd)).max(0.0),
+            cost: dd + cost + log_determinant + margin,
+            latent: mean_n,
+            latent_variance: variance_n2,
         }
     }
 

@@ -32,6 +32,7 @@ mod drift;
 mod edges;
 mod ends;
 mod few;
+mod force_range;
 mod noise;
 mod one_weight;
 mod scatter;

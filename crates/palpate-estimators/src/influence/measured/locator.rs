@@ -376,7 +376,7 @@ impl Seen<'_> {
             let times = |slopes: &Lanes, factor: f64| slopes.map(|slope| factor * slope);
             (self.weights[g], residual, [times(along, scale), times(across, scale), times(mean, noise.gain)])
         }));
-        equations.with_expected(latent, [0.0, 1.0])
+        equations.with_prior([latent, 1.0])
     }
 
     /// Nodes of the nuisance coordinate.

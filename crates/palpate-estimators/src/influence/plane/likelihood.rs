@@ -5,10 +5,12 @@
 use super::locator::PlaneLocator;
 use super::search::Search;
 use crate::fit::Locate;
+use crate::force_prior::ForceRange;
 use crate::influence::config::ForceBelief;
 use crate::likelihood::{
     CalibrationVariance, ContactFit, Geometry, Likelihood, Linearisation, PlaneLikelihood,
 };
+use crate::untouched_drift::UntouchedDrift;
 use crate::untouched_scatter::UntouchedScatter;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
@@ -22,19 +24,31 @@ pub struct PlateLikelihood {
     /// The locator's, without what is believed of an unknown force: that is told once, and not with every reading.
     search: Search,
     untouched_scatter: Option<UntouchedScatter>,
+    untouched_drift: Option<UntouchedDrift>,
 }
 
 impl PlateLikelihood {
     /// The likelihood of the channels that a locator does not leave out.
     pub fn new(locator: &PlaneLocator) -> Self {
         let force = locator.force().known_n().map_or(ForceBelief::Unknown, ForceBelief::Known);
-        Self { locator: locator.clone(), search: locator.search_with(force), untouched_scatter: None }
+        Self {
+            locator: locator.clone(),
+            search: locator.search_with(force),
+            untouched_scatter: None,
+            untouched_drift: None,
+        }
     }
 
     /// The same, by which readings within a scatter are residue of a touch.
     #[must_use]
     pub fn with_untouched_scatter(self, untouched_scatter: Option<UntouchedScatter>) -> Self {
         Self { untouched_scatter, ..self }
+    }
+
+    /// The likelihood of a surface whose untouched rows drift.
+    #[must_use]
+    pub fn with_untouched_drift(self, untouched_drift: Option<UntouchedDrift>) -> Self {
+        Self { untouched_drift, ..self }
     }
 }
 
@@ -108,6 +122,10 @@ impl Likelihood for PlateLikelihood {
         self.untouched_scatter.as_ref().is_some_and(|scatter| scatter.contains(reading))
     }
 
+    fn untouched_drift(&self) -> Option<&UntouchedDrift> {
+        self.untouched_drift.as_ref()
+    }
+
     fn extent(&self) -> Extent {
         let [length_m, width_m] = self.search.size_m;
         Extent::plane(length_m, width_m).expect("a table is longer and wider than 0")
@@ -115,6 +133,10 @@ impl Likelihood for PlateLikelihood {
 
     fn known_force_n(&self) -> Option<f64> {
         self.search.force.known_n()
+    }
+
+    fn force_range(&self) -> Option<ForceRange> {
+        self.known_force_n().is_none().then(|| self.locator.channels().force_range())?
     }
 
     fn most_contacts(&self) -> usize {

@@ -51,6 +51,11 @@ impl PlaneLocator {
         InfluencesAtNodes::of_table(positions, channels, [&table.values, &table.variances])
     }
 
+    /// Offsets, noise, and which channels are left out.
+    pub(super) fn channels(&self) -> &Channels {
+        &self.stored.channels
+    }
+
     /// Knowledge of the force.
     pub fn force(&self) -> ForceBelief {
         self.stored.force

@@ -1,5 +1,6 @@
 //! Presses of one weight, or nearly one, and touches whose force nobody knows.
 
+use super::super::force_prior::PressForces;
 use super::*;
 use crate::recording::is_same_force;
 use palpate_numerics::normal_interval_95;
@@ -69,23 +70,18 @@ fn presses_of_nearly_one_weight_leave_the_force_as_open() {
 }
 
 #[test]
-fn the_force_prior_follows_the_spread_of_the_presses() {
-    let prior_of = |forces_n: &[f64]| {
+fn presses_of_nearly_one_weight_leave_the_force_open_over_a_decade() {
+    let range_of = |forces_n: &[f64]| {
         let mut bench = Bench::strip(11, 9, 9);
         bench.presses = forces_n.iter().map(|force_n| bench.row(Position::along(0.1), *force_n)).collect();
         let recording = bench.recording();
         let presses = Presses::of_recording(&bench.setup(), &recording, Repeats::All, &[]).unwrap();
-        super::super::force_prior::ForcePrior::of_presses(&presses, &Prior::smooth(bench.extent, &presses))
+        PressForces::new(&presses, &Prior::smooth(bench.extent, &presses), None).range.unwrap().ends_n()
     };
     for weight_n in [98.1, 0.1 + 0.2, 1e-3, 196.2, 250.0, 500.0, 1000.0] {
-        assert!(is_same_force(prior_of(&[weight_n; 9]).sd_n, weight_n), "{weight_n}");
+        let (least_n, greatest_n) = range_of(&[weight_n; 9]);
+        assert!(is_same_force(10.0 * least_n, weight_n) && is_same_force(greatest_n, 10.0 * weight_n));
     }
-    // Rounded alike.
-    assert!(is_same_force(prior_of(&[98.1, 9.81 * 10.0, 98.1]).sd_n, 98.1));
-    let nearly = prior_of(&[490.0, 510.0]).sd_n;
-    assert!((400.0..500.0).contains(&nearly), "{nearly}");
-    let varied_n = [0.5, 2.0, 3.5, 5.0];
-    let (_, variance_n2) = palpate_numerics::mean_and_variance(varied_n.into_iter());
-    let varied = prior_of(&varied_n);
-    assert!((varied.sd_n - variance_n2.sqrt()).abs() < 1e-9, "{varied:?}");
+    assert_eq!(range_of(&[490.0, 510.0]), (50.0, 5000.0));
+    assert_eq!(range_of(&[0.0, 0.5, 2.0, 3.5, 4.0]), (0.25, 25.0));
 }

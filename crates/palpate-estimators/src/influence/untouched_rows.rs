@@ -1,0 +1,132 @@
+//! Offsets of a surface with a model by the untouched rows of its recording.
+//!
+//! Where the untouched rows show no drift, their mean is the offset of every row. Where they drift, the offset of a row is interpolated in time between the
+//! means of the rests before and after it. With the weights a and b of two rests of n and m rows, a reading less that offset has the variance
+//! σ²·(1 + a²/n + b²/m) of noise of variance σ².
+
+use crate::offset_course::OffsetCourse;
+use crate::recording::{Recording, Row};
+use crate::untouched_drift::UntouchedDrift;
+use palpate_numerics::mean;
+
+/// Untouched rows of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct UntouchedRows {
+    /// Mean reading of each channel.
+    pub mean: Vec<f64>,
+    /// Number of rows.
+    pub count: f64,
+    /// Sum of squared deviations of each channel from the mean of its rest, or of all rows where these do not drift.
+    pub scatter: Vec<f64>,
+    /// Degrees of freedom of the scatter.
+    pub freedom: f64,
+    /// Time and mean of each rest, with its number of rows, where the rows drift; empty where they do not.
+    rests: Vec<Rest>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Rest {
+    time: f64,
+    mean: Vec<f64>,
+    count: f64,
+}
+
+/// Offset of a row: of each channel, with its variance over that of the noise.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct RowOffset {
+    pub values: Vec<f64>,
+    pub relative_variance: f64,
+}
+
+impl UntouchedRows {
+    /// Those of a recording; `None` where nothing but presses was recorded.
+    pub fn of_recording(recording: &Recording) -> Option<Self> {
+        let mean = recording.untouched_mean()?;
+        let rests = recording.rests();
+        let drifts = UntouchedDrift::of_recording(recording).is_some();
+        let times = times(recording);
+        let rest = |rows: &Vec<usize>| Rest {
+            time: self::mean(rows.iter().map(|row| times[*row])),
+            mean: (0..recording.channels.len()).map(|c| column_mean(recording, rows, c)).collect(),
+            count: rows.len() as f64,
+        };
+        let all: Vec<Vec<usize>> = if drifts { rests.clone() } else { vec![rests.concat()] };
+        let scatter = |c: usize| -> f64 {
+            let of_group = |rows: &Vec<usize>| -> f64 {
+                let mean = column_mean(recording, rows, c);
+                rows.iter().map(|row| (recording.rows[*row].reading[c] - mean).powi(2)).sum()
+            };
+            all.iter().map(of_group).sum()
+        };
+        let count: usize = rests.iter().map(Vec::len).sum();
+        Some(Self {
+            scatter: (0..recording.channels.len()).map(scatter).collect(),
+            freedom: (count - all.len()) as f64,
+            count: count as f64,
+            rests: if drifts { rests.iter().map(rest).collect() } else { Vec::new() },
+            mean,
+        })
+    }
+
+    /// True where the offsets of rows differ.
+    pub fn drifts(&self) -> bool {
+        !self.rests.is_empty()
+    }
+
+    /// The offset of a row, by its time in the recording.
+    pub fn offset_at(&self, time: f64) -> RowOffset {
+        let after = self.rests.partition_point(|rest| rest.time <= time);
+        let of_rest =
+            |rest: &Rest| RowOffset { values: rest.mean.clone(), relative_variance: rest.count.recip() };
+        match (after.checked_sub(1).and_then(|i| self.rests.get(i)), self.rests.get(after)) {
+            (None, None) => RowOffset { values: self.mean.clone(), relative_variance: self.count.recip() },
+            (Some(only), None) | (None, Some(only)) => of_rest(only),
+            (Some(before), Some(after)) => {
+                let b = (time - before.time) / (after.time - before.time);
+                let a = 1.0 - b;
+                let pairs = before.mean.iter().zip(&after.mean);
+                RowOffset {
+                    values: pairs.map(|(before, after)| a * before + b * after).collect(),
+                    relative_variance: a * a / before.count + b * b / after.count,
+                }
+            }
+        }
+    }
+
+    /// The rows of a recording in which something touched, less their offsets, each with the variance of its reading over that of the noise.
+    ///
+    /// One mean of all untouched rows errs alike in all rows, and is left to the learning: its variance is not counted in the rows.
+    pub fn tared_presses(&self, recording: &Recording) -> Vec<(Row, f64)> {
+        let times = times(recording);
+        let rows = recording.rows.iter().zip(times).filter(|(row, _)| row.touches());
+        rows.map(|(row, time)| {
+            let RowOffset { values, relative_variance } = self.offset_at(time);
+            let mut row = row.clone();
+            row.reading.iter_mut().zip(values).for_each(|(value, offset)| *value -= offset);
+            (row, 1.0 + if self.drifts() { relative_variance } else { 0.0 })
+        })
+        .collect()
+    }
+}
+
+/// Offsets at the rows of `asked` by the untouched rows of a recording; `None` where these show no drift, or rows have no times.
+pub(super) fn offset_course(recording: &Recording, asked: &Recording) -> Option<OffsetCourse> {
+    let untouched = UntouchedRows::of_recording(recording).filter(UntouchedRows::drifts)?;
+    recording.times_s()?;
+    let at_rows: Vec<Vec<f64>> =
+        asked.times_s()?.into_iter().map(|time_s| untouched.offset_at(time_s).values).collect();
+    let column = |c: usize| at_rows.iter().map(|values| values[c]).collect();
+    Some(OffsetCourse {
+        at_rows: (0..untouched.mean.len()).map(|c| Some(column(c))).collect(),
+        means: untouched.mean.iter().copied().map(Some).collect(),
+    })
+}
+
+/// Time of each row in seconds, or its number where rows have no times.
+fn times(recording: &Recording) -> Vec<f64> {
+    recording.times_s().unwrap_or_else(|| (0..recording.rows.len()).map(|row| row as f64).collect())
+}
+
+fn column_mean(recording: &Recording, rows: &[usize], channel: usize) -> f64 {
+    mean(rows.iter().map(|row| recording.rows[*row].reading[channel]))
+}
