@@ -1,4 +1,19 @@
 use super::*;
+use palpate_numerics::NORMAL_99;
+
+fn log_normal(least_n: f64, greatest_n: f64) -> ForcePrior {
+    ForcePrior::LogNormal(LogNormalPrior::new(least_n, greatest_n))
+}
+
+/// The likelihood exp(b·W − ½·a·W²).
+fn likelihood(b: f64, a: f64) -> ForceLikelihood {
+    ForceLikelihood { b, a, at_n: 0.0, misfit: 0.0 }
+}
+
+/// −2·ln of the integral.
+fn cost(integral: ForceIntegral) -> f64 {
+    integral.peak_cost + integral.width_cost
+}
 
 /// Integral, mean and variance by small steps of ln W.
 fn by_small_steps(range: (f64, f64), b: f64, a: f64) -> [f64; 3] {
@@ -25,10 +40,10 @@ fn by_small_steps(range: (f64, f64), b: f64, a: f64) -> [f64; 3] {
 #[test]
 fn integrals_are_those_of_small_steps() {
     for range in [(0.05, 50.0), (0.5, 10.0), (2.0, 3.0), (1e-3, 1e3)] {
-        let prior = ForcePrior::log_normal(range.0, range.1);
+        let prior = log_normal(range.0, range.1);
         let (low, high): (f64, f64) = range;
         // Costs count from that of a likelihood that says nothing.
-        let constant = prior.integrate(0.0, 0.0).cost - by_small_steps(range, 0.0, 0.0)[0];
+        let constant = cost(prior.integrate(likelihood(0.0, 0.0))) - by_small_steps(range, 0.0, 0.0)[0];
         for share in [-1.0, 0.2, 0.5, 0.8, 0.99] {
             let force_n = if share < 0.0 { -low } else { low * (high / low).powf(share) };
             for z in [0.1, 1.0, 3.0, 5.5, 7.0, 20.0, 100.0] {
@@ -37,11 +52,11 @@ fn integrals_are_those_of_small_steps() {
                     continue;
                 }
                 let a = (z / force_n).powi(2);
-                let [cost, mean_n, variance_n2] = by_small_steps(range, a * force_n, a);
-                let found = prior.integrate(a * force_n, a);
+                let [expected, mean_n, variance_n2] = by_small_steps(range, a * force_n, a);
+                let found = prior.integrate(likelihood(a * force_n, a));
                 let context =
-                    format!("{range:?}, {force_n} N, z = {z}: {found:?}, {cost} {mean_n} {variance_n2}");
-                assert!((found.cost - constant - cost).abs() < 0.15, "{context}");
+                    format!("{range:?}, {force_n} N, z = {z}: {found:?}, {expected} {mean_n} {variance_n2}");
+                assert!((cost(found) - constant - expected).abs() < 0.15, "{context}");
                 assert!((found.mean_n - mean_n).abs() < 0.05 * variance_n2.sqrt(), "{context}");
                 assert!((found.variance_n2 / variance_n2 - 1.0).abs() < 0.1, "{context}");
             }
@@ -51,13 +66,13 @@ fn integrals_are_those_of_small_steps() {
 
 #[test]
 fn no_force_is_negative_or_greater_than_the_upper_end() {
-    let normal = ForcePrior::Normal { mean_n: 3.0, precision: 0.25, greatest_n: 15.0 };
-    for prior in [ForcePrior::log_normal(0.5, 10.0), ForcePrior::log_normal(1e-300, 1e300), normal] {
+    let normal = ForcePrior::Normal(NormalPrior { mean_n: 3.0, precision: 0.25, greatest_n: 15.0 });
+    for prior in [log_normal(0.5, 10.0), log_normal(1e-300, 1e300), normal] {
         let (_, most_n) = prior.ends_n();
         for force_n in [-1e9, -1.0, 0.0, 1e-12, 1.0, 9.9, 10.1, 1e3, 1e12] {
             for a in [0.0, 1e-12, 1e-3, 1.0, 1e6, 1e18] {
-                let found = prior.integrate(a * force_n, a);
-                assert!(!found.cost.is_nan() && found.variance_n2 >= 0.0, "{force_n} N, {a}: {found:?}");
+                let found = prior.integrate(likelihood(a * force_n, a));
+                assert!(!cost(found).is_nan() && found.variance_n2 >= 0.0, "{force_n} N, {a}: {found:?}");
                 let is_possible = found.mean_n >= 0.0 && found.mean_n <= most_n * (1.0 + 1e-12);
                 assert!(is_possible, "{prior:?}, {force_n} N, {a}: {found:?}");
                 assert!((0.0..=most_n).contains(&prior.estimate_n(a * force_n, a)), "{force_n} N, {a}");
@@ -68,7 +83,7 @@ fn no_force_is_negative_or_greater_than_the_upper_end() {
 
 #[test]
 fn a_likelihood_that_says_nothing_leaves_the_prior() {
-    let found = ForcePrior::log_normal(0.5, 10.0).integrate(0.0, 0.0);
+    let found = log_normal(0.5, 10.0).integrate(likelihood(0.0, 0.0));
     let [_, mean_n, variance_n2] = by_small_steps((0.5, 10.0), 0.0, 0.0);
     assert!((found.mean_n / mean_n - 1.0).abs() < 0.01, "{found:?} beside {mean_n}");
     assert!((found.variance_n2 / variance_n2 - 1.0).abs() < 0.02, "{found:?} beside {variance_n2}");

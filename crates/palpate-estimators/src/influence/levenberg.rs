@@ -1,6 +1,7 @@
 //! Levenberg's steps down the misfit of a contact (K. Levenberg, Quart. Appl. Math. 2, 1944, with Marquardt's scaling by the diagonal).
 
 use super::lanes::{LANES, Lanes, sum_of};
+use crate::force_prior::PriorTerms;
 use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
 use palpate_numerics::small::{Ldl, Matrix};
 use palpate_numerics::with_shared_error;
@@ -47,11 +48,11 @@ impl Equations {
         self
     }
 
-    /// With a prior of the last unknown, −2·ln of its density being the square of a residual: by the residual and its slope.
-    pub fn with_prior(mut self, [residual, slope]: [f64; 2]) -> Self {
-        self.misfit += residual * residual;
-        self.right[2] -= residual * slope;
-        self.information[2][2] += slope * slope;
+    /// With a prior of the last unknown.
+    pub fn with_prior(mut self, PriorTerms { cost, slope, precision }: PriorTerms) -> Self {
+        self.misfit += cost;
+        self.right[2] -= slope;
+        self.information[2][2] += precision;
         self
     }
 }

@@ -13,7 +13,7 @@ use super::bank::{
 };
 use super::belief::{Belief, Observation};
 use super::gaussian::Gaussian;
-use crate::force_prior::ForcePrior;
+use crate::force_prior::{ForcePrior, PriorTerms};
 use crate::likelihood::{ContactFit, LineLikelihood, PlaneLikelihood};
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::{Contact, Position};
@@ -74,8 +74,8 @@ impl<L: ?Sized> BirthModel<'_, L> {
         let [force_n, variance_n2, density] = match self.force_prior {
             Some(force_prior) if known_n.is_none() => {
                 let force_n = force_n.min(force_prior.ends_n().1);
-                let [residual, slope] = force_prior.residual(force_n);
-                [force_n, slope.powi(-2), (-0.5 * residual * residual).exp()]
+                let PriorTerms { cost, precision, .. } = force_prior.terms(force_n);
+                [force_n, precision.recip(), (-0.5 * cost).exp()]
             }
             _ => [force_n, 0.0, 1.0],
         };

@@ -1,13 +1,14 @@
 //! The locator of a force-linear surface: the posterior of a reading over a grid of places, the force integrated in closed form
 //! ([`super::seen`]).
 
+use super::broad_scan::{BroadScan, ChannelAtPlace};
 use super::drift::DriftCourse;
 use super::posterior::Functions;
 use super::prior::{Prior, Source};
 use super::scan::Scan;
 use super::shared_errors::own_shares;
 use crate::fit::{Locate, LocatorFault, NoCheck};
-use crate::force_prior::{ForcePrior, ForceRange};
+use crate::force_prior::{ForcePrior, ForceRange, LogNormalPrior, NormalPrior};
 use crate::influence::at_nodes::InfluencesAtNodes;
 use crate::influence::config::Structure;
 use crate::influence::grid::{Axis, check_axes, greatest_distances};
@@ -92,7 +93,7 @@ pub(super) struct Stored {
     /// Mean and standard deviation of φ of the presses, in newtons.
     pub mean_force_n: f64,
     pub force_sd_n: f64,
-    /// φ up to which the [`Scan`] bounds costs as they are, in newtons; the hardest contact where there is no range.
+    /// φ of the hardest contact, in newtons, where there is no range.
     pub hardest_n: f64,
     /// Range of the forces of contacts; `None` where these are expected to be as hard as the presses, as in files without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -148,7 +149,7 @@ pub struct ForceLinearLocator {
     /// Loadings on errors that all channels share, u; nothing where they share none.
     pub(super) shared: Vec<Lanes>,
     /// Bounds of what each place costs a reading.
-    pub(super) scan: Scan,
+    pub(super) scan: CellScan,
     /// Greatest distance of the influences of each place from those of its neighbours along and across, per newton and over the noise.
     pub(super) lengths: Vec<[f64; 2]>,
     /// The largest square of a relative reading of noise alone.
@@ -166,6 +167,15 @@ pub struct Scatter {
     pub force_n: f64,
     /// Number of each channel in use, from 0, with the standard deviation of its scatter under this force, in its unit.
     pub sd: Vec<(usize, f64)>,
+}
+
+/// Costs of the cells of the grid, about, by which minima are searched.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum CellScan {
+    /// Bounds by the variances of the hardest φ.
+    Bounded(Scan),
+    /// By the variances of each place's own φ.
+    Broad(BroadScan),
 }
 
 /// Without a range contacts are expected to have forces that spread this many times as far as those of the presses.
@@ -187,7 +197,7 @@ impl Stored {
             open: in_lanes(&self.functions.offset_variances),
             own: in_lanes(&self.own_shares()),
             shared: in_lanes(&self.shared_errors),
-            scan: Scan::default(),
+            scan: CellScan::Bounded(Scan::default()),
             lengths: Vec::new(),
             noise_bound: 0.0,
             detection_bound: 0.0,
@@ -205,13 +215,15 @@ impl Stored {
         match self.force_range {
             Some(range) => {
                 let (least_n, greatest_n) = range.ends_n();
-                ForcePrior::log_normal(self.prior.response_n(least_n), self.prior.response_n(greatest_n))
+                let [least_n, greatest_n] =
+                    [least_n, greatest_n].map(|force_n| self.prior.response_n(force_n));
+                ForcePrior::LogNormal(LogNormalPrior::new(least_n, greatest_n))
             }
-            None => ForcePrior::Normal {
+            None => ForcePrior::Normal(NormalPrior {
                 mean_n: self.mean_force_n,
                 precision: (FORCE_SPREAD * self.force_sd_n).powi(-2),
                 greatest_n: self.hardest_n,
-            },
+            }),
         }
     }
 
@@ -502,24 +514,44 @@ impl ForceLinearLocator {
         self.lengths = (0..self.places()).map(distances).collect();
     }
 
-    fn new_scan(&self) -> Scan {
+    fn new_scan(&self) -> CellScan {
         let live = self.stored.live.len();
         let own = self.stored.own_shares();
+        let as_one = self.stored.channels_as_one;
         // The greatest eigenvalue of the errors' correlation is no more than this.
         let together = 1.0 + self.stored.shared_errors.iter().map(|loading| loading * loading).sum::<f64>();
-        let expected = self.force_prior.normal_part();
-        Scan::new(self.places(), live, expected, self.known_response_n(), |place, c| {
+        let channel = |place: usize, c: usize| {
             let Place { values, variances, covariances } = self.place(place);
             let open = self.stored.functions.offset_variances[c];
             let noise = self.noise() * self.noise_at(self.node(place));
             let (v, beta) = (variances[c], covariances[c]);
-            let hardest_n = self.known_response_n().unwrap_or(self.stored.hardest_n);
-            let hardest = noise + together * (open + hardest_n * (2.0 * beta + hardest_n * v)).max(0.0);
             let told = if v > 0.0 { beta * beta / v } else { 0.0 };
-            let as_one = self.stored.channels_as_one;
             let least = (noise + own[c] * (open - told).max(0.0)).powf(as_one.recip());
-            (values[c], [least, as_one * hardest.max(noise + together * open)])
-        })
+            ChannelAtPlace { f: values[c], noise, open, beta, v, least }
+        };
+        let bounded = |expected: [f64; 2], hardest_n: f64| {
+            CellScan::Bounded(Scan::new(
+                self.places(),
+                live,
+                expected,
+                self.known_response_n(),
+                |place, c| {
+                    let ChannelAtPlace { f, noise, open, beta, v, least } = channel(place, c);
+                    let hardest =
+                        noise + together * (open + hardest_n * (2.0 * beta + hardest_n * v)).max(0.0);
+                    (f, [least, as_one * hardest.max(noise + together * open)])
+                },
+            ))
+        };
+        match (self.known_response_n(), &self.force_prior) {
+            (Some(known_n), _) => bounded([0.0; 2], known_n),
+            (None, ForcePrior::Normal(prior)) => bounded([prior.mean_n, prior.precision], prior.greatest_n),
+            (None, ForcePrior::LogNormal(prior)) => {
+                CellScan::Broad(BroadScan::new(self.places(), live, prior.clone(), |place, c| {
+                    channel(place, c).scaled(as_one, as_one * together)
+                }))
+            }
+        }
     }
 
     /// Places of the grid.

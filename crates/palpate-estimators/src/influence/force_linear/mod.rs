@@ -4,6 +4,7 @@
 //! Learnt from the presses ([`learning`]) and inverted over a grid of places ([`locator`]).
 
 mod beyond_presses;
+mod broad_scan;
 mod condensed;
 mod drift;
 mod drift_fit;

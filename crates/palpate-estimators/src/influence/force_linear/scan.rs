@@ -56,9 +56,7 @@ impl Scan {
                 log_determinant += least.ln();
             }
             scan.squares[block][lane] = square.max(f64::MIN_POSITIVE);
-            // The width of a log-normal prior is that of ln φ, which the signal alone tells.
-            let is_normal = known.is_none() && expected[1] > 0.0;
-            let width = if is_normal { scan.squares[block][lane].ln() } else { 0.0 };
+            let width = if known.is_some() { 0.0 } else { scan.squares[block][lane].ln() };
             scan.constants[block][lane] = log_determinant + width;
         }
         scan
@@ -83,9 +81,9 @@ impl CellBlocks for Scan {
             fd = V::load(products).mul_add(V::splat(*d), fd);
         }
         let ff = V::load(&self.squares[block]);
+        let response = self.known.map_or(fd / ff, V::splat);
         let zero = V::splat(0.0);
-        let response = self.known.map_or((fd / ff).max(zero), V::splat);
         let misfit = (dd + response * (response * ff - (fd + fd))).max(zero);
-        [misfit, misfit + V::load(&self.constants[block]), response]
+        [misfit, misfit + V::load(&self.constants[block]), response.max(zero)]
     }
 }

@@ -12,8 +12,8 @@
 //! is large, everything would explain a reading otherwise. From few presses ln p is divided by a number of channels whose errors count as
 //! those of one.
 
-use super::locator::{COVARIANCES, ForceLinearLocator, LAYERS, Stored, VALUES, VARIANCES};
-use crate::force_prior::ForceIntegral;
+use super::locator::{COVARIANCES, CellScan, ForceLinearLocator, LAYERS, Stored, VALUES, VARIANCES};
+use crate::force_prior::{ForceIntegral, ForceLikelihood};
 use crate::influence::grid::Axis;
 use crate::influence::inversion::{
     Cells, Explain, Explained, Inversion, Limits, Look, Slopes, ToldForce, look_at_cells,
@@ -234,25 +234,11 @@ impl Explain for Seen<'_> {
     }
 
     fn scan(&self, looks: &mut Vec<Look>) {
-        let ForceLinearLocator { scan, stored, force_prior, .. } = self.locator;
-        let live = stored.live.len();
-        look_at_cells(scan, &self.reading, live, looks);
-        if self.range().is_none() {
-            return;
+        let live = self.locator.stored.live.len();
+        match &self.locator.scan {
+            CellScan::Bounded(scan) => look_at_cells(scan, &self.reading, live, looks),
+            CellScan::Broad(scan) => look_at_cells(scan, &self.reading, live, looks),
         }
-        let Some(mut best) = looks.iter().copied().min_by(|a, b| a.cost.total_cmp(&b.cost)) else { return };
-        let scale = stored.hardest_n / best.latent;
-        if scale < 1.0 {
-            // The bounds hold for φ up to the hardest. With variances noise + φ²·v, the misfit of a reading of a greater φ is at least that of the
-            // reading brought to the hardest, as the noise grows with φ there.
-            let scaled: Vec<Lanes> = self.reading.iter().map(|lanes| lanes.map(|d| scale * d)).collect();
-            look_at_cells(scan, &scaled, live, looks);
-            looks.iter_mut().for_each(|look| look.latent /= scale);
-            best = looks.iter().copied().min_by(|a, b| a.cost.total_cmp(&b.cost)).unwrap_or(best);
-        }
-        let square: f64 = self.reading.as_flattened().iter().map(|d| d * d).sum();
-        let signal = force_prior.signal_cost(square - best.misfit);
-        looks.iter_mut().for_each(|look| look.cost += signal);
     }
 
     /// Of few presses variances change too much from place to place.
@@ -302,7 +288,7 @@ impl Explain for Seen<'_> {
             equations = equations.with_shared_errors(errors);
         }
         match self.range() {
-            Some(_) => equations.with_prior(force_prior.residual(response_n)),
+            Some(_) => equations.with_prior(force_prior.terms(response_n)),
             None => equations,
         }
     }
@@ -350,10 +336,12 @@ impl Explain for Seen<'_> {
             prior.estimate_n(fd, ff)
         });
         let Weighed { dd, fd, ff, log_determinant } = self.weighed(response_n);
-        let ForceIntegral { cost, mean_n, variance_n2 } = prior.integrate(fd, ff);
+        let misfit = (dd + response_n * (response_n * ff - 2.0 * fd)).max(0.0);
+        let likelihood = ForceLikelihood { b: fd, a: ff, at_n: response_n, misfit };
+        let ForceIntegral { peak_cost, width_cost, mean_n, variance_n2 } = prior.integrate(likelihood);
         Explained {
-            misfit: (dd + response_n * (response_n * ff - 2.0 * fd)).max(0.0),
-            cost: dd + cost + log_determinant + margin,
+            misfit,
+            cost: peak_cost + log_determinant + width_cost + margin,
             latent: mean_n,
             latent_variance: variance_n2,
         }

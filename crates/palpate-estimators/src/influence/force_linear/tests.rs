@@ -802,3 +802,69 @@ fn influences_at_the_nodes_are_those_of_the_strip_within_their_deviations() {
     assert!((0.85..=1.0).contains(&within), "{within} of {}", off.len());
     assert!(off.iter().any(|off| off.abs() > 0.5), "deviations are far too large");
 }
+
+#[test]
+fn zz_debug() {
+    use crate::influence::inversion::Explain;
+    let mut precise = Bench::strip(10, 60, 15);
+    for row in &mut precise.presses {
+        let clean = (precise.influences)(row.position);
+        let force_n = row.force_n.unwrap();
+        row.reading = clean.iter().zip(&precise.offsets).map(|(f, offset)| offset + force_n * f).collect();
+    }
+    let locator = precise.fit(Structure::ForceLinear).unwrap();
+    eprintln!(
+        "prior {:?} noise sd {:?} axes {:?}",
+        locator.force_prior.ends_n(),
+        locator.channels().map(|(_, _, n)| n).collect::<Vec<_>>(),
+        locator.stored.x
+    );
+    eprintln!(
+        "hardest {} limit {} as_one {} shared {:?}",
+        locator.stored.hardest_n,
+        locator.stored.residual_limit,
+        locator.stored.channels_as_one,
+        locator.shared.len()
+    );
+    for row in precise.presses.clone() {
+        let (found, all) = (locator.locate(&row.reading), locator.summed_everywhere(&row.reading, 40));
+        let all400 = locator.summed_everywhere(&row.reading, 400);
+        let sd_m = all.uncertainty.unwrap().covariance[0].sqrt();
+        let apart_m = found.contact.position.distance_m(all.position);
+        if apart_m < 0.1 * sd_m + 5e-5 {
+            continue;
+        }
+        eprintln!(
+            "press {:?} {:?}: found {:?} {:?} sd {} F {:?} x95 {:?}; all {:?} sd {} F {:?}; all400 {:?}",
+            row.position.x_m,
+            row.force_n,
+            found.status,
+            found.contact.position.x_m,
+            found.contact.uncertainty.unwrap().covariance[0].sqrt(),
+            found.contact.force_n,
+            found.contact.uncertainty.unwrap().x_95_m,
+            all.position.x_m,
+            sd_m,
+            all.force_n,
+            all400.position.x_m
+        );
+        let mut seen = locator.seen(&locator.relative(&row.reading));
+        let x = locator.stored.x;
+        for mm10 in 2780..2830 {
+            let at = f64::from(mm10) * 1e-4;
+            let node = (at - x.value(0.0)) / (x.value(1.0) - x.value(0.0));
+            let mut line = format!("{at:.4}");
+            for latent in [0.5, 1.0, row.force_n.unwrap(), 5.0, 20.0] {
+                let e = seen.explain([node, 0.0], latent);
+                line += &format!(
+                    "  | {:.2} {:.2} {:.4} {:.4}",
+                    e.misfit,
+                    e.cost,
+                    e.latent,
+                    e.latent_variance.sqrt()
+                );
+            }
+            eprintln!("{line}");
+        }
+    }
+}

@@ -6,6 +6,7 @@ use super::line::{Line, Marginal, Stretch, WhiteNoise};
 use super::scan::Scan;
 use super::table::Table;
 use crate::fit::{Locate, LocatorFault, NoCheck};
+use crate::force_prior::PriorTerms;
 use crate::influence::grid::{Axis, check_axes, greatest_distances, middle};
 use crate::influence::inversion::{
     Cells, Explain, Explained, Inversion, Layers, Limits, Look, Slopes, Stencil, ToldForce, look_at_cells,
@@ -376,7 +377,7 @@ impl Seen<'_> {
             let times = |slopes: &Lanes, factor: f64| slopes.map(|slope| factor * slope);
             (self.weights[g], residual, [times(along, scale), times(across, scale), times(mean, noise.gain)])
         }));
-        equations.with_prior([latent, 1.0])
+        equations.with_prior(PriorTerms { cost: latent * latent, slope: latent, precision: 1.0 })
     }
 
     /// Nodes of the nuisance coordinate.

@@ -1,7 +1,7 @@
 //! Touches much lighter and much harder than the presses, and ranges of forces that the rig states.
 
 use super::*;
-use crate::force_prior::ForceRange;
+use crate::force_prior::{ForcePrior, ForceRange};
 
 const FLOOR_M: [f64; 2] = [1.2, 0.8];
 /// Counts per newton of a load cell, as its data sheet states them.
@@ -120,7 +120,7 @@ fn locators_of_files_without_a_range_keep_the_forces_of_the_presses() {
     assert!(file.as_object_mut().unwrap().remove("force_range").is_some());
     let older: ForceLinearLocator = serde_json::from_value(file).unwrap();
     let mean_n = mean(bench.presses.iter().map(|row| row.force_n.unwrap()));
-    let [found_n, _] = older.force_prior.normal_part();
-    assert!((found_n / mean_n - 1.0).abs() < 1e-9, "{found_n} beside {mean_n}");
-    assert!(older.force_prior.ends_n().1 < 16.0, "{:?}", older.force_prior.ends_n());
+    let ForcePrior::Normal(prior) = &older.force_prior else { panic!("{:?}", older.force_prior) };
+    assert!((prior.mean_n / mean_n - 1.0).abs() < 1e-9, "{prior:?} beside {mean_n}");
+    assert!(prior.greatest_n < 16.0, "{prior:?}");
 }

@@ -1,0 +1,136 @@
+//! Costs of places, about, where the prior of the force is log-normal: forces reach over decades, and variances with them.
+//!
+//! Variances grow with φ, so bounds by the variances of the hardest φ say little of light touches, and nothing of harder ones. The least-squares φ of a
+//! place hardly depends on the variances, however: with the variances of no force, where noise weighs the channels, and with those of the greatest,
+//! where the calibration does. The greater of the two φ gives the variances of the place.
+//!
+//! The prior's width is that of ln φ: beside it the likelihood of the signal-to-noise ratio z costs ln(1 + s²·z²).
+
+use crate::force_prior::LogNormalPrior;
+use crate::influence::inversion::CellBlocks;
+use crate::influence::lanes::{LANES, Lanes};
+use palpate_numerics::simd::Eight;
+
+/// Influences and variances of every place, in blocks of eight.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct BroadScan {
+    prior: LogNormalPrior,
+    places: usize,
+    channels: usize,
+    /// Channel by channel.
+    terms: Vec<Terms>,
+    /// The least of the determinant, −2·ln.
+    constants: Vec<Lanes>,
+}
+
+/// A channel at a place: f, and the variances noise + ω + φ·(2·β + φ·v) of its readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ChannelAtPlace {
+    pub f: f64,
+    pub noise: f64,
+    /// ω.
+    pub open: f64,
+    pub beta: f64,
+    pub v: f64,
+    /// The least variance for any φ.
+    pub least: f64,
+}
+
+impl ChannelAtPlace {
+    /// With greater variances: noise by one factor, those that the calibration leaves by another.
+    pub fn scaled(self, noise: f64, calibration: f64) -> Self {
+        Self {
+            noise: noise * self.noise,
+            open: calibration * self.open,
+            beta: calibration * self.beta,
+            v: calibration * self.v,
+            ..self
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Terms {
+    f: Lanes,
+    noise: Lanes,
+    open: Lanes,
+    twice_beta: Lanes,
+    v: Lanes,
+}
+
+/// Σ d²/S, Σ f·d/S and Σ f²/S.
+struct Sums<V> {
+    dd: V,
+    fd: V,
+    ff: V,
+}
+
+impl BroadScan {
+    pub fn new(
+        places: usize,
+        channels: usize,
+        prior: LogNormalPrior,
+        channel: impl Fn(usize, usize) -> ChannelAtPlace,
+    ) -> Self {
+        const NO_PLACE: Terms = Terms {
+            f: [0.0; LANES],
+            noise: [1.0; LANES],
+            open: [0.0; LANES],
+            twice_beta: [0.0; LANES],
+            v: [0.0; LANES],
+        };
+        let blocks = places.div_ceil(LANES);
+        let mut terms = vec![NO_PLACE; blocks * channels];
+        let mut constants = vec![[0.0; LANES]; blocks];
+        for place in 0..places {
+            let (block, lane) = (place / LANES, place % LANES);
+            for c in 0..channels {
+                let ChannelAtPlace { f, noise, open, beta, v, least } = channel(place, c);
+                let terms = &mut terms[block * channels + c];
+                (terms.f[lane], terms.noise[lane], terms.open[lane]) = (f, noise, open);
+                (terms.twice_beta[lane], terms.v[lane]) = (2.0 * beta, v);
+                constants[block][lane] += least.ln();
+            }
+        }
+        Self { prior, places, channels, terms, constants }
+    }
+
+    /// The sums of the places of a block, by the variances of these φ.
+    #[inline(always)] // Compiled for the instructions of its caller.
+    fn sums<V: Eight>(&self, block: usize, reading: &[f64], response: V) -> Sums<V> {
+        let zero = V::splat(0.0);
+        let mut sums = Sums { dd: zero, fd: zero, ff: V::splat(f64::MIN_POSITIVE) };
+        for (terms, d) in self.terms[block * self.channels..(block + 1) * self.channels].iter().zip(reading) {
+            let [f, noise, open, twice_beta, v] =
+                [&terms.f, &terms.noise, &terms.open, &terms.twice_beta, &terms.v].map(V::load);
+            let variance = noise + response.mul_add(response.mul_add(v, twice_beta), open).max(zero);
+            let (weight, d) = (V::splat(1.0) / variance, V::splat(*d));
+            let (weighted_d, weighted_f) = (weight * d, weight * f);
+            sums.dd = weighted_d.mul_add(d, sums.dd);
+            sums.fd = weighted_f.mul_add(d, sums.fd);
+            sums.ff = weighted_f.mul_add(f, sums.ff);
+        }
+        sums
+    }
+}
+
+impl CellBlocks for BroadScan {
+    fn cells(&self) -> usize {
+        self.places
+    }
+
+    /// The least misfit and cost of each place of a block, about, and φ there.
+    #[inline(always)]
+    fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
+        let (_, greatest_n) = self.prior.ends_n();
+        let (zero, greatest) = (V::splat(0.0), V::splat(greatest_n));
+        let response = |sums: &Sums<V>| (sums.fd / sums.ff).max(zero).min(greatest);
+        let [by_noise, by_calibration] =
+            [zero, greatest].map(|force| response(&self.sums(block, reading, force)));
+        let sums = self.sums(block, reading, by_noise.max(by_calibration));
+        let found = response(&sums);
+        let misfit = (sums.dd + found * (found * sums.ff - (sums.fd + sums.fd))).max(zero);
+        let signals = (found * found * sums.ff).to_array().map(|square| self.prior.signal_cost(square));
+        [misfit, misfit + V::load(&self.constants[block]) + V::load(&signals), found]
+    }
+}
