@@ -29,12 +29,13 @@ class Sensors(Section):
     positions : sequence, optional
         Positions, one by one, in metres or with units; on a plane pairs.
     noise, resolution, offset_error : float or str, optional
-        Standard deviation of a reading's noise, step to which it is rounded, and standard deviation of its offset; in SI units
-        of what is measured (m, rad, m/m, N; of raw channels their own), or with a unit.
+        Standard deviation of a reading's noise, step to which it is rounded, and largest offset: offsets are uniform within
+        ± this. In SI units of what is measured (m, rad, m/m, N; of raw channels their own), or with a unit.
     gain_error : float or str, optional
-        Standard deviation of the gain's error, as a share.
+        Largest error of the gain, as a share: errors are uniform within ± this.
     position_error : float or str, optional
-        Standard deviation of the distance between a sensor and where it is said to be, in metres or with a unit.
+        Largest error of a sensor's position along each side of the surface, in metres or with a unit: errors are uniform within
+        ± this.
     range : tuple, optional
         The lowest and highest reading.
     dead : sequence of int, optional

@@ -33,11 +33,11 @@ pub(crate) struct SensorsKeys {
     pub noise: Option<At<Written>>,
     /// Step to which a reading is rounded; 0 by default.
     pub resolution: Option<At<Written>>,
-    /// Standard deviation of the gain's error; 0 by default.
+    /// Largest error of the gain, errors being uniform within ± this; 0 by default.
     pub gain_error: Option<Fraction>,
-    /// Standard deviation of the offset; 0 by default.
+    /// Largest offset, offsets being uniform within ± this; 0 by default.
     pub offset_error: Option<At<Written>>,
-    /// Standard deviation of the distance between a sensor and its stated position; 0 by default.
+    /// Largest error of a sensor's position along each side of the surface, errors being uniform within ± this; 0 by default.
     pub position_error: Option<At<NotNegative<Length>>>,
     /// The lowest and highest reading; unlimited by default.
     pub range: Option<At<RangeKeys>>,

@@ -95,6 +95,57 @@ fn light_and_hard_touches_are_located_from_presses_of_one_weight() {
     }
 }
 
+/// Forces from the least to a third of the greatest that a locator expects, each at a place of a strip.
+fn touches_of_all_forces(bench: &mut Bench, locator: &ForceLinearLocator) -> Vec<(Position, f64)> {
+    const TOUCHES: usize = 20;
+    let (least_n, greatest_n) = locator.stored.force_range.unwrap().ends_n();
+    (0..TOUCHES)
+        .map(|i| {
+            let share = i as f64 / (TOUCHES - 1) as f64;
+            let at = Position::along(bench.rng.random_range(0.03..0.27));
+            (at, least_n * (greatest_n / (3.0 * least_n)).powf(share))
+        })
+        .collect()
+}
+
+#[test]
+fn estimates_of_light_and_hard_touches_are_those_of_a_plain_sum_over_the_grid() {
+    const PER_NODE: usize = 100;
+    let mut bench = Bench::strip(9, 25, 9);
+    // From presses without noise the variances of influences exceed noise many times, and grow with the square of the force.
+    let mut precise = Bench::strip(10, 60, 15);
+    for i in 0..precise.presses.len() {
+        let (at, force_n) = (precise.presses[i].position, precise.presses[i].force_n.unwrap());
+        precise.presses[i].reading = clean_counts(&precise, at, force_n);
+    }
+    let noisy: fn(&mut Bench, Position, f64) -> Vec<f64> = Bench::counts;
+    let clean = |bench: &mut Bench, at: Position, force_n: f64| clean_counts(bench, at, force_n);
+    for (bench, read) in [(&mut bench, noisy), (&mut precise, clean)] {
+        let locator = bench.fit(Structure::ForceLinear).unwrap();
+        let spacing_m = locator.stored.x.step / PER_NODE as f64;
+        let touches = touches_of_all_forces(bench, &locator);
+        let compared = touches.iter().filter(|(at, force_n)| {
+            let reading = read(bench, *at, *force_n);
+            let (found, all) = (locator.locate(&reading), locator.summed_everywhere(&reading, PER_NODE));
+            let sd_m = all.uncertainty.unwrap().covariance[0].sqrt();
+            let apart_m = found.contact.position.distance_m(all.position);
+            // Of several modes the estimate is but one, and the sum may step over a narrow one.
+            let is_comparable = found.status == Status::Located && sd_m > spacing_m;
+            assert!(
+                !is_comparable || apart_m < 0.1 * sd_m + 5e-5,
+                "{force_n} N at {at:?}: {apart_m} m of {sd_m} m: {found:?} {all:?}"
+            );
+            is_comparable
+        });
+        assert!(2 * compared.count() > touches.len());
+    }
+}
+
+fn clean_counts(bench: &Bench, at: Position, force_n: f64) -> Vec<f64> {
+    let influences = (bench.influences)(at);
+    influences.iter().zip(&bench.offsets).map(|(f, offset)| offset + force_n * f).collect()
+}
+
 #[test]
 fn a_stated_range_bounds_forces_whatever_the_response() {
     let mut bench = Bench::strip(3, 40, 10);
