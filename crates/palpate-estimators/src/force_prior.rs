@@ -1,4 +1,4 @@
-//! Prior of the force of a contact whose force is not known: one for the estimators, the tracker and the status of readings.
+//! Prior of the unknown force of a contact: one for the estimators, the tracker and the status of readings.
 //!
 //! A [`ForceRange`] (W₁, W₂) is a log-normal distribution, ln W ~ N(μ, s²) with the quantiles W₁ at 0.5 % and W₂ at 99.5 %, cut off at W₂. Over
 //! several decades it is nearly flat in ln W: a place where the surface is stiff, and a greater force has to explain the reading, is as probable as
@@ -51,8 +51,8 @@ impl ForceRange {
 
     /// A decade either side of the mean force of presses, in newtons, and all of these; `None` without a press.
     ///
-    /// Readings that are proportional to the force have the same directions at any force, so extrapolation is safe there. Where readings follow
-    /// another function of the force, nothing but the calibration knows it, and contacts are expected to be about as hard as the presses.
+    /// Readings that are proportional to the force have the same directions at any force, so extrapolation is safe there. Another function
+    /// of the force is calibrated over the presses alone, and contacts are expected to be about as hard as these.
     pub fn of_presses(forces_n: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut sum_n, mut count, mut least_n, mut greatest_n) = (0.0, 0.0, f64::INFINITY, 0.0f64);
         for force_n in forces_n {

@@ -66,14 +66,27 @@ impl LogNormalPrior {
         PriorTerms { cost: residual * residual, slope: residual * slope, precision: slope * slope }
     }
 
+    /// Mode of the posterior where the prior hardly changes over the likelihood, the mean elsewhere.
     pub fn estimate_n(&self, b: f64, a: f64) -> f64 {
-        self.integrate(ForceLikelihood { b, a, at_n: 0.0, misfit: 0.0 }).mean_n
+        if self.is_distinct(b, a) {
+            self.expand(b, a).0.mean_n.clamp(0.0, self.greatest_n)
+        } else {
+            self.sum(ForceLikelihood { b, a, at_n: 0.0, misfit: 0.0 }).mean_n
+        }
     }
 
     pub fn integrate(&self, likelihood: ForceLikelihood) -> ForceIntegral {
         let ForceLikelihood { b, a, .. } = likelihood;
-        let is_distinct = b > 0.0 && a > 0.0 && b * self.log_sd.min(1.0) >= DISTINCT * a.sqrt();
-        if is_distinct { self.expand(likelihood) } else { self.sum(likelihood) }
+        if self.is_distinct(b, a) {
+            let (cut, cost) = self.expand(b, a);
+            cut.integrate(likelihood.misfit_at(b / a) + cost)
+        } else {
+            self.sum(likelihood)
+        }
+    }
+
+    fn is_distinct(&self, b: f64, a: f64) -> bool {
+        b > 0.0 && a > 0.0 && b * self.log_sd.min(1.0) >= DISTINCT * a.sqrt()
     }
 
     /// ln W from the median, in standard deviations.
@@ -81,11 +94,10 @@ impl LogNormalPrior {
         (force_n.ln() - self.log_median) / self.log_sd
     }
 
-    /// By the second order of ln p about Ŵ, p = exp(−q²/2)/(s·W) with q = (ln W − μ)/s: with k = q/s the slope is −(1 + k)/W and the curvature
-    /// (1 + k − 1/s²)/W².
-    fn expand(&self, likelihood: ForceLikelihood) -> ForceIntegral {
-        let a = likelihood.a;
-        let found_n = likelihood.b / a;
+    /// The posterior by the second order of ln p about Ŵ, and −2·ln of p at its mean: p = exp(−q²/2)/(s·W) with q = (ln W − μ)/s; with k = q/s the
+    /// slope is −(1 + k)/W and the curvature (1 + k − 1/s²)/W².
+    fn expand(&self, b: f64, a: f64) -> (CutNormal, f64) {
+        let found_n = b / a;
         let q = self.deviation(found_n);
         let k = q / self.log_sd;
         let slope = -(1.0 + k) / found_n;
@@ -93,8 +105,7 @@ impl LogNormalPrior {
         // Far below the range the curvature of the prior alone is that of no maximum; the likelihood's stays.
         let precision = (a - curvature).max(0.5 * a);
         let cut = CutNormal { mean_n: found_n + slope / precision, precision, greatest_n: self.greatest_n };
-        let prior_cost = q * q + 2.0 * (self.log_sd * found_n).ln() - slope * slope / precision;
-        cut.integrate(likelihood.misfit_at(found_n) + prior_cost)
+        (cut, q * q + 2.0 * (self.log_sd * found_n).ln() - slope * slope / precision)
     }
 
     /// By the trapezoidal rule.

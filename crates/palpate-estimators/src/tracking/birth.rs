@@ -3,7 +3,7 @@
 //! A new contact has a wide prior about the places that explain the reading by itself, with any usual speed, on a surface that
 //! hardly swings. The reading then gives its probability and its posterior.
 //!
-//! Its force has the [prior](crate::force_prior) of all estimators. About the force W that fits, a log-normal distribution ln W ~ N(μ, s²) has the density
+//! The force of a contact has the [prior](crate::force_prior) of all estimators. About the force W that fits, a log-normal distribution ln W ~ N(μ, s²) has the density
 //! e^(−q²/2)/(√(2π)·s·W) with q = (ln W − μ)/s: that of a normal distribution with the standard deviation s·W at its mean, times e^(−q²/2).
 
 use super::TrackerConfig;

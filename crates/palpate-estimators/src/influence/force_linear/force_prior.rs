@@ -6,7 +6,7 @@ use crate::force_prior::ForceRange;
 use crate::recording::is_one_force;
 use palpate_numerics::mean_and_variance;
 
-/// Forces up to this many times the greatest of the calibration are looked for where the response to the force is not proportional.
+/// The greatest force of contacts over that of the calibration, where the response to the force is not proportional.
 const HARDEST: f64 = 3.0;
 
 /// Forces of the presses.
@@ -31,7 +31,7 @@ impl PressForces {
         let of_presses = ForceRange::of_presses(pressed().map(|force_n| force_n.abs()));
         Self {
             mean_n,
-            // Presses of one force say nothing of others.
+            // Presses of one force do not bound others.
             sd_n: if is_one_force(responses_n()) { mean_n.abs() } else { variance_n2.sqrt() },
             hardest_n: prior.response_n(HARDEST * presses.greatest_force_n()),
             range: stated.or_else(|| of_presses.filter(|_| is_proportional)),

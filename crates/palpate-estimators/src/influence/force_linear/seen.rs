@@ -7,7 +7,7 @@
 //!
 //! p(a | d) ∝ ∫ p(F)·|V|^(−½)·exp(−½·(d − F·f)ᵀ·V⁻¹·(d − F·f)) dF, V = diag(S) + g·gᵀ,
 //!
-//! where the noise differs by place its multiplier m(a) in the place of the 1, V taken at the mean of the force there. Where the response
+//! where the noise differs by place its multiplier m(a) in the place of the 1, V taken at a point estimate of the force there. Where the response
 //! to the force is not linear, F stands for φ(F), and the estimate is turned back. The determinant belongs there: between presses, where v
 //! is large, everything would explain a reading otherwise. From few presses ln p is divided by a number of channels whose errors count as
 //! those of one.
