@@ -65,6 +65,16 @@ struct Sums<V> {
     ff: V,
 }
 
+impl<V: Eight> Sums<V> {
+    /// φ of the least squares, from 0 to the greatest.
+    ///
+    /// A closure in its place would not be compiled for the instructions of the caller.
+    #[inline(always)]
+    fn response(&self, greatest: V) -> V {
+        (self.fd / self.ff).max(V::splat(0.0)).min(greatest)
+    }
+}
+
 impl BroadScan {
     pub fn new(
         places: usize,
@@ -101,8 +111,8 @@ impl BroadScan {
         let zero = V::splat(0.0);
         let mut sums = Sums { dd: zero, fd: zero, ff: V::splat(f64::MIN_POSITIVE) };
         for (terms, d) in self.terms[block * self.channels..(block + 1) * self.channels].iter().zip(reading) {
-            let [f, noise, open, twice_beta, v] =
-                [&terms.f, &terms.noise, &terms.open, &terms.twice_beta, &terms.v].map(V::load);
+            let (f, noise, open) = (V::load(&terms.f), V::load(&terms.noise), V::load(&terms.open));
+            let (twice_beta, v) = (V::load(&terms.twice_beta), V::load(&terms.v));
             let variance = noise + response.mul_add(response.mul_add(v, twice_beta), open).max(zero);
             let (weight, d) = (V::splat(1.0) / variance, V::splat(*d));
             let (weighted_d, weighted_f) = (weight * d, weight * f);
@@ -124,11 +134,10 @@ impl CellBlocks for BroadScan {
     fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let (_, greatest_n) = self.prior.ends_n();
         let (zero, greatest) = (V::splat(0.0), V::splat(greatest_n));
-        let response = |sums: &Sums<V>| (sums.fd / sums.ff).max(zero).min(greatest);
-        let [by_noise, by_calibration] =
-            [zero, greatest].map(|force| response(&self.sums(block, reading, force)));
+        let by_noise = self.sums(block, reading, zero).response(greatest);
+        let by_calibration = self.sums(block, reading, greatest).response(greatest);
         let sums = self.sums(block, reading, by_noise.max(by_calibration));
-        let found = response(&sums);
+        let found = sums.response(greatest);
         let misfit = (sums.dd + found * (found * sums.ff - (sums.fd + sums.fd))).max(zero);
         let signals = (found * found * sums.ff).to_array().map(|square| self.prior.signal_cost(square));
         [misfit, misfit + V::load(&self.constants[block]) + V::load(&signals), found]
