@@ -217,6 +217,13 @@ class Centroid(Estimator):
 
 @dataclass(frozen=True)
 class Auto(Estimator):
-    """Whichever of the others locates best in cross-validation; `Locator.choice` says why."""
+    """Choice of the estimator with the smallest errors and intervals at held-out positions; `Locator.choice` gives the figures.
+
+    Parameters
+    ----------
+    only : sequence of str, optional
+        Kinds of the candidates, as in ``["influence", "gaussian-process"]``; all that suit the surface.
+    """
 
     _kind: ClassVar[str | None] = "auto"
+    only: Sequence[str] | None = key()

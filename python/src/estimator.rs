@@ -113,14 +113,16 @@ impl Estimator {
         recording.inner.check_distinct_positions(needed).map_err(refused)?;
         check_memory(memory_limit, &self.inner, &self.setup, &recording.inner)?;
         let task = FitTask::new(&self.setup, &recording.inner).seed(seed);
-        let choice = match &self.inner {
-            estimator::Estimator::Auto => {
+        let choice = match self.inner.candidates(task) {
+            Some(candidates) => {
                 let begun = Instant::now();
                 let clock = || begun.elapsed().as_secs_f64();
                 let limit = TimeLimit { clock: &clock, seconds: auto_seconds };
-                Some(work::run(py, progress, None, |watch| choose(task.watch(watch), Some(limit)))?)
+                Some(work::run(py, progress, None, |watch| {
+                    choose(task.watch(watch), candidates, Some(limit))
+                })?)
             }
-            _ => None,
+            None => None,
         };
         let chosen = choice.as_ref().map_or(&self.inner, |choice| &choice.best);
         let rounds = Some(chosen.most_rounds()).filter(|most| *most > 0);

@@ -5,7 +5,7 @@ use serde::Deserialize;
 use palpate_estimators::centroid::Centroid;
 use palpate_estimators::closed_form::ClosedForm;
 use palpate_estimators::digit::{DigitEstimator, DigitTheory};
-use palpate_estimators::estimator::Estimator;
+use palpate_estimators::estimator::{Auto, Estimator};
 use palpate_estimators::gaussian_process::GaussianProcessEstimator;
 use palpate_estimators::influence::{Influence, InfluenceSource, Structure};
 use palpate_estimators::neighbours::Neighbours;
@@ -40,8 +40,8 @@ pub(crate) enum EstimatorKeys {
     Neighbours,
     /// The calibrated centroid of array sensors.
     Centroid,
-    /// Whichever of the others locates best in cross-validation.
-    Auto,
+    /// Choice among the others at held-out positions.
+    Auto(AutoKeys),
 }
 
 /// A feed-forward network and its training by back-propagation; the defaults are those of the founding paper.
@@ -110,6 +110,32 @@ pub(crate) struct DigitKeys {
     pub false_alarm_rate: Option<FalseAlarms>,
 }
 
+/// Choice of the estimator with the smallest errors and intervals at held-out positions.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct AutoKeys {
+    /// Kinds of the candidates; all that suit the surface by default.
+    pub only: Option<Vec<At<String>>>,
+}
+
+impl AutoKeys {
+    fn build(&self) -> Result<Auto, RigError> {
+        let only = self.only.iter().flatten().map(|kind| match kind.as_str() {
+            "auto" => Err(kind.place.refuse("the kind of an estimator other than `auto`".to_owned())),
+            known if Estimator::KINDS.contains(&known) => Ok(known.to_owned()),
+            _ => Err(kind.place.refuse(format!("one of {}", kinds()))),
+        });
+        Ok(Auto { only: only.collect::<Result<_, _>>()? })
+    }
+}
+
+/// Kinds of candidates, for messages.
+fn kinds() -> String {
+    let kinds: Vec<String> =
+        Estimator::KINDS.iter().filter(|kind| **kind != "auto").map(|kind| format!("`{kind}`")).collect();
+    kinds.join(", ")
+}
+
 fn rate(key: Option<FalseAlarms>) -> FalseAlarmRate {
     key.and_then(|rate| FalseAlarmRate::new(rate.si).ok()).unwrap_or_default()
 }
@@ -130,7 +156,7 @@ impl EstimatorKeys {
             }),
             Self::Neighbours => Estimator::Neighbours(Neighbours::default()),
             Self::Centroid => Estimator::Centroid(Centroid),
-            Self::Auto => Estimator::Auto,
+            Self::Auto(keys) => Estimator::Auto(keys.build()?),
         })
     }
 }

@@ -65,7 +65,7 @@ impl Rig {
         let setup = sections.setup()?;
         Ok(Self {
             training: sections.training(&setup)?,
-            estimator: sections.estimator(&setup)?.unwrap_or_default(),
+            estimator: sections.estimator(&setup)?.unwrap_or_else(|| Estimator::usual(&setup)),
             loads: sections.loads(setup.surface())?,
             motion: sections.motion(&setup)?,
             design: sections.design(&setup)?,

@@ -11,7 +11,7 @@ use crate::tare::say_drift;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
 use palpate_estimators::description;
-use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, FitCost, TimeLimit, Tried, choose};
+use palpate_estimators::estimator::{CHOICE_FOLDS, FitCost, TimeLimit, Tried, choose};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
@@ -105,10 +105,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     lines.iter().try_for_each(|line| output::say(format!("  {line}")))
 }
 
-/// Estimated cost of the fit, of `auto` with a choice that takes no longer than it may.
+/// Estimated cost of the fit, with a choice that takes no longer than it may.
 fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
     let cost = rig.estimator.fit_cost(&rig.setup, recording);
-    if rig.estimator != Estimator::Auto {
+    let task = FitTask::new(&rig.setup, recording);
+    if rig.estimator.candidates(task).is_none() {
         return cost.with_interval_check(recording);
     }
     let choice = cost.seconds.min(f64::from(arguments.auto_seconds));
@@ -118,23 +119,21 @@ fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
     FitCost { seconds: choice + chosen.seconds, ..cost }
 }
 
-/// The rig with the estimator that cross-validation chooses where it is `auto`, and the estimators that were tried.
+/// The rig with the estimator that cross-validation chooses, and the figures of its candidates.
 fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result<(Rig, Vec<Tried>), Failure> {
-    if rig.estimator != Estimator::Auto {
-        return Ok((rig, Vec::new()));
-    }
+    let task = FitTask::new(&rig.setup, recording).seed(arguments.seed);
+    let Some(candidates) = rig.estimator.candidates(task) else { return Ok((rig, Vec::new())) };
     let start = Instant::now();
     let clock = || start.elapsed().as_secs_f64();
     let limit = TimeLimit { clock: &clock, seconds: f64::from(arguments.auto_seconds) };
-    let task = FitTask::new(&rig.setup, recording).seed(arguments.seed);
     let choice = Observer::of_stages()
-        .watch(|watch| choose(task.watch(watch), Some(limit)))
+        .watch(|watch| choose(task.watch(watch), candidates, Some(limit)))
         .map_err(|error| Failure::from_error(&error))?;
     if let Some(spans) = &choice.drift {
         say_drift(&rig.setup, spans);
     }
     remark!(
-        "auto: {}, with the least mean error × interval score at positions held out ({CHOICE_FOLDS} folds)",
+        "{}: the smallest mean error × interval score at held-out positions ({CHOICE_FOLDS} folds)",
         choice.best.name()
     );
     remark!("{:<24} {:>12} {:>20} {:>14}", "", "mean error", "score of 95 %", "95 % covers");

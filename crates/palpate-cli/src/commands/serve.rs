@@ -10,7 +10,7 @@ use crate::remark::remark;
 use crate::rules;
 use crate::session::SessionOptions;
 use crate::target::{Inputs, Target};
-use palpate_estimators::estimator::{Estimator, Locator};
+use palpate_estimators::estimator::{Auto, Estimator, Locator};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_live::calibration::{DepthKnowledge, Journal, plan};
 use palpate_live::rules::{Rules, RulesByAction};
@@ -332,9 +332,13 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
 }
 
 fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Failure> {
-    if rig.estimator == Estimator::Auto {
+    if let Estimator::Auto(Auto { only }) = &rig.estimator
+        && only.is_empty()
+    {
         let complaint = Complaint::about(path, "the estimator is `auto`, whose choice may take minutes");
-        return Err(complaint.help("`palpate fit` it once, and serve the locator").into());
+        return Err(complaint
+            .help("name its candidates by `only`, or `palpate fit` it once and serve the locator")
+            .into());
     }
     let recording = match &arguments.data {
         Some(data) => input::read_recording(&rig.setup, data)?,

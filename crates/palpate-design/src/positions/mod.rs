@@ -113,7 +113,7 @@ impl PositionProblem {
         if pressed.force_n().is_none() {
             return Err(PositionError::NoForce);
         }
-        if design.estimator == Estimator::Auto {
+        if matches!(design.estimator, Estimator::Auto(_)) {
             return Err(PositionError::Auto);
         }
         let (count, needed) = (design.count, design.estimator.positions_needed());

@@ -5,6 +5,7 @@ use super::variance::{ExpectedError, Posterior};
 use super::*;
 use crate::contacts::ContactPrior;
 use palpate_estimators::arrangement::Training;
+use palpate_estimators::estimator::Auto;
 use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::sensing::{Sensor, SensorKind};
@@ -180,7 +181,7 @@ fn what_cannot_be_designed_is_refused() {
     let network = "an estimator of kind `network` needs at least 2";
     assert_eq!(refusal(paper(), 1), format!("1 training position(s); {network}"));
     assert!(refusal(noisy(), 0).contains("the number of training positions is 0"));
-    let auto = PositionDesign::default().estimator(Estimator::Auto);
+    let auto = PositionDesign::default().estimator(Estimator::Auto(Auto::default()));
     assert!(refusal(Example { design: auto, ..noisy() }, 5).contains("designed for one estimator"));
     let mut unknown = noisy();
     unknown.setup = unknown.setup.unknown_force();

@@ -46,9 +46,9 @@ fn structure(linear: &ForceLinearLocator) -> String {
             "structure: force-monotone; readings follow the force to the power of {exponent:.2}, with which the \
              presses are e¹⁰ times as probable"
         ),
-        (_, true) => "structure: force-linear, as stated".to_owned(),
+        (_, true) => "structure: force-linear".to_owned(),
         (_, false) => format!(
-            "structure: force-monotone, as stated; readings follow the force to the power of {exponent:.2}"
+            "structure: force-monotone; readings follow the force to the power of {exponent:.2}"
         ),
     }
 }

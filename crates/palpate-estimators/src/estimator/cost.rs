@@ -5,7 +5,7 @@
 
 use super::{CHOICE_FOLDS, Estimator, is_learnt};
 use crate::features::FeatureKind;
-use crate::fit::CHECK_FOLDS;
+use crate::fit::{CHECK_FOLDS, FitTask};
 use crate::gaussian_process::folds_taken;
 use crate::influence::measured::{MeasuredInfluence, most_nodes, most_nuisance_nodes};
 use crate::influence::{Influence, Structure, force_linear, learning, sizes_over_a_model};
@@ -68,6 +68,14 @@ struct Sizes {
 impl Estimator {
     /// Memory and time of fitting to a recording of a setup.
     pub fn fit_cost(&self, setup: &Setup, recording: &Recording) -> FitCost {
+        if let Some(candidates) = self.candidates(FitTask::new(setup, recording)) {
+            let costs = candidates.iter().map(|candidate| candidate.fit_cost(setup, recording));
+            // One after the other, in each fold.
+            return costs.fold(FitCost { memory_bytes: 0.0, seconds: 0.0 }, |sum, cost| FitCost {
+                memory_bytes: sum.memory_bytes.max(cost.memory_bytes),
+                seconds: sum.seconds + CHOICE_FOLDS as f64 * cost.seconds,
+            });
+        }
         let sizes = Sizes::new(setup, recording);
         let own = match self {
             Self::GaussianProcess(process) => {
@@ -107,15 +115,7 @@ impl Estimator {
             Self::ClosedForm(_) | Self::Digit(_) | Self::Centroid(_) => {
                 FitCost { memory_bytes: 0.0, seconds: sizes.rows * sizes.channels * 1e-6 }
             }
-            Self::Auto => {
-                let contenders = Self::contenders(setup);
-                let costs = contenders.iter().map(|contender| contender.fit_cost(setup, recording));
-                // One after the other, in each fold.
-                costs.fold(FitCost { memory_bytes: 0.0, seconds: 0.0 }, |sum, cost| FitCost {
-                    memory_bytes: sum.memory_bytes.max(cost.memory_bytes),
-                    seconds: sum.seconds + CHOICE_FOLDS as f64 * cost.seconds,
-                })
-            }
+            Self::Auto(_) => FitCost { memory_bytes: 0.0, seconds: 0.0 },
         };
         let own = if is_learnt(self.kind()) { own.and(check_cost(setup, recording)) } else { own };
         own.and(FitCost { memory_bytes: sizes.rows * (NUMBER * sizes.channels + 120.0), seconds: 0.0 })

@@ -1,5 +1,6 @@
 //! Every estimator as one type: whoever evaluates, studies, reports or listens treats all alike.
 
+mod auto;
 mod compare;
 mod cost;
 mod locator_file;
@@ -16,6 +17,7 @@ pub use crate::tracking::{
     Across, Creep, Drift, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig,
 };
 pub use crate::tried::Tried;
+pub use auto::{Auto, CHOICE_FOLDS, Choice, TimeLimit, choose, take_off_drift};
 pub use compare::{CompareOptions, Compared, Comparison, UnknownEstimator, compare, contenders, select};
 pub use cost::FitCost;
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
@@ -25,12 +27,11 @@ pub use settings::Setting;
 
 use std::borrow::Cow;
 use std::sync::Arc;
-use trial_splits::TrialSplits;
 
 use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
 use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
-use crate::evaluation::{Evaluation, EvaluationError, Split};
+use crate::evaluation::EvaluationError;
 use crate::fit::{
     ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue,
     fit_with_interval_check,
@@ -63,8 +64,8 @@ macro_rules! estimators {
         #[derive(Clone, Debug, PartialEq)]
         pub enum Estimator {
             $($(#[doc = $doc])* #[doc = concat!("(`kind = \"", $kind, "\"`).")] $variant($config),)*
-            /// Whichever of the others locates best in cross-validation (`kind = "auto"`).
-            Auto,
+            /// Choice among the others at held-out positions (`kind = "auto"`).
+            Auto(Auto),
         }
 
         /// The methods that can locate.
@@ -92,6 +93,9 @@ macro_rules! estimators {
                 /// The estimator that was being tried; `None` before the first.
                 stopped: Option<&'static str>,
             },
+            /// The estimators that `only` names do not suit the surface.
+            #[error("no estimator that `only` names suits the surface")]
+            NoCandidate,
             /// No estimator suits the recording; the last one's complaint.
             #[error("no estimator suits the recording: {0}")]
             Choice(Box<EvaluationError<FitError>>),
@@ -108,7 +112,7 @@ macro_rules! estimators {
             pub fn kind(&self) -> &'static str {
                 match self {
                     $(Self::$variant(_) => $kind,)*
-                    Self::Auto => "auto",
+                    Self::Auto(_) => "auto",
                 }
             }
         }
@@ -118,25 +122,26 @@ macro_rules! estimators {
             type Error = FitError;
 
             fn fit_method(&self, task: FitTask) -> Result<Method, FitError> {
+                if let Some(candidates) = self.candidates(task) {
+                    return choose(task, candidates, None)?.best.fit_method(task);
+                }
                 let learnt_from = self.learnt_from(task.recording);
                 let task = FitTask { recording: &learnt_from, ..task };
                 match self {
                     $(Self::$variant(estimator) => Ok(estimator.fit_method(task)?.into()),)*
-                    Self::Auto => choose(task, None)?.best.fit_method(task),
+                    Self::Auto(_) => Err(FitError::NoCandidate),
                 }
             }
 
             fn fit_task(&self, task: FitTask) -> Result<Locator, FitError> {
-                match self {
-                    // The folds of the check need no choice of their own.
-                    Self::Auto => {
-                        let Choice { best, tried, .. } = choose(task, None)?;
-                        let mut locator = best.fit_task(task)?;
-                        locator.provenance.choice = tried;
-                        Ok(locator)
-                    }
-                    _ => fit_with_interval_check(self, task),
-                }
+                let Some(candidates) = self.candidates(task) else {
+                    return fit_with_interval_check(self, task);
+                };
+                // The folds of the check need no choice of their own.
+                let Choice { best, tried, .. } = choose(task, candidates, None)?;
+                let mut locator = best.fit_task(task)?;
+                locator.provenance.choice = tried;
+                Ok(locator)
             }
 
             fn drift_course(&self, task: FitTask, asked: &Recording) -> Option<OffsetCourse> {
@@ -145,13 +150,16 @@ macro_rules! estimators {
 
             /// Fits with a seed, watched. A method that is learnt has a [`ReadingCheck`] beside it.
             fn fit_without_interval_check(&self, task: FitTask) -> Result<Locator, FitError> {
-                if let Self::Auto = self {
-                    return choose(task, None)?.best.fit_without_interval_check(task);
+                if let Some(candidates) = self.candidates(task) {
+                    return choose(task, candidates, None)?.best.fit_without_interval_check(task);
                 }
                 self.fit_beside(task, || ReadingCheck::fit(task))
             }
 
             fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Locator>) -> Result<(), FitError> {
+                if let Some(candidates) = self.candidates(task) {
+                    return choose(task, candidates, None)?.best.fit_many(task, queue);
+                }
                 let learnt_from = self.learnt_from(task.recording);
                 let task = FitTask { recording: &learnt_from, ..task };
                 match self {
@@ -159,7 +167,7 @@ macro_rules! estimators {
                         let map = |_, locator: Fitted<$method>| locator.into_locator();
                         Ok(estimator.fit_many(task, &mut Mapped { queue, map })?)
                     })*
-                    Self::Auto => choose(task, None)?.best.fit_many(task, queue),
+                    Self::Auto(_) => Err(FitError::NoCandidate),
                 }
             }
         }
@@ -242,7 +250,7 @@ impl Estimator {
     /// The rows that a method learns from: those without contact teach offset and noise, which methods that go from a reading to a position do not have.
     fn learnt_from<'a>(&self, recording: &'a Recording) -> Cow<'a, Recording> {
         match self {
-            Self::Influence(_) | Self::ClosedForm(_) | Self::Digit(_) | Self::Auto => {
+            Self::Influence(_) | Self::ClosedForm(_) | Self::Digit(_) | Self::Auto(_) => {
                 Cow::Borrowed(recording)
             }
             _ => recording.touched(),
@@ -285,6 +293,14 @@ impl Estimator {
             Self::Network(Network::default()),
         ]);
         contenders
+    }
+
+    /// The estimator of a bench whose rig names none: on a surface without a model the [quick](Auto::quick) choice, elsewhere the default network.
+    pub fn usual(setup: &Setup) -> Self {
+        match setup.surface().model() {
+            Some(_) => Self::default(),
+            None => Self::Auto(Auto::quick()),
+        }
     }
 
     /// A digit's estimator by the linear theory of bending, to be compared with.
@@ -602,134 +618,6 @@ impl Locator {
     }
 }
 
-/// Choice of `auto`, and how each estimator did.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
-    /// The estimator with the least [`Tried::score_m`].
-    pub best: Estimator,
-    /// Estimators that were tried, best first.
-    pub tried: Vec<Tried>,
-    /// Names of those that were not, with the reason.
-    pub left_out: Vec<(&'static str, String)>,
-    /// Greatest change of each channel by the drift that was subtracted from the held-out readings; `None` without a drift.
-    pub drift: Option<Vec<f64>>,
-}
-
-/// Figures of an estimator that was tried; `None` without intervals.
-fn figures(name: &str, evaluation: &Evaluation) -> Option<Tried> {
-    Some(Tried {
-        name: name.to_owned(),
-        mean_error_m: evaluation.summary(None)?.average_m,
-        interval_score_m: evaluation.interval_score_m()?,
-        coverage_percent: evaluation.coverage_percent(),
-    })
-}
-
-/// The time that the choice of an estimator may take.
-#[derive(Clone, Copy)]
-pub struct TimeLimit<'a> {
-    /// Tells seconds since any fixed moment.
-    pub clock: &'a (dyn Fn() -> f64 + Sync),
-    /// Limit in seconds; an estimator that is not done by then is stopped and left out.
-    pub seconds: f64,
-}
-
-/// Reason of an estimator that [`TimeLimit`] leaves out.
-const NOT_IN_TIME: &str = "it was not done in time";
-
-/// Tares the held-out readings of splits by the drift that the other presses show. Returns the greatest change of each channel, or `None` where
-/// no split has a drift.
-///
-/// # Errors
-/// [`InfluenceFitError`] where a split's presses cannot be learnt from, and when the watch stopped it.
-pub fn take_off_drift(
-    setup: &Setup,
-    splits: &mut [Split],
-    watch: Watch,
-) -> Result<Option<Vec<f64>>, InfluenceFitError> {
-    let mut spans: Option<Vec<f64>> = None;
-    for Split { training, judged, offsets, .. } in splits {
-        *offsets = Influence::offset_course(FitTask::new(setup, training).watch(watch), judged)?;
-        for found in offsets.iter().map(OffsetCourse::spans) {
-            let spans = spans.get_or_insert_with(|| vec![0.0; found.len()]);
-            spans.iter_mut().zip(found).for_each(|(most, span)| *most = most.max(span));
-        }
-    }
-    Ok(spans)
-}
-
-/// Folds of the cross-validation that chooses.
-pub const CHOICE_FOLDS: usize = 5;
-
-/// Chooses the estimator for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds: the least geometric mean of mean error
-/// and interval score. Estimators are tried from the one that is best on most recordings on. In use a drift is tared away, and so it is here:
-/// where the presses show one, it is subtracted from the held-out readings.
-///
-/// # Errors
-/// [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason;
-/// [`FitError::NotInTime`] when none was done in time; and [`FitError::Cancelled`] when the watch stopped it.
-pub fn choose(task: FitTask, limit: Option<TimeLimit>) -> Result<Choice, FitError> {
-    let FitTask { setup, recording, seed, watch } = task;
-    let start_s = limit.map_or(0.0, |limit| (limit.clock)());
-    let is_over = || limit.is_some_and(|limit| (limit.clock)() - start_s >= limit.seconds);
-    let in_time = |progress| watch.report(progress).is_ok() && !is_over();
-    let limited = Watch::new(&in_time);
-    // Stopped by whoever watches, unless it was the time.
-    let stopped = |stopped: Option<&'static str>| match (watch.round(), limit) {
-        (Ok(()), Some(TimeLimit { seconds, .. })) => FitError::NotInTime { seconds, stopped },
-        _ => Cancelled.into(),
-    };
-    let positions = recording.distinct_positions().len();
-    let unsuited = |error| FitError::Choice(Box::new(error));
-    let recording = recording.clone().in_order();
-    let mut splits =
-        Split::by_folds(&recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
-    let whole = FitTask::new(setup, &recording).watch(limited);
-    let course = Influence::offset_course(whole, &recording);
-    let drift = match course
-        .and_then(|course| course.map(|_| take_off_drift(setup, &mut splits, limited)).transpose())
-    {
-        Ok(drift) => drift.flatten(),
-        Err(error) if Cancelled::caused(&error) => return Err(stopped(None)),
-        // Without influence functions there is no drift; when that estimator is tried, its error has the reason.
-        Err(_) => {
-            splits.iter_mut().for_each(|split| split.offsets = None);
-            None
-        }
-    };
-    let (mut tried, mut left_out, mut last) = (Vec::new(), Vec::new(), None);
-    let contenders = contenders(setup, &Estimator::Auto, recording.rows.len());
-    let count = contenders.len();
-    let trials = TrialSplits::new(setup, &splits, seed, &|| 0.0);
-    for (done, estimator) in contenders.into_iter().enumerate() {
-        let name = estimator.name();
-        watch.counted("trying estimators", "estimators", done, count)?;
-        match trials.evaluate(&estimator, limited) {
-            Ok(one) => {
-                if let Some(outcome) = figures(name, &one.evaluation) {
-                    tried.push((estimator, outcome));
-                }
-            }
-            Err(error) if Cancelled::caused(&error) => {
-                let why = stopped(Some(name));
-                if tried.is_empty() || matches!(why, FitError::Cancelled(_)) {
-                    return Err(why);
-                }
-                left_out.push((name, NOT_IN_TIME.to_owned()));
-            }
-            Err(error) => {
-                left_out.push((name, error.to_string()));
-                last = Some(error);
-            }
-        }
-    }
-    tried.sort_by(|a, b| a.1.score_m().total_cmp(&b.1.score_m()));
-    let Some(best) = tried.first().map(|(estimator, _)| estimator.clone()) else {
-        return Err(last.map_or_else(|| Cancelled.into(), unsuited));
-    };
-    Ok(Choice { best, tried: tried.into_iter().map(|(_, outcome)| outcome).collect(), left_out, drift })
-}
-
 impl Locator {
     /// Channels that read a spread load: by the fitted influence functions of an influence locator, with its offsets and noise, and
     /// by the mechanics of the bench for any other.
@@ -816,6 +704,3 @@ impl Locator {
         }
     }
 }
-
-#[cfg(test)]
-mod choice_tests;

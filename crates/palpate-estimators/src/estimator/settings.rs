@@ -1,6 +1,6 @@
 //! An estimator's settings in words, so that a report can list those of any method.
 
-use super::Estimator;
+use super::{Auto, Estimator};
 use crate::digit::{DigitEstimator, DigitTheory};
 use crate::influence::{Influence, InfluenceSource, Structure};
 use crate::network::{
@@ -51,7 +51,9 @@ impl Estimator {
             }
             Self::ClosedForm(config) => vec![false_alarms(config.false_alarm_rate)],
             // They have nothing to set.
-            Self::GaussianProcess(_) | Self::Centroid(_) | Self::Auto => Vec::new(),
+            Self::GaussianProcess(_) | Self::Centroid(_) => Vec::new(),
+            Self::Auto(Auto { only }) if only.is_empty() => Vec::new(),
+            Self::Auto(Auto { only }) => vec![Setting::new("only", "candidates", only.join(", "))],
         }
     }
 }
@@ -84,7 +86,7 @@ fn influence(config: Influence) -> Vec<Setting> {
 
 fn measured_influence(config: Influence) -> Vec<Setting> {
     let structure = match config.structure {
-        Structure::Auto => "whichever the presses tell",
+        Structure::Auto => "chosen at held-out positions; with fewer than 19, by the evidence",
         Structure::ForceLinear => "force-linear",
         Structure::ForceMonotone => "force-monotone",
         Structure::Free => "free",

@@ -161,6 +161,15 @@ impl Influence {
         }
     }
 
+    /// True where the presses of a surface without a model allow several structures of the readings, and none is stated: they have two forces or
+    /// more, the untouched 0 among them, and no nuisance coordinate.
+    pub(crate) fn has_structures(&self, setup: &Setup, recording: &Recording) -> bool {
+        self.structure == Structure::Auto
+            && setup.surface().model().is_none()
+            && !has_nuisance(recording)
+            && force_linear::has_forces(setup, recording)
+    }
+
     /// Fits the influence functions of a plane with a model.
     ///
     /// # Errors

@@ -4,6 +4,7 @@ mod roles;
 
 use std::fmt::Write;
 
+use palpate_estimators::estimator::Auto;
 use palpate_estimators::recording::{
     Content, CsvError, CsvProblem, Decimal, Header, Heading, Recording, Separator, Table, TableColumn,
     ZeroForce,
@@ -289,10 +290,10 @@ impl FirstRig {
         toml.line("measure = \"raw\"", "whatever the channels read: counts, volts");
         self.write_recording(&mut toml);
         toml.section("estimator");
-        toml.line(
-            "kind = \"influence\"",
-            "or \"auto\": whichever estimator locates best at positions held out",
-        );
+        let Auto { only } = Auto::quick();
+        toml.line("kind = \"auto\"", "the best of these at held-out positions");
+        let quoted: Vec<String> = only.iter().map(|kind| format!("\"{kind}\"")).collect();
+        toml.line(&format!("only = [{}]", quoted.join(", ")), "without this line all others too: minutes");
         toml.text.push('\n');
         toml.comment("Next:");
         self.next_commands(name).iter().for_each(|command| toml.comment(&format!("  {command}")));

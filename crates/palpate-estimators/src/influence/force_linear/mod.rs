@@ -35,6 +35,7 @@ use super::measured::MeasuredError;
 use crate::fit::FitTask;
 use crate::offset_course::OffsetCourse;
 use crate::recording::Recording;
+use crate::setup::Setup;
 use crate::status::FalseAlarmRate;
 use force_prior::PressForces;
 use learning::Learnt;
@@ -42,7 +43,7 @@ use locator::{Stored, Tables};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean;
 pub(crate) use presses::FEW;
-use presses::{Presses, shares};
+use presses::{Presses, Repeats, shares};
 use prior::Prior;
 
 /// Distinct positions without which a reading cannot be a function of anything.
@@ -67,6 +68,12 @@ pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLin
         Some(factor) => locator.with_likelihood_divided_by(factor, task.recording),
         None => locator,
     }))
+}
+
+/// True of presses with forces, of which two differ.
+pub(super) fn has_forces(setup: &Setup, recording: &Recording) -> bool {
+    let presses = Presses::of_recording(setup, recording, Repeats::Consecutive, &[]);
+    presses.is_some_and(|presses| presses.distinct_forces() >= 2)
 }
 
 /// [`fit`], more presses than `most` condensed to so many.

@@ -1,0 +1,201 @@
+//! Choice of an estimator at held-out positions.
+
+use super::trial_splits::TrialSplits;
+use super::{Estimator, FitError, contenders};
+use crate::evaluation::{Evaluation, Split};
+use crate::fit::FitTask;
+use crate::influence::{Influence, InfluenceFitError};
+use crate::offset_course::OffsetCourse;
+use crate::setup::Setup;
+use crate::tried::Tried;
+use palpate_numerics::FEWEST_FOR_95;
+use palpate_numerics::watch::{Cancelled, Watch};
+
+/// Choice among estimators (`kind = "auto"`).
+///
+/// ```
+/// use palpate_estimators::estimator::{Auto, Estimator};
+/// use palpate_estimators::fit::Fit;
+/// use palpate_estimators::{arrangement::Training, setup::Setup};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let presses = setup.simulate(&Training::even(10).repeated(3), 0)?;
+/// let auto = Estimator::Auto(Auto { only: vec!["influence".to_owned(), "neighbours".to_owned()] });
+/// let locator = auto.fit(&setup, &presses)?;
+/// assert_eq!(locator.kind(), "influence");
+/// assert_eq!(locator.provenance.choice.len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Auto {
+    /// Kinds of the candidates; empty for all that suit the surface.
+    pub only: Vec<String>,
+}
+
+impl Auto {
+    /// The candidates on a surface without a model by default: those that take seconds.
+    pub fn quick() -> Self {
+        Self { only: ["influence", "gaussian-process"].map(str::to_owned).to_vec() }
+    }
+}
+
+impl Estimator {
+    /// Estimators among which it chooses at held-out positions; `None` of one that does not choose.
+    ///
+    /// `influence` with `structure = "auto"` chooses a structure from 19 positions on, the number from which intervals are checked. With fewer, the
+    /// evidence of the presses decides.
+    pub fn candidates(&self, FitTask { setup, recording, .. }: FitTask) -> Option<Vec<Self>> {
+        let all = || contenders(setup, self, recording.rows.len());
+        match self {
+            Self::Auto(Auto { only }) => {
+                let is_named = |kind: &str| only.is_empty() || only.iter().any(|name| name == kind);
+                Some(all().into_iter().filter(|contender| is_named(contender.kind())).collect())
+            }
+            Self::Influence(influence)
+                if influence.has_structures(setup, recording)
+                    && recording.distinct_positions().len() >= FEWEST_FOR_95 =>
+            {
+                Some(all().into_iter().filter(|contender| contender.kind() == self.kind()).collect())
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The chosen estimator, and the figures of the others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// The estimator with the least [`Tried::score_m`].
+    pub best: Estimator,
+    /// Estimators that were tried, best first.
+    pub tried: Vec<Tried>,
+    /// Names of those that were not, with the reason.
+    pub left_out: Vec<(&'static str, String)>,
+    /// Greatest change of each channel by the drift that was subtracted from the held-out readings; `None` without a drift.
+    pub drift: Option<Vec<f64>>,
+}
+
+/// Figures of an estimator that was tried; `None` without intervals.
+fn figures(name: &str, evaluation: &Evaluation) -> Option<Tried> {
+    Some(Tried {
+        name: name.to_owned(),
+        mean_error_m: evaluation.summary(None)?.average_m,
+        interval_score_m: evaluation.interval_score_m()?,
+        coverage_percent: evaluation.coverage_percent(),
+    })
+}
+
+/// The time that the choice of an estimator may take.
+#[derive(Clone, Copy)]
+pub struct TimeLimit<'a> {
+    /// Tells seconds since any fixed moment.
+    pub clock: &'a (dyn Fn() -> f64 + Sync),
+    /// Limit in seconds; an estimator that is not done by then is stopped and left out.
+    pub seconds: f64,
+}
+
+/// Reason of an estimator that [`TimeLimit`] leaves out.
+const NOT_IN_TIME: &str = "it was not done in time";
+
+/// Tares the held-out readings of splits by the drift that the other presses show. Returns the greatest change of each channel, or `None` where
+/// no split has a drift.
+///
+/// # Errors
+/// [`InfluenceFitError`] where a split's presses cannot be learnt from, and when the watch stopped it.
+pub fn take_off_drift(
+    setup: &Setup,
+    splits: &mut [Split],
+    watch: Watch,
+) -> Result<Option<Vec<f64>>, InfluenceFitError> {
+    let mut spans: Option<Vec<f64>> = None;
+    for Split { training, judged, offsets, .. } in splits {
+        *offsets = Influence::offset_course(FitTask::new(setup, training).watch(watch), judged)?;
+        for found in offsets.iter().map(OffsetCourse::spans) {
+            let spans = spans.get_or_insert_with(|| vec![0.0; found.len()]);
+            spans.iter_mut().zip(found).for_each(|(most, span)| *most = most.max(span));
+        }
+    }
+    Ok(spans)
+}
+
+/// Folds of the cross-validation that chooses.
+pub const CHOICE_FOLDS: usize = 5;
+
+/// Chooses among [candidates](Estimator::candidates) for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds: the least geometric mean of mean error
+/// and interval score. A drift that the presses show is subtracted from the held-out readings, as a tare does in use.
+///
+/// # Errors
+/// [`FitError::NoCandidate`] without a candidate; [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason;
+/// [`FitError::NotInTime`] when none was done in time; and [`FitError::Cancelled`] when the watch stopped it.
+pub fn choose(
+    task: FitTask,
+    candidates: Vec<Estimator>,
+    limit: Option<TimeLimit>,
+) -> Result<Choice, FitError> {
+    if candidates.is_empty() {
+        return Err(FitError::NoCandidate);
+    }
+    let FitTask { setup, recording, seed, watch } = task;
+    let start_s = limit.map_or(0.0, |limit| (limit.clock)());
+    let is_over = || limit.is_some_and(|limit| (limit.clock)() - start_s >= limit.seconds);
+    let in_time = |progress| watch.report(progress).is_ok() && !is_over();
+    let limited = Watch::new(&in_time);
+    // Stopped by whoever watches, unless it was the time.
+    let stopped = |stopped: Option<&'static str>| match (watch.round(), limit) {
+        (Ok(()), Some(TimeLimit { seconds, .. })) => FitError::NotInTime { seconds, stopped },
+        _ => Cancelled.into(),
+    };
+    let positions = recording.distinct_positions().len();
+    let unsuited = |error| FitError::Choice(Box::new(error));
+    let recording = recording.clone().in_order();
+    let mut splits =
+        Split::by_folds(&recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
+    let whole = FitTask::new(setup, &recording).watch(limited);
+    let course = Influence::offset_course(whole, &recording);
+    let drift = match course
+        .and_then(|course| course.map(|_| take_off_drift(setup, &mut splits, limited)).transpose())
+    {
+        Ok(drift) => drift.flatten(),
+        Err(error) if Cancelled::caused(&error) => return Err(stopped(None)),
+        // Without influence functions there is no drift; when that estimator is tried, its error has the reason.
+        Err(_) => {
+            splits.iter_mut().for_each(|split| split.offsets = None);
+            None
+        }
+    };
+    let (mut tried, mut left_out, mut last) = (Vec::new(), Vec::new(), None);
+    let count = candidates.len();
+    let trials = TrialSplits::new(setup, &splits, seed, &|| 0.0);
+    for (done, estimator) in candidates.into_iter().enumerate() {
+        let name = estimator.name();
+        watch.counted("trying estimators", "estimators", done, count)?;
+        match trials.evaluate(&estimator, limited) {
+            Ok(one) => {
+                if let Some(outcome) = figures(name, &one.evaluation) {
+                    tried.push((estimator, outcome));
+                }
+            }
+            Err(error) if Cancelled::caused(&error) => {
+                let why = stopped(Some(name));
+                if tried.is_empty() || matches!(why, FitError::Cancelled(_)) {
+                    return Err(why);
+                }
+                left_out.push((name, NOT_IN_TIME.to_owned()));
+            }
+            Err(error) => {
+                left_out.push((name, error.to_string()));
+                last = Some(error);
+            }
+        }
+    }
+    tried.sort_by(|a, b| a.1.score_m().total_cmp(&b.1.score_m()));
+    let Some(best) = tried.first().map(|(estimator, _)| estimator.clone()) else {
+        return Err(last.map_or_else(|| Cancelled.into(), unsuited));
+    };
+    Ok(Choice { best, tried: tried.into_iter().map(|(_, outcome)| outcome).collect(), left_out, drift })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,127 @@
+//! Choice among candidates, and the time that it may take.
+
+use super::*;
+use crate::fit::Fit;
+use crate::fixtures::paper;
+use crate::influence::Structure;
+use crate::recording::{Recording, Row};
+use palpate_mechanics::contact::Position;
+use palpate_numerics::watch::Progress;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+fn all_candidates(task: FitTask) -> Vec<Estimator> {
+    Estimator::Auto(Auto::default()).candidates(task).unwrap()
+}
+
+#[test]
+fn estimators_that_are_not_done_in_time_are_stopped_and_left_out() {
+    let bench = paper(5e-6, 2);
+    let recording = bench.simulate(0);
+    // Time passes only while other estimators than the first are tried.
+    let done = AtomicUsize::new(0);
+    let observe = |progress| {
+        if let Progress::Counted { unit: "estimators", done: count, .. } = progress {
+            done.store(count, Ordering::Relaxed);
+        }
+        true
+    };
+    let clock = || done.load(Ordering::Relaxed) as f64;
+    let limit = TimeLimit { clock: &clock, seconds: 1.0 };
+    let task = FitTask::new(&bench.setup, &recording).watch(Watch::new(&observe));
+    let choice = choose(task, all_candidates(task), Some(limit)).unwrap();
+    // Fits that are done before they are watched at all need no stopping.
+    assert!(choice.tried.iter().any(|tried| tried.name == "influence"), "{:?}", choice.tried);
+    assert_eq!(choice.tried.len() + choice.left_out.len(), Estimator::contenders(&bench.setup).len());
+    for kind in ["network", "network-lm", "gaussian-process"] {
+        assert!(choice.left_out.contains(&(kind, NOT_IN_TIME.to_owned())), "{kind}: {:?}", choice.left_out);
+    }
+}
+
+#[test]
+fn the_first_estimator_is_stopped_too_and_nothing_is_chosen() {
+    let bench = paper(5e-6, 2);
+    let recording = bench.simulate(0);
+    // Each look at the clock is a second.
+    let looks = AtomicUsize::new(0);
+    let clock = || looks.fetch_add(1, Ordering::Relaxed) as f64;
+    let limit = TimeLimit { clock: &clock, seconds: 2.0 };
+    let task = FitTask::new(&bench.setup, &recording);
+    let error = choose(task, all_candidates(task), Some(limit)).unwrap_err();
+    assert_eq!(error, FitError::NotInTime { seconds: 2.0, stopped: Some("influence") });
+    let told = error.to_string();
+    assert!(
+        told.starts_with("no estimator was done within the 2 s") && told.contains("`influence` was stopped"),
+        "{told}"
+    );
+    // Whoever watches stops it for reasons of their own.
+    let stop = |_| false;
+    let task = FitTask::new(&bench.setup, &recording).watch(Watch::new(&stop));
+    let limit = TimeLimit { clock: &|| 0.0, seconds: 2.0 };
+    assert!(Cancelled::caused(&choose(task, all_candidates(task), Some(limit)).unwrap_err()));
+}
+
+#[test]
+fn chooses_among_the_named_kinds_alone() {
+    let bench = paper(5e-6, 2);
+    let recording = bench.simulate(0);
+    let only = |kinds: &[&str]| {
+        let auto = Auto { only: kinds.iter().map(|kind| (*kind).to_owned()).collect() };
+        Estimator::Auto(auto).fit_task(FitTask::new(&bench.setup, &recording))
+    };
+    let choice = only(&["neighbours", "centroid"]).unwrap().provenance.choice;
+    assert_eq!(choice.len(), 2, "{choice:?}");
+    assert_eq!(only(&["digit"]).unwrap_err(), FitError::NoCandidate);
+}
+
+/// Presses of a line without a model at even places, by two forces each. Its four channels read the force to a power, times a bump each.
+fn pressed_line(places: usize, power: f64) -> (Setup, Recording) {
+    const LENGTH_M: f64 = 0.1;
+    const COUNTS: f64 = 1000.0;
+    let setup = Setup::measured(LENGTH_M, &["a", "b", "c", "d"]).unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut press = |x_m: f64, force_n: f64| {
+        let bump = |c: usize| (-((x_m - 0.02 * (c as f64 + 1.0)) / 0.03).powi(2)).exp();
+        let mut noise = || rng.random_range(-1.0..1.0);
+        let reading = (0..4).map(|c| COUNTS * force_n.powf(power) * bump(c) + noise()).collect();
+        let position = Position::along(x_m);
+        Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading }
+    };
+    let place_m = |place: usize| LENGTH_M * (place as f64 + 0.5) / places as f64;
+    let forces_n = [0.0, 1.0, 4.0];
+    let rows = (0..places).flat_map(|place| forces_n.map(|force_n| press(place_m(place), force_n))).collect();
+    let recording = Recording::new(setup.layout(), "bench", rows);
+    (setup, recording)
+}
+
+#[test]
+fn influence_chooses_its_structure_at_held_out_places() {
+    let influence = Estimator::Influence(Influence::default());
+    for (power, best) in [(1.0, "influence force-linear"), (0.6, "influence force-monotone")] {
+        let (setup, recording) = pressed_line(19, power);
+        let locator = influence.fit(&setup, &recording).unwrap();
+        let choice = &locator.provenance.choice;
+        assert_eq!((choice.len(), choice[0].name.as_str()), (3, best), "{choice:?}");
+        let [best_m, next_m] = [0, 1].map(|i| choice[i].score_m());
+        assert!(best_m <= next_m, "{choice:?}");
+    }
+}
+
+#[test]
+fn few_places_choose_the_structure_by_their_evidence() {
+    let (setup, recording) = pressed_line(18, 1.0);
+    let influence = Estimator::Influence(Influence::default());
+    assert!(influence.candidates(FitTask::new(&setup, &recording)).is_none());
+    assert!(influence.fit(&setup, &recording).unwrap().provenance.choice.is_empty());
+}
+
+#[test]
+fn a_stated_structure_and_a_nuisance_coordinate_leave_no_choice() {
+    let (setup, mut recording) = pressed_line(19, 1.0);
+    let stated = Influence { structure: Structure::ForceLinear, ..Influence::default() };
+    assert!(Estimator::Influence(stated).candidates(FitTask::new(&setup, &recording)).is_none());
+    recording.rows.iter_mut().for_each(|row| row.nuisances = vec![1.0]);
+    let influence = Estimator::Influence(Influence::default());
+    assert!(influence.candidates(FitTask::new(&setup, &recording)).is_none());
+}
