@@ -526,14 +526,15 @@ impl<M: Locate> Fitted<M> {
 
     /// The locator with the scatter of the untouched rows of the recording that it was fitted to, where its noise does not explain it: where more of these
     /// rows are contacts by noise alone than the false-alarm rate allows, at the 5 % level. A scatter that hides most
-    /// presses is not that of an untouched surface, and is left out.
+    /// presses is not that of an untouched surface, and is left out. A method without a rule of `no_contact` has the scatter as its rule.
     #[must_use]
-    pub fn with_scatter_of(mut self, recording: &Recording) -> Self {
+    pub fn with_scatter_of(self, recording: &Recording) -> Self {
         /// Rows that are located, at most.
         const MOST: usize = 400;
-        const MOST_HIDDEN: f64 = 0.5;
         let of_check = || self.check.as_ref()?.false_alarm_rate();
-        let Some(rate) = self.method.false_alarm_rate().or_else(of_check) else { return self };
+        let Some(rate) = self.method.false_alarm_rate().or_else(of_check) else {
+            return self.by_untouched_rows(recording);
+        };
         let Some(centre) = self.method.offsets().or_else(|| self.untouched.clone()) else { return self };
         let Some(rests) = Rests::of_recording(recording) else { return self };
         let is_contact = |reading: &[f64]| self.locate(reading).is_ok_and(|e| e.status != Status::NoContact);
@@ -548,12 +549,24 @@ impl<M: Locate> Fitted<M> {
             return self;
         }
         let scatter = rests.scatter(centre, self.setup.layout(), rate);
+        self.with_scatter(scatter, recording)
+    }
+
+    /// The locator of a method without a rule of `no_contact`, with the scatter of the untouched rows about their mean as its rule.
+    fn by_untouched_rows(self, recording: &Recording) -> Self {
+        let rests = Rests::of_recording(recording).or_else(|| Rests::of_single_rows(recording));
+        let Some((centre, rests)) = self.untouched.clone().zip(rests) else { return self };
+        let scatter = rests.scatter(centre, self.setup.layout(), FalseAlarmRate::default());
+        self.with_scatter(scatter, recording)
+    }
+
+    /// The locator with a scatter, unless this hides most presses.
+    fn with_scatter(self, scatter: UntouchedScatter, recording: &Recording) -> Self {
+        const MOST_HIDDEN: f64 = 0.5;
         let presses = || recording.rows.iter().filter(|row| row.touches());
         let hidden = presses().filter(|row| scatter.contains(&row.reading)).count();
-        if hidden as f64 <= MOST_HIDDEN * presses().count() as f64 {
-            self.untouched_scatter = Some(scatter);
-        }
-        self
+        let is_right = hidden as f64 <= MOST_HIDDEN * presses().count() as f64;
+        Self { untouched_scatter: if is_right { Some(scatter) } else { self.untouched_scatter }, ..self }
     }
 
     /// Checks what a file may have got wrong.

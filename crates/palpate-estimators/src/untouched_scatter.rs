@@ -48,9 +48,18 @@ impl Rests {
 
     /// The rests of a recording; `None` where it has too few, or its rows have no order in time.
     pub fn of_recording(recording: &Recording) -> Option<Self> {
+        Self::new(recording, &recording.rests())
+    }
+
+    /// The untouched rows of a recording with too few rests, each as a rest of its own: their noise, without the residue of touches; `None` of too few rows.
+    pub fn of_single_rows(recording: &Recording) -> Option<Self> {
+        let rows: Vec<Vec<usize>> = recording.rests().into_iter().flatten().map(|row| vec![row]).collect();
+        Self::new(recording, &rows)
+    }
+
+    fn new(recording: &Recording, rests: &[Vec<usize>]) -> Option<Self> {
         let by_row = || (0..recording.rows.len()).map(|row| row as f64).collect();
         let times_s: Vec<f64> = recording.times_s().unwrap_or_else(by_row);
-        let rests = recording.rests();
         if rests.len() < FEWEST_RESTS {
             return None;
         }

@@ -288,6 +288,30 @@ fn a_false_alarm_rate_is_a_share_within_its_range() {
 }
 
 #[test]
+fn candidates_of_auto_are_kinds() {
+    let with = |only: &str| BENCH.replace("kind = \"network\"", &format!("kind = \"auto\"\nonly = {only}"));
+    let only = |text: &str| match Rig::from_toml(&with(text)).unwrap().estimator {
+        Estimator::Auto(auto) => auto.only,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(only("[\"influence\", \"neighbours\"]"), ["influence", "neighbours"]);
+    let refused = ["[\"influence\", \"neighbour\"]", "[\"auto\"]", "\"influence\"", "[3]"];
+    insta::assert_snapshot!(refused.map(|only| pointed(&with(only))).join("\n\n"));
+}
+
+#[test]
+fn a_measured_surface_without_an_estimator_compares_the_quick_ones() {
+    let text = "surface = { kind = \"measured\", length = \"100 mm\" }\n\
+                sensors = { measure = \"raw\" }\n\
+                recording = { position = \"x\", channels = [\"a\", \"b\"] }";
+    assert_eq!(Rig::from_toml(text).unwrap().estimator, Estimator::Auto(Auto::quick()));
+    assert_eq!(
+        Rig::from_toml(&BENCH.replace("[estimator]\nkind = \"network\"\n", "")).unwrap().estimator,
+        Estimator::default()
+    );
+}
+
+#[test]
 fn a_bad_recording_section_is_refused_with_a_caret() {
     let shown = refused(
         FSI_WATER,

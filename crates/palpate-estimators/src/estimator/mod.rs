@@ -539,7 +539,9 @@ impl Locator {
 
     /// False-alarm rate; `None` of a method without `no_contact`.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
-        self.method.false_alarm_rate().or_else(|| self.check.as_ref()?.false_alarm_rate())
+        let of_check = || self.check.as_ref()?.false_alarm_rate();
+        let of_scatter = || self.untouched_scatter.as_ref().map(|_| FalseAlarmRate::default());
+        self.method.false_alarm_rate().or_else(of_check).or_else(of_scatter)
     }
 
     /// True of a locator with forces in its estimates, known or estimated.

@@ -112,3 +112,43 @@ fn disabled_channels_say_nothing() {
     reading[3] = 100.0;
     assert!(!all.contains(&reading) && !without.contains(&reading));
 }
+
+#[test]
+fn methods_without_a_rule_of_no_contact_have_one_by_untouched_rows() {
+    use crate::estimator::Estimator;
+    use crate::fit::Fit;
+    use crate::influence::{Influence, Structure};
+    use palpate_core::Status;
+    const LENGTH_M: f64 = 0.3;
+    let free = Estimator::Influence(Influence { structure: Structure::Free, ..Influence::default() });
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+    let mut row = |x_m: f64, force_n: f64| {
+        let bump = |c: usize| (-((x_m - 0.05 * (c as f64 + 0.5)) / 0.08).powi(2)).exp();
+        let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
+        let reading = (0..CHANNELS).map(|c| 500.0 + 300.0 * force_n * bump(c) + noise()).collect();
+        Row {
+            position: Position::along(x_m),
+            force_n: Some(force_n),
+            nuisances: Vec::new(),
+            time_s: None,
+            reading,
+        }
+    };
+    let places_m = (0..12).map(|i| LENGTH_M * (f64::from(i) + 0.5) / 12.0);
+    // Untouched between the presses, and untouched before them all.
+    let between: Vec<Row> =
+        places_m.clone().flat_map(|x_m| [(x_m, 2.0), (x_m, 0.0)]).map(|(x_m, f)| row(x_m, f)).collect();
+    let asked = std::iter::repeat_n((0.1, 0.0), 20).chain(places_m.map(|x_m| (x_m, 2.0)));
+    let before: Vec<Row> = asked.map(|(x_m, f)| row(x_m, f)).collect();
+    for rows in [between, before] {
+        let recording = Recording::new(setup().layout(), "rests", rows);
+        let locator = free.fit(&setup(), &recording).unwrap();
+        assert!(locator.false_alarm_rate().is_some());
+        let mut count = |force_n: f64| {
+            let statuses = (0..500).map(|i| row(LENGTH_M * f64::from(i) / 500.0, force_n));
+            statuses.filter(|row| locator.locate(&row.reading).unwrap().status == Status::NoContact).count()
+        };
+        let (untouched, touched) = (count(0.0), count(0.2));
+        assert!(untouched >= 497 && touched == 0, "{untouched} {touched}");
+    }
+}

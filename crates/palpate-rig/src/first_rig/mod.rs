@@ -293,7 +293,7 @@ impl FirstRig {
         let Auto { only } = Auto::quick();
         toml.line("kind = \"auto\"", "the best of these at held-out positions");
         let quoted: Vec<String> = only.iter().map(|kind| format!("\"{kind}\"")).collect();
-        toml.line(&format!("only = [{}]", quoted.join(", ")), "without this line all others too: minutes");
+        toml.line(&format!("only = [{}]", quoted.join(", ")), "the candidates that take seconds");
         toml.text.push('\n');
         toml.comment("Next:");
         self.next_commands(name).iter().for_each(|command| toml.comment(&format!("  {command}")));
