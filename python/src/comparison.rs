@@ -7,6 +7,7 @@ use palpate::estimators::estimator::{
     take_off_drift,
 };
 use palpate::estimators::evaluation::{self, Calibration, ErrorSummary, Split, evaluate_splits, limit_ratio};
+use palpate::estimators::fit::FitTask;
 use palpate::estimators::recording;
 use palpate::estimators::setup;
 use palpate::numerics::watch::{Cancelled, Watch};
@@ -68,7 +69,8 @@ pub fn cross_validate(
     let rounds = Some(count as u64 * method.most_rounds()).filter(|most| *most > 0);
     let tried = work::run_with(py, progress, rounds, |watch| {
         let splits = self::folds(setup, &recording.inner, count, tare, watch)?;
-        let tried = evaluate_splits(setup, method, &splits, seed, &|| 0.0, watch)?;
+        let method = method.for_folds(FitTask::new(setup, &recording.inner).seed(seed).watch(watch))?;
+        let tried = evaluate_splits(setup, &method, &splits, seed, &|| 0.0, watch)?;
         Ok::<_, Box<dyn std::error::Error + Send + Sync>>(tried.evaluation)
     })?;
     let evaluation = tried.map_err(|error| of_work(&*error))?;

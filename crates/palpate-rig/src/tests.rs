@@ -8,7 +8,7 @@ mod sections;
 use super::*;
 use palpate_estimators::arrangement::Arrangement;
 use palpate_estimators::arrangement::Training;
-use palpate_estimators::estimator::Estimator;
+use palpate_estimators::estimator::{Auto, Estimator};
 use palpate_estimators::network::{InputScale, Network, OutputCoding};
 use palpate_estimators::recording::{Column, Decimal, PositionColumns, Separator, ValueColumn};
 use palpate_mechanics::sensing::Layout;

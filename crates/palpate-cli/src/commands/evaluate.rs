@@ -16,6 +16,7 @@ use palpate_estimators::evaluation::{
     ErrorSummary, Evaluation, ForceSummary, MappedPositions, Portion, Split, evaluate_splits,
     percentage_error, simulate_use_all_over_watched,
 };
+use palpate_estimators::fit::FitTask;
 use palpate_estimators::recording::{Provenance, Recording};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_length_mm};
@@ -161,7 +162,7 @@ fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
 }
 
 /// A rig: its estimator is fitted to each fold, and judged at the positions that the fold holds out.
-fn cross_validated(arguments: &Arguments, rig: Box<Rig>) -> Result<Answers, Failure> {
+fn cross_validated(arguments: &Arguments, mut rig: Box<Rig>) -> Result<Answers, Failure> {
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
         None => Observer::of_stages()
@@ -174,6 +175,14 @@ fn cross_validated(arguments: &Arguments, rig: Box<Rig>) -> Result<Answers, Fail
     let recording = recording.in_order();
     let mut splits = Split::by_folds(&recording, folds).map_err(Complaint::new)?;
     tare_splits(&arguments.tare, &rig.setup, &recording, &mut splits)?;
+    let task = FitTask::new(&rig.setup, &recording).seed(seed);
+    let chosen = Observer::of_stages()
+        .watch(|watch| rig.estimator.for_folds(task.watch(watch)))
+        .map_err(|error| Failure::from_error(&error))?;
+    if chosen != rig.estimator {
+        remark!("structure: {}, by its errors and intervals at held-out positions", chosen.name());
+    }
+    rig.estimator = chosen;
     let Rig { setup, estimator, .. } = &*rig;
     let evaluation = Observer::of_rounds(folds as u64 * estimator.most_rounds())
         .watch(|watch| evaluate_splits(setup, estimator, &splits, seed, &|| 0.0, watch))

@@ -133,7 +133,7 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
         say_drift(&rig.setup, spans);
     }
     remark!(
-        "{}: the smallest mean error × interval score at held-out positions ({CHOICE_FOLDS} folds)",
+        "chosen: {}, with the smallest mean error × interval score at held-out positions ({CHOICE_FOLDS} folds)",
         choice.best.name()
     );
     remark!("{:<24} {:>12} {:>20} {:>14}", "", "mean error", "score of 95 %", "95 % covers");

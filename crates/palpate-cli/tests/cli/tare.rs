@@ -278,7 +278,7 @@ fn held_out_readings_are_judged_without_the_drift_of_the_recording() {
     let options = ["--data", "drift.csv", "--auto-seconds", "30", "-o", "auto.json"];
     let fit = run(folder.path(), &[&["fit", "auto.toml"][..], &options].concat());
     let chosen = String::from_utf8(fit.stderr).unwrap();
-    assert!(chosen.contains("it is taken off held-out readings\nauto: influence force-"), "{chosen}");
+    assert!(chosen.contains("it is taken off held-out readings\nchosen: influence force-"), "{chosen}");
     let tried = chosen.lines().find_map(|line| line.strip_prefix("influence force-linear "));
     let auto_mm: f64 = tried.unwrap().split_whitespace().next().unwrap().parse().unwrap();
     assert!((auto_mm / tared_mm - 1.0).abs() < 1e-2, "{auto_mm} mm, {tared_mm} mm");

@@ -44,8 +44,8 @@ impl Auto {
 impl Estimator {
     /// Estimators among which it chooses at held-out positions; `None` of one that does not choose.
     ///
-    /// `influence` with `structure = "auto"` chooses a structure from 19 positions on, the number from which intervals are checked. With fewer, the
-    /// evidence of the presses decides.
+    /// `influence` with `structure = "auto"` chooses a structure from 19 positions on, the number from which intervals are checked. With fewer, and in
+    /// fits within folds, the evidence of the presses decides.
     pub fn candidates(&self, FitTask { setup, recording, .. }: FitTask) -> Option<Vec<Self>> {
         let all = || contenders(setup, self, recording.rows.len());
         match self {
@@ -61,6 +61,28 @@ impl Estimator {
             }
             _ => None,
         }
+    }
+}
+
+impl Estimator {
+    /// The estimator that it chooses; itself where it has no candidates.
+    ///
+    /// # Errors
+    /// Those of [`choose`].
+    pub fn choose_alone(&self, task: FitTask) -> Result<Self, FitError> {
+        match self.candidates(task) {
+            Some(candidates) => Ok(choose(task, candidates, None)?.best),
+            None => Ok(self.clone()),
+        }
+    }
+
+    /// The estimator for an evaluation in folds. The structure of influence functions is chosen once, by all presses: the folds would choose
+    /// among the same three at sixteen times the cost. The choice of `auto` is repeated in each fold.
+    ///
+    /// # Errors
+    /// Those of [`choose`].
+    pub fn for_folds(&self, task: FitTask) -> Result<Self, FitError> {
+        if let Self::Auto(_) = self { Ok(self.clone()) } else { self.choose_alone(task) }
     }
 }
 

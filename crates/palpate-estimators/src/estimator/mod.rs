@@ -122,14 +122,12 @@ macro_rules! estimators {
             type Error = FitError;
 
             fn fit_method(&self, task: FitTask) -> Result<Method, FitError> {
-                if let Some(candidates) = self.candidates(task) {
-                    return choose(task, candidates, None)?.best.fit_method(task);
-                }
+                let asked = task;
                 let learnt_from = self.learnt_from(task.recording);
                 let task = FitTask { recording: &learnt_from, ..task };
                 match self {
                     $(Self::$variant(estimator) => Ok(estimator.fit_method(task)?.into()),)*
-                    Self::Auto(_) => Err(FitError::NoCandidate),
+                    Self::Auto(_) => self.choose_alone(asked)?.fit_method(asked),
                 }
             }
 
@@ -150,16 +148,14 @@ macro_rules! estimators {
 
             /// Fits with a seed, watched. A method that is learnt has a [`ReadingCheck`] beside it.
             fn fit_without_interval_check(&self, task: FitTask) -> Result<Locator, FitError> {
-                if let Some(candidates) = self.candidates(task) {
-                    return choose(task, candidates, None)?.best.fit_without_interval_check(task);
+                if let Self::Auto(_) = self {
+                    return self.choose_alone(task)?.fit_without_interval_check(task);
                 }
                 self.fit_beside(task, || ReadingCheck::fit(task))
             }
 
             fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Locator>) -> Result<(), FitError> {
-                if let Some(candidates) = self.candidates(task) {
-                    return choose(task, candidates, None)?.best.fit_many(task, queue);
-                }
+                let asked = task;
                 let learnt_from = self.learnt_from(task.recording);
                 let task = FitTask { recording: &learnt_from, ..task };
                 match self {
@@ -167,7 +163,7 @@ macro_rules! estimators {
                         let map = |_, locator: Fitted<$method>| locator.into_locator();
                         Ok(estimator.fit_many(task, &mut Mapped { queue, map })?)
                     })*
-                    Self::Auto(_) => Err(FitError::NoCandidate),
+                    Self::Auto(_) => self.choose_alone(asked)?.fit_many(asked, queue),
                 }
             }
         }
