@@ -554,7 +554,9 @@ impl<M: Locate> Fitted<M> {
 
     /// The locator of a method without a rule of `no_contact`, with the scatter of the untouched rows about their mean as its rule.
     fn by_untouched_rows(self, recording: &Recording) -> Self {
-        let rests = Rests::of_recording(recording).or_else(|| Rests::of_single_rows(recording));
+        let rests = Rests::of_recording(recording)
+            .or_else(|| Rests::of_single_rows(recording))
+            .or_else(|| Rests::of_repeats(recording));
         let Some((centre, rests)) = self.untouched.clone().zip(rests) else { return self };
         let scatter = rests.scatter(centre, self.setup.layout(), FalseAlarmRate::default());
         self.with_scatter(scatter, recording)

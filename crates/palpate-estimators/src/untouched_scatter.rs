@@ -13,7 +13,7 @@
 //! surface: with few rests of unrelated channels the test is conservative.
 
 use crate::locator_fault::LocatorFault;
-use crate::recording::Recording;
+use crate::recording::{Recording, Row};
 use crate::status::FalseAlarmRate;
 use palpate_mechanics::sensing::Layout;
 use palpate_numerics::{chi_squared_critical_value, mean};
@@ -55,6 +55,32 @@ impl Rests {
     pub fn of_single_rows(recording: &Recording) -> Option<Self> {
         let rows: Vec<Vec<usize>> = recording.rests().into_iter().flatten().map(|row| vec![row]).collect();
         Self::new(recording, &rows)
+    }
+
+    /// The noise by repeats, of a recording with too few untouched rows: rows of one position and force, and untouched rows, about their means. `None` of
+    /// too few repeats.
+    pub fn of_repeats(recording: &Recording) -> Option<Self> {
+        let rows = &recording.rows;
+        let key = |row: &usize| {
+            let Row { position, force_n, .. } = &rows[*row];
+            let touched = rows[*row].touches().then_some((position.x_m, position.y_m, *force_n));
+            touched.map(|(x_m, y_m, force_n)| [x_m, y_m, force_n.unwrap_or(f64::NAN)].map(f64::to_bits))
+        };
+        let mut ordered: Vec<usize> = (0..rows.len()).collect();
+        ordered.sort_by_key(key);
+        let groups: Vec<&[usize]> = ordered.chunk_by(|a, b| key(a) == key(b)).collect();
+        let freedom = rows.len() - groups.len();
+        if freedom < FEWEST_RESTS {
+            return None;
+        }
+        let deviations = groups.into_iter().flat_map(|group| {
+            let mean = recording.mean_reading(group);
+            let off = move |row: &usize| -> Vec<f64> {
+                rows[*row].reading.iter().zip(&mean).map(|(value, mean)| value - mean).collect()
+            };
+            group.iter().map(move |row| (off(row), 1.0))
+        });
+        Some(Self { deviations: deviations.collect(), freedom: freedom as f64 })
     }
 
     fn new(recording: &Recording, rests: &[Vec<usize>]) -> Option<Self> {

@@ -11,7 +11,7 @@ use crate::tare::say_drift;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
 use palpate_estimators::description;
-use palpate_estimators::estimator::{CHOICE_FOLDS, FitCost, TimeLimit, Tried, choose};
+use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, FitCost, FitError, TimeLimit, Tried, choose};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
@@ -109,14 +109,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
     let cost = rig.estimator.fit_cost(&rig.setup, recording);
     let task = FitTask::new(&rig.setup, recording);
-    if rig.estimator.candidates(task).is_none() {
-        return cost.with_interval_check(recording);
-    }
+    let Some(candidates) = rig.estimator.candidates(task) else { return cost.with_interval_check(recording) };
     let choice = cost.seconds.min(f64::from(arguments.auto_seconds));
-    // The one that is chosen takes no longer than one fold of all.
-    let chosen =
-        FitCost { seconds: cost.seconds / CHOICE_FOLDS as f64, ..cost }.with_interval_check(recording);
-    FitCost { seconds: choice + chosen.seconds, ..cost }
+    // The chosen one takes no longer than the slowest.
+    let costs = candidates.iter().map(|candidate| candidate.fit_cost(&rig.setup, recording));
+    let slowest = costs.fold(FitCost { seconds: 0.0, ..cost }, |slowest, cost| FitCost {
+        seconds: slowest.seconds.max(cost.seconds),
+        memory_bytes: slowest.memory_bytes.max(cost.memory_bytes),
+    });
+    FitCost { seconds: choice + slowest.with_interval_check(recording).seconds, ..slowest }
 }
 
 /// The rig with the estimator that cross-validation chooses, and the figures of its candidates.
@@ -126,9 +127,16 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     let start = Instant::now();
     let clock = || start.elapsed().as_secs_f64();
     let limit = TimeLimit { clock: &clock, seconds: f64::from(arguments.auto_seconds) };
-    let choice = Observer::of_stages()
-        .watch(|watch| choose(task.watch(watch), candidates, Some(limit)))
-        .map_err(|error| Failure::from_error(&error))?;
+    let choice = match Observer::of_stages().watch(|watch| choose(task.watch(watch), candidates, Some(limit)))
+    {
+        Err(FitError::NotInTime { seconds, .. }) if matches!(rig.estimator, Estimator::Influence(_)) => {
+            remark!(
+                "structure: by the evidence of the presses, as no structure was compared within {seconds} s"
+            );
+            return Ok((rig, Vec::new()));
+        }
+        chosen => chosen.map_err(|error| Failure::from_error(&error))?,
+    };
     if let Some(spans) = &choice.drift {
         say_drift(&rig.setup, spans);
     }

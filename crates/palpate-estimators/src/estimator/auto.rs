@@ -6,10 +6,13 @@ use crate::evaluation::{Evaluation, Split};
 use crate::fit::FitTask;
 use crate::influence::{Influence, InfluenceFitError};
 use crate::offset_course::OffsetCourse;
+use crate::reading_check::ReadingCheck;
+use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::tried::Tried;
 use palpate_numerics::FEWEST_FOR_95;
 use palpate_numerics::watch::{Cancelled, Watch};
+use std::borrow::Cow;
 
 /// Choice among estimators (`kind = "auto"`).
 ///
@@ -145,6 +148,15 @@ pub fn take_off_drift(
 /// Folds of the cross-validation that chooses.
 pub const CHOICE_FOLDS: usize = 5;
 
+/// The rows by which candidates are compared. Structures of one method keep their order with more than [`ReadingCheck::MOST_ROWS`] rows, and so many are enough.
+pub(super) fn compared_rows<'a>(candidates: &[Estimator], recording: &'a Recording) -> Cow<'a, Recording> {
+    if candidates.iter().all(|candidate| matches!(candidate, Estimator::Influence(_))) {
+        ReadingCheck::thinned(recording)
+    } else {
+        Cow::Borrowed(recording)
+    }
+}
+
 /// Chooses among [candidates](Estimator::candidates) for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds: the least geometric mean of mean error
 /// and interval score. A drift that the presses show is subtracted from the held-out readings, as a tare does in use.
 ///
@@ -169,9 +181,9 @@ pub fn choose(
         (Ok(()), Some(TimeLimit { seconds, .. })) => FitError::NotInTime { seconds, stopped },
         _ => Cancelled.into(),
     };
+    let recording = compared_rows(&candidates, recording).into_owned().in_order();
     let positions = recording.distinct_positions().len();
     let unsuited = |error| FitError::Choice(Box::new(error));
-    let recording = recording.clone().in_order();
     let mut splits =
         Split::by_folds(&recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
     let whole = FitTask::new(setup, &recording).watch(limited);

@@ -3,6 +3,7 @@
 //! Times are for one core that has other work too, and on an idle one up to four times too long. `cargo bench -p palpate --bench cost` measures
 //! them, and docs/measured.md has what it found.
 
+use super::auto::compared_rows;
 use super::{CHOICE_FOLDS, Estimator, is_learnt};
 use crate::features::FeatureKind;
 use crate::fit::{CHECK_FOLDS, FitTask};
@@ -69,7 +70,8 @@ impl Estimator {
     /// Memory and time of fitting to a recording of a setup.
     pub fn fit_cost(&self, setup: &Setup, recording: &Recording) -> FitCost {
         if let Some(candidates) = self.candidates(FitTask::new(setup, recording)) {
-            let costs = candidates.iter().map(|candidate| candidate.fit_cost(setup, recording));
+            let compared = compared_rows(&candidates, recording);
+            let costs = candidates.iter().map(|candidate| candidate.fit_cost(setup, &compared));
             // One after the other, in each fold.
             return costs.fold(FitCost { memory_bytes: 0.0, seconds: 0.0 }, |sum, cost| FitCost {
                 memory_bytes: sum.memory_bytes.max(cost.memory_bytes),

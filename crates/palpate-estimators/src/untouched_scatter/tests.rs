@@ -135,12 +135,16 @@ fn methods_without_a_rule_of_no_contact_have_one_by_untouched_rows() {
         }
     };
     let places_m = (0..12).map(|i| LENGTH_M * (f64::from(i) + 0.5) / 12.0);
+    let places_m_of_repeats = places_m.clone().flat_map(|x_m| [(x_m, 2.0), (x_m, 2.0)]);
     // Untouched between the presses, and untouched before them all.
     let between: Vec<Row> =
         places_m.clone().flat_map(|x_m| [(x_m, 2.0), (x_m, 0.0)]).map(|(x_m, f)| row(x_m, f)).collect();
     let asked = std::iter::repeat_n((0.1, 0.0), 20).chain(places_m.map(|x_m| (x_m, 2.0)));
     let before: Vec<Row> = asked.map(|(x_m, f)| row(x_m, f)).collect();
-    for rows in [between, before] {
+    // A few untouched rows, and repeats of presses.
+    let repeated = places_m_of_repeats.chain(std::iter::repeat_n((0.1, 0.0), 2));
+    let repeated: Vec<Row> = repeated.map(|(x_m, f)| row(x_m, f)).collect();
+    for rows in [between, before, repeated] {
         let recording = Recording::new(setup().layout(), "rests", rows);
         let locator = free.fit(&setup(), &recording).unwrap();
         assert!(locator.false_alarm_rate().is_some());

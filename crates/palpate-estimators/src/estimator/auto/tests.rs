@@ -4,7 +4,7 @@ use super::*;
 use crate::fit::Fit;
 use crate::fixtures::paper;
 use crate::influence::Structure;
-use crate::recording::{Recording, Row};
+use crate::recording::Row;
 use palpate_mechanics::contact::Position;
 use palpate_numerics::watch::Progress;
 use rand::{RngExt, SeedableRng};

@@ -125,6 +125,13 @@ impl Learnt {
         let decades = (*ALL_DECADES.start(), *ALL_DECADES.end());
         let mut search = Search { presses: &searched, extent, structure, noise, watch, decades };
         let smooth = search.smooth()?;
+        if smooth.fits.is_empty() {
+            return if structure == Structure::Auto {
+                Ok(None)
+            } else {
+                Err(MeasuredError::TooFewPresses { presses: pressed.len() })
+            };
+        }
         if structure == Structure::Auto && !smooth.prior.has_response() {
             return Ok(None);
         }

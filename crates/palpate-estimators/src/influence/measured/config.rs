@@ -57,6 +57,14 @@ pub enum MeasuredError {
         /// Which row, from 1.
         row: usize,
     },
+    /// Presses that leave no influence function and noise to be estimated beside the offset.
+    #[error(
+        "{presses} presses tell no influence functions with a force: press at least 3 times, at two positions or more"
+    )]
+    TooFewPresses {
+        /// Number of presses.
+        presses: usize,
+    },
     /// An error of the regression.
     #[error(transparent)]
     Regression(#[from] RegressionError),

@@ -1,6 +1,7 @@
 //! Strips that are pressed a few times, each time at another place, with no rows of force 0: as many readings as coefficients.
 
 use super::*;
+use crate::influence::measured::MeasuredError;
 
 /// Touches of a strip.
 const TOUCHES: usize = 100;
@@ -87,4 +88,22 @@ fn few_presses_tell_no_more_than_they_can() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn two_presses_are_too_few_for_a_structure_by_the_force() {
+    let setup = Setup::measured(0.045, &["c"]).unwrap();
+    let row = |x_m: f64, force_n: f64| Row {
+        position: Position::along(x_m),
+        force_n: Some(force_n),
+        nuisances: Vec::new(),
+        time_s: None,
+        reading: vec![5.0 * force_n],
+    };
+    let recording = Recording::new(setup.layout(), "two", vec![row(0.01, 1.0), row(0.02, 2.0)]);
+    let fitted = |structure| fit(FitTask::new(&setup, &recording), structure);
+    for structure in [Structure::ForceLinear, Structure::ForceMonotone] {
+        assert_eq!(fitted(structure).unwrap_err(), MeasuredError::TooFewPresses { presses: 2 });
+    }
+    assert!(fitted(Structure::Auto).unwrap().is_none());
 }
