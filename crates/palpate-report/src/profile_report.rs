@@ -353,6 +353,10 @@ fn status_in_words(profile: &LoadProfile) -> Markup {
             b { "Outside the model" } ": no load explains the reading within its noise. The least sum of squared residuals is "
             (misfit) " standard deviations squared; noise alone seldom makes more than " (worst) "."
         },
+        Status::Ambiguous => html! {
+            b { "Ambiguous" } ": the number of patches is not resolved. More patches than these explain the reading better, with a probability of error \
+            between 0.1 % and 5 %. The intervals contain both explanations."
+        },
         _ => html! {
             "A load explains the reading: the least sum of squared residuals is " (misfit) " standard deviations squared, below "
             (worst) "."

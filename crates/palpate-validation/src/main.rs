@@ -1,4 +1,4 @@
-//! `palpate-validation real-benches`: runs an experiment, prints its table and writes its figures.
+//! `palpate-validation EXPERIMENT`: runs an experiment, prints its table and writes its figures.
 #![forbid(unsafe_code)]
 
 use std::io::{IsTerminal, Write};
@@ -8,7 +8,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
-use palpate_validation::real_benches::{self, BENCHES, Options, Results};
+use palpate_validation::{load_profiles, real_benches};
+use serde::Serialize;
 
 /// Accuracy, coverage and statuses of palpate's estimators.
 #[derive(Parser)]
@@ -29,9 +30,21 @@ enum Experiment {
         #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=10_000))]
         contacts: u32,
         /// A bench to run, such as `real-strip`; may be given several times [default: all]
-        #[arg(long, value_name = "NAME", value_parser = BENCHES.map(|(name, _)| name))]
+        #[arg(long, value_name = "NAME", value_parser = real_benches::BENCHES.map(|(name, _)| name))]
         bench: Vec<String>,
         /// Folder for the figures, real-benches.json
+        #[arg(long, value_name = "FOLDER")]
+        out: Option<PathBuf>,
+    },
+    /// Intervals of load profiles on the founding paper's beam
+    LoadProfiles {
+        /// Readings of each row
+        #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+        readings: u64,
+        /// Seed of loads and noise
+        #[arg(long, value_name = "N", default_value_t = 0)]
+        seed: u64,
+        /// Folder for the figures, load-profiles.json
         #[arg(long, value_name = "FOLDER")]
         out: Option<PathBuf>,
     },
@@ -48,30 +61,50 @@ fn main() -> ExitCode {
 }
 
 fn run(experiment: Experiment) -> Result<()> {
-    let Experiment::RealBenches { seeds, contacts, bench, out } = experiment;
-    let mut options = Options { seeds, contacts: contacts as usize, ..Options::default() };
-    if !bench.is_empty() {
-        options.benches = bench;
-    }
-    if let Some(out) = &out {
-        std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
-    }
-    let (start, is_seen) = (Instant::now(), std::io::stderr().is_terminal());
-    let results = real_benches::run(&options, |what, done, of| {
-        if is_seen {
-            eprint!("\r\x1b[K{done} of {of}, {:.0} s: {what}", start.elapsed().as_secs_f64());
+    match experiment {
+        Experiment::RealBenches { seeds, contacts, bench, out } => {
+            make_folder(out.as_deref())?;
+            let mut options =
+                real_benches::Options { seeds, contacts: contacts as usize, ..Default::default() };
+            if !bench.is_empty() {
+                options.benches = bench;
+            }
+            let results = with_progress(|progress| real_benches::run(&options, progress))?;
+            finish("real-benches", &results.markdown(), &results, out.as_deref())
         }
-    })?;
-    if is_seen {
-        eprint!("\r\x1b[K");
+        Experiment::LoadProfiles { readings, seed, out } => {
+            make_folder(out.as_deref())?;
+            let options = load_profiles::Options { readings, seed };
+            let results = with_progress(|progress| load_profiles::run(options, progress))?;
+            finish("load-profiles", &results.markdown(), &results, out.as_deref())
+        }
     }
-    std::io::stdout().write_all(results.markdown().as_bytes()).context("cannot print the table")?;
-    out.map_or(Ok(()), |out| write(&out, &results))
 }
 
-/// Writes the figures under a temporary name, and renames them.
-fn write(folder: &Path, results: &Results) -> Result<()> {
-    let path = folder.join("real-benches.json");
+fn make_folder(folder: Option<&Path>) -> Result<()> {
+    let Some(folder) = folder else { return Ok(()) };
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))
+}
+
+/// Runs an experiment, with its progress on a terminal.
+fn with_progress<R>(run: impl FnOnce(&(dyn Fn(&str, usize, usize) + Sync)) -> Result<R>) -> Result<R> {
+    let (start, is_terminal) = (Instant::now(), std::io::stderr().is_terminal());
+    let results = run(&|name, finished, of| {
+        if is_terminal {
+            eprint!("\r\x1b[K{finished} of {of}, {:.0} s: {name}", start.elapsed().as_secs_f64());
+        }
+    });
+    if is_terminal {
+        eprint!("\r\x1b[K");
+    }
+    results
+}
+
+/// Prints the table, and writes the figures to a folder under a temporary name that is then renamed.
+fn finish(name: &str, table: &str, results: &impl Serialize, folder: Option<&Path>) -> Result<()> {
+    std::io::stdout().write_all(table.as_bytes()).context("cannot print the table")?;
+    let Some(folder) = folder else { return Ok(()) };
+    let path = folder.join(format!("{name}.json"));
     let cannot = || format!("cannot write {}", path.display());
     let mut file = tempfile::NamedTempFile::new_in(folder).with_context(cannot)?;
     serde_json::to_writer_pretty(&mut file, results).with_context(cannot)?;

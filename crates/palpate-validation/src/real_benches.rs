@@ -1,13 +1,12 @@
 //! Benches as they come, beside the same benches in a clean world: errors, coverage of intervals, statuses.
 
 use crate::experiment::{Bench, Knowledge, World, Zero};
+use crate::parallel::in_parallel;
 use crate::tally::{Figures, Tally};
 use anyhow::{Context, Result};
 use palpate::prelude::{Estimator, GaussianProcessEstimator, Influence, Rig};
 use serde::Serialize;
 use std::fmt::Write;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 /// The benches, by their file in the folder `examples`.
 pub const BENCHES: [(&str, &str); 4] = [
@@ -102,25 +101,9 @@ fn run_on(
     progress: impl Fn(&str, usize, usize) + Sync,
 ) -> Result<Results> {
     let cases = cases(&benches)?;
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let judged = Mutex::new(Vec::new());
-    let work = || {
-        loop {
-            let number = next.fetch_add(1, Ordering::Relaxed);
-            let Some(case) = cases.get(number) else { return };
-            let rows = case.rows(options);
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            progress(&format!("{}, {}, {}", case.name, case.knowledge.1, case.world.1), done, cases.len());
-            judged.lock().unwrap_or_else(PoisonError::into_inner).push((number, rows));
-        }
-    };
-    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(cases.len());
-    std::thread::scope(|scope| {
-        (0..threads).for_each(|_| drop(scope.spawn(work)));
-    });
-    let mut judged = judged.into_inner().unwrap_or_else(PoisonError::into_inner);
-    judged.sort_by_key(|(number, _)| *number);
-    let rows = judged.into_iter().map(|(_, rows)| rows).collect::<Result<Vec<_>>>()?.concat();
+    let name = |case: &Case| format!("{}, {}, {}", case.name, case.knowledge.1, case.world.1);
+    let rows = in_parallel(&cases, |case| case.rows(options), name, progress);
+    let rows = rows.into_iter().collect::<Result<Vec<_>>>()?.concat();
     Ok(Results {
         palpate: env!("CARGO_PKG_VERSION"),
         experiment: "real-benches",
@@ -265,6 +248,7 @@ fn cells(figures: &Figures) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     #[test]
     fn the_smallest_experiment_has_a_row_for_every_case_and_shows_the_worlds_apart() {

@@ -7,7 +7,8 @@ use crate::output::{self, Table};
 use crate::progress::Observer;
 use crate::target::{Inputs, Target};
 use palpate_estimators::estimator::{
-    CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, patch_limits,
+    CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, Status,
+    patch_limits,
 };
 use palpate_estimators::simulate::simulate_loads_watched;
 use palpate_mechanics::contact::Position;
@@ -182,6 +183,11 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
         None => format!("simulated: {}", told.status),
     };
     output::say(heading)?;
+    if told.status == Status::Ambiguous.name() {
+        output::say(
+            "the number of patches is not resolved: more than these explain the reading better, at 5 %",
+        )?;
+    }
     let misfit =
         if told.misfit < 1e6 { format!("{:.1}", told.misfit) } else { format!("{:.1e}", told.misfit) };
     output::say(format!("misfit {misfit}; noise seldom makes more than {:.1}", told.worst_misfit))?;

@@ -9,10 +9,8 @@
 //! The least misfit for a given sum is had without a constraint: x that minimises ‖A·x − y‖² + ρ²·(c·x − t)² over x ≥ 0 is, by the conditions
 //! of Karush, Kuhn and Tucker, also the least for its own sum, and that rises with t.
 
-use ndarray::{Array1, Array2, Axis};
-use palpate_numerics::Cholesky;
-
-use super::smoothness::block;
+use ndarray::{Array1, Array2};
+use palpate_numerics::{Cholesky, holding};
 
 /// Misfit above the least, up to which a load is not excluded. For an unknown without bounds it would be 3.84, the 95 % quantile of χ² of one;
 /// that no load pulls makes the least misfit larger, and with 3.84 a total of two pads in mid-span was held in 92 % of readings.
@@ -40,9 +38,10 @@ pub(super) struct Bounds {
     stiffness: f64,
 }
 
-/// Sum and misfit of a load that has the least misfit for its sum.
-#[derive(Clone, Copy)]
+/// A load that has the least misfit for its sum.
+#[derive(Clone)]
 struct Least {
+    load: Array1<f64>,
     sum: f64,
     misfit: f64,
 }
@@ -58,28 +57,62 @@ impl Bounds {
         Self { gram, right, square, best, most, stiffness }
     }
 
+    /// The least misfit of all loads on these cells.
+    pub fn least_misfit(&self) -> f64 {
+        self.most - RATIO_95
+    }
+
     /// Bounds of c·x; the upper one is infinite where the reading gives none.
     pub fn of_sum(&self, c: &Array1<f64>) -> (f64, f64) {
-        let best = c.dot(&self.best);
-        let step = 0.01 * best.abs().max(1.0 / self.stiffness.sqrt());
-        let low = self.bound(c, best, -step).unwrap_or(f64::NEG_INFINITY);
-        let high = self.bound(c, best, step).unwrap_or(f64::INFINITY);
+        let [low, high] = [-1.0, 1.0].map(|side| self.bound(c, side));
+        let low = low.map_or(f64::NEG_INFINITY, |(sum, _)| sum);
+        let high = high.map_or(f64::INFINITY, |(sum, _)| sum);
         // A sum of forces is no less than 0.
         let low = if c.iter().all(|c| *c >= 0.0) { low.max(0.0) } else { low };
         (low, high)
     }
 
-    /// True where some load on these cells alone is not excluded.
-    pub fn is_open(&self, cells: &[usize]) -> bool {
-        let (gram, right) = (block(&self.gram, cells), self.right.select(Axis(0), cells));
-        let x = LeastSquares { gram: &gram, right: &right, drawn: None }.non_negative();
-        misfit((&gram, &right, self.square), &x) <= self.most
+    /// Bounds of the mean Σ a·x/Σ x over some cells, where a is the coordinate of each.
+    ///
+    /// A mean v has a load that is not excluded if the bounds of Σ (a − v)·x contain 0. The load at the upper bound of that sum has a mean above v, which
+    /// is the next v (Dinkelbach, *On Nonlinear Fractional Programming*, Management Science 13, 1967).
+    pub fn of_mean(&self, cells: &[usize], coordinates: &[f64]) -> (f64, f64) {
+        let ends = coordinates.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |ends, a| holding(ends, *a));
+        let mean = |load: &Array1<f64>| {
+            let (mut moment, mut sum) = (0.0, 0.0);
+            for (cell, a) in cells.iter().zip(coordinates) {
+                (moment, sum) = (moment + a * load[*cell], sum + load[*cell]);
+            }
+            (sum > 0.0).then(|| moment / sum)
+        };
+        let size = ends.1 - ends.0;
+        let bound = |side: f64, end: f64| {
+            let Some(mut v) = mean(&self.best) else { return end };
+            for _ in 0..MOST_STEPS {
+                let mut c = Array1::zeros(self.right.len());
+                cells.iter().zip(coordinates).for_each(|(cell, a)| c[*cell] = (a - v) / size);
+                let next = self.bound(&c, side).map(|(_, load)| mean(&load));
+                let Some(Some(next)) = next else { return end };
+                let gain = side * (next - v);
+                if gain > 0.0 {
+                    v = next;
+                }
+                if gain <= NEGLIGIBLE * size {
+                    break;
+                }
+            }
+            v
+        };
+        if size > 0.0 { (bound(-1.0, ends.0), bound(1.0, ends.1)) } else { ends }
     }
 
-    /// The sum at which the least misfit reaches the largest one, from `best` by steps of `step`; `None` where it never does.
-    fn bound(&self, c: &Array1<f64>, best: f64, step: f64) -> Option<f64> {
-        let mut inside = (best, Least { sum: best, misfit: self.most - RATIO_95 });
-        let mut way = step;
+    /// The sum at which the least misfit reaches the largest one, on one side of the best sum, and a load beside it that is not excluded; `None`
+    /// where there is no such sum.
+    fn bound(&self, c: &Array1<f64>, side: f64) -> Option<(f64, Array1<f64>)> {
+        let best = c.dot(&self.best);
+        let step = side * 0.01 * best.abs().max(1.0 / self.stiffness.sqrt());
+        let least = Least { load: self.best.clone(), sum: best, misfit: self.least_misfit() };
+        let (mut inside, mut way) = ((best, least), step);
         for _ in 0..MOST_DOUBLINGS {
             let t = best + way;
             let least = self.least(c, t);
@@ -87,8 +120,8 @@ impl Bounds {
                 return Some(self.between(c, inside, (t, least)));
             }
             // No load has a smaller sum than none.
-            if step < 0.0 && least.sum <= 0.0 && c.iter().all(|c| *c >= 0.0) {
-                return Some(0.0);
+            if side < 0.0 && least.sum <= 0.0 && c.iter().all(|c| *c >= 0.0) {
+                return Some((0.0, least.load));
             }
             inside = (t, least);
             way *= 2.0;
@@ -96,8 +129,13 @@ impl Bounds {
         None
     }
 
-    /// The sum between two targets t at which the least misfit is the largest one.
-    fn between(&self, c: &Array1<f64>, mut inside: (f64, Least), mut outside: (f64, Least)) -> f64 {
+    /// The sum between two targets t at which the least misfit is the largest one, with the load of the inner target.
+    fn between(
+        &self,
+        c: &Array1<f64>,
+        mut inside: (f64, Least),
+        mut outside: (f64, Least),
+    ) -> (f64, Array1<f64>) {
         for _ in 0..MOST_STEPS {
             let over = outside.1.misfit - self.most;
             if over < NEGLIGIBLE || self.most - inside.1.misfit < NEGLIGIBLE {
@@ -105,18 +143,19 @@ impl Bounds {
             }
             let t = 0.5 * (inside.0 + outside.0);
             let least = self.least(c, t);
-            *(if least.misfit > self.most { &mut outside } else { &mut inside }) = (t, least);
+            let end = if least.misfit > self.most { &mut outside } else { &mut inside };
+            *end = (t, least);
         }
-        let share =
-            (self.most - inside.1.misfit) / (outside.1.misfit - inside.1.misfit).max(f64::MIN_POSITIVE);
-        inside.1.sum + share * (outside.1.sum - inside.1.sum)
+        let (inside, outside) = (inside.1, outside.1);
+        let share = (self.most - inside.misfit) / (outside.misfit - inside.misfit).max(f64::MIN_POSITIVE);
+        (inside.sum + share * (outside.sum - inside.sum), inside.load)
     }
 
     /// The load of least misfit for its sum, drawn to `t`.
     fn least(&self, c: &Array1<f64>, t: f64) -> Least {
         let drawn = Some((c, self.stiffness, t));
         let x = LeastSquares { gram: &self.gram, right: &self.right, drawn }.non_negative();
-        Least { sum: c.dot(&x), misfit: misfit((&self.gram, &self.right, self.square), &x) }
+        Least { sum: c.dot(&x), misfit: misfit((&self.gram, &self.right, self.square), &x), load: x }
     }
 }
 
@@ -252,5 +291,24 @@ mod tests {
         assert_eq!(blind.of_sum(&Array1::ones(2)).1, f64::INFINITY);
         let faint = Bounds::new(&Array2::from_elem((1, 1), 2.0), &Array1::from(vec![1.0]));
         assert_eq!(faint.of_sum(&Array1::ones(1)).0, 0.0);
+    }
+
+    #[test]
+    fn bounds_of_a_mean_are_those_of_two_cells() {
+        // Two sensors, each of one cell at 0 m or 1 m: forces of 20/2 and 10/2 N with a standard deviation of 1/2 N. A mean v has no force
+        // (1 − v)·b = v·a, and the misfit of the nearest one is (v·20 − (1 − v)·10)²/(v² + (1 − v)²).
+        let a = Array2::from_diag(&Array1::from(vec![2.0, 2.0]));
+        let bounds = Bounds::new(&a, &Array1::from(vec![20.0, 10.0]));
+        let misfit = |v: f64| (v * 20.0 - (1.0 - v) * 10.0).powi(2) / (v * v + (1.0 - v) * (1.0 - v));
+        let (low, high) = bounds.of_mean(&[0, 1], &[0.0, 1.0]);
+        assert!(low < 1.0 / 3.0 && 1.0 / 3.0 < high, "{low} {high}");
+        for end in [low, high] {
+            assert!((misfit(end) - RATIO_95).abs() < 0.1, "{end}: {}", misfit(end));
+        }
+        // One cell has one mean, and an invisible cell may have all of the load.
+        assert_eq!(bounds.of_mean(&[1], &[0.3]), (0.3, 0.3));
+        let blind =
+            Bounds::new(&Array2::from_shape_vec((1, 2), vec![2.0, 0.0]).unwrap(), &Array1::from(vec![20.0]));
+        assert_eq!(blind.of_mean(&[0, 1], &[0.0, 1.0]).1, 1.0);
     }
 }

@@ -11,8 +11,9 @@
 //! readings are proportional where it is small, as a share s of the way from the least, a part of the grid, to the widest
 //! at its centre: w² = w_min² + s·(w_max(c)² − w_min²).
 
+use super::cells::Cells;
 use super::cumulative::CumulativeInfluence;
-use ndarray::{Array1, Array2};
+use ndarray::{Array1, Array2, ArrayView1};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, UniformLoad};
 use palpate_numerics::{Cholesky, chi_squared_critical_value};
@@ -25,6 +26,8 @@ const WHOLE: f64 = 0.95;
 const LOOKED_AT: usize = 16;
 /// Misfit that does not matter.
 const NEGLIGIBLE: f64 = 1e-3;
+/// Share by which the diagonal is raised in the projection of the score test.
+const SCORE_DAMPING: f64 = 1e-9;
 /// Steps of a minimisation; a dozen is usual.
 const MOST_STEPS: usize = 200;
 /// Share by which the diagonal of the normal equations is raised at first, at least, and at most.
@@ -68,28 +71,111 @@ pub(super) enum Aim {
 type Drawn = (Aim, f64, f64);
 
 impl<'a> EvenLoads<'a> {
-    /// The loads of least misfit, from those that a profile shows; `None` without any.
+    /// The loads of least misfit, from those of a profile; `None` without any.
     pub fn new(
         table: &'a CumulativeInfluence,
         y: &'a Array1<f64>,
         extent: Extent,
         starts: &[UniformLoad],
     ) -> Option<Self> {
-        let mut loads = Self {
-            table,
-            y,
-            dimensions: extent.dimensions(),
-            best: Minimum { unknowns: Vec::new(), misfit: f64::INFINITY },
-        };
-        // Beside a support a profile is drawn inwards: the same moment may be that of a heavier load nearer to it.
-        for nearer in [1.0, 0.5, 0.25] {
-            let unknowns = starts.iter().flat_map(|start| loads.unknowns_of(start, nearer)).collect();
-            let found = loads.minimum(unknowns, None, &[]);
-            if found.misfit < loads.best.misfit {
-                loads.best = found;
+        let no_loads = Minimum { unknowns: Vec::new(), misfit: f64::INFINITY };
+        let loads = Self { table, y, dimensions: extent.dimensions(), best: no_loads };
+        // Beside a support a profile is drawn inwards: a heavier load nearer to the support may have the same moment.
+        let nearer = [1.0, 0.5, 0.25].into_iter();
+        let starts = nearer.map(|nearer| {
+            starts.iter().flat_map(|start| loads.unknowns_of(start, nearer)).collect::<Vec<f64>>()
+        });
+        loads.fit_from(starts.filter(|start| !start.is_empty()).collect())
+    }
+
+    /// The loads of least misfit from several starts, along x; `None` without any.
+    fn fit_from(&self, starts: Vec<Vec<f64>>) -> Option<Self> {
+        let fits = starts.into_iter().map(|start| self.minimum(start, None, &[]));
+        let best =
+            fits.min_by(|a, b| a.misfit.total_cmp(&b.misfit)).filter(|best| best.misfit.is_finite())?;
+        let mut loads: Vec<&[f64]> = best.unknowns.chunks(self.each()).collect();
+        loads.sort_by(|a, b| a[1].total_cmp(&b[1]));
+        let best = Minimum { unknowns: loads.concat(), misfit: best.misfit };
+        Some(Self { table: self.table, y: self.y, dimensions: self.dimensions, best })
+    }
+
+    /// The fit of one more load than these: from each of these in two halves, and from a load in each cell where the score test has a maximum.
+    /// `influence` has the mean influence of each cell, a cell a column.
+    pub fn with_one_more(&self, cells: &Cells, influence: &Array2<f64>) -> Option<Self> {
+        let loads: Vec<UniformLoad> = (0..self.count()).map(|number| self.fitted_load(number)).collect();
+        let mut starts = Vec::new();
+        for (number, load) in loads.iter().enumerate() {
+            for halves in self.halves(load) {
+                let others = loads.iter().enumerate().filter(|(other, _)| *other != number);
+                let start = others.map(|(_, other)| other).chain(&halves);
+                starts.push(start.flat_map(|load| self.unknowns_of(load, 1.0)).collect());
             }
         }
-        (!starts.is_empty() && loads.best.misfit.is_finite()).then_some(loads)
+        for load in self.additions(cells, influence) {
+            starts.push([&self.best.unknowns[..], &self.unknowns_of(&load, 1.0)].concat());
+        }
+        self.fit_from(starts)
+    }
+
+    /// Both halves of a load along each axis.
+    fn halves(&self, load: &UniformLoad) -> Vec<[UniformLoad; 2]> {
+        let (from, to, middle) = (load.from(), load.to(), load.centre());
+        let half = |from, to| UniformLoad::new(from, to, 0.5 * load.force_n());
+        let mut halves = vec![[
+            half(from, Position { x_m: middle.x_m, ..to }),
+            half(Position { x_m: middle.x_m, ..from }, to),
+        ]];
+        if self.dimensions > 1 {
+            halves.push([
+                half(from, Position { y_m: middle.y_m, ..to }),
+                half(Position { y_m: middle.y_m, ..from }, to),
+            ]);
+        }
+        halves
+    }
+
+    /// Loads of one cell where a load lowers the misfit the most to first order, all unknowns of these loads being fitted again (Rao's score
+    /// test): with S the derivatives of the reading, r the residual and a′ the influence of the cell less its projection on S, the gain is
+    /// (a′·r)²/|a′|² for a′·r > 0.
+    fn additions(&self, cells: &Cells, influence: &Array2<f64>) -> Vec<UniformLoad> {
+        let (residuals, slopes) = self.residuals(&self.best.unknowns);
+        let hessian = slopes.dot(&slopes.t());
+        let everything: Vec<usize> = (0..slopes.nrows()).collect();
+        let force_and_gain = |column: ArrayView1<f64>| {
+            let projected = solve(&hessian, &everything, SCORE_DAMPING, &slopes.dot(&column))?;
+            let across = &column - &slopes.t().dot(&projected);
+            let (slope, square) = (-across.dot(&residuals), across.dot(&across));
+            (slope > 0.0 && square > 0.0).then(|| (slope / square, slope * slope / square))
+        };
+        let found: Vec<(f64, f64)> = influence
+            .columns()
+            .into_iter()
+            .map(|column| force_and_gain(column).unwrap_or((0.0, 0.0)))
+            .collect();
+        let is_maximum = |cell: &usize| {
+            found[*cell].1 > NEGLIGIBLE
+                && cells.neighbours(*cell).all(|beside| found[beside].1 <= found[*cell].1)
+        };
+        let load = |cell: usize| {
+            let (from, to) = cells.corners(cell);
+            UniformLoad::new(from, to, found[cell].0)
+        };
+        (0..cells.len()).filter(is_maximum).map(load).collect()
+    }
+
+    /// Number of loads.
+    pub fn count(&self) -> usize {
+        self.best.unknowns.len() / self.each()
+    }
+
+    /// Number of the unknowns of all loads.
+    pub fn unknowns(&self) -> usize {
+        self.best.unknowns.len()
+    }
+
+    /// One of the loads, as fitted.
+    pub fn fitted_load(&self, number: usize) -> UniformLoad {
+        self.load(&self.best.unknowns[number * self.each()..][..self.each()])
     }
 
     /// The misfit that they leave.
@@ -343,7 +429,7 @@ impl<'a> EvenLoads<'a> {
     }
 
     /// Standard deviation of a value to first order; `None` where the reading does not tell it.
-    fn sd(&self, aim: Aim) -> Option<f64> {
+    pub fn sd(&self, aim: Aim) -> Option<f64> {
         let unknowns = &self.best.unknowns;
         let here = self.normal_equations(unknowns, None);
         let slope = self.slope_of(aim, unknowns);
@@ -465,7 +551,6 @@ fn solve(hessian: &Array2<f64>, listed: &[usize], share: f64, right: &Array1<f64
 
 #[cfg(test)]
 mod tests {
-    use super::super::cells::Cells;
     use super::super::tests::{beam, clean};
     use super::super::{LoadSensors, cumulative};
     use super::*;

@@ -10,9 +10,9 @@
 //!    sensor sees, as next to a support, is not invented.
 //! 3. Smoothness is weighed by its evidence, the probability of the reading under it, in the Gaussian approximation on the
 //!    cells that are not zero; profile and covariance are the mixture over all λ.
-//! 4. Patches are the connected parts that carry load. Their forces and centres, and the centre of pressure, have the intervals of even loads in
-//!    their places, by which no prior decides, and the values of such loads where the mixture's are outside of these; where no even loads
-//!    explain the reading, the intervals are those of the mixture's covariance.
+//! 4. Patches are the connected parts that carry load, and more where the reading needs more even loads to be explained ([`patch_number`]). Their
+//!    forces and centres, and the centre of pressure, have the intervals of even loads, which no prior decides, and the values of such loads where
+//!    the mixture's are outside of these. Where no even loads explain the reading, the intervals are those of loads of any shape ([`bounds`]).
 //! 5. The whole force is bounded over loads of any shape.
 //!
 //! The method is penalised non-negative least squares in Bayesian dress: MacKay, *Bayesian Interpolation*, Neural
@@ -22,6 +22,7 @@ mod bounds;
 mod cells;
 mod cumulative;
 mod even_loads;
+mod patch_number;
 mod patches;
 mod smoothness;
 
@@ -37,14 +38,15 @@ use crate::setup::Setup;
 use crate::status::misfit_bound;
 use bounds::Bounds;
 use cumulative::CumulativeInfluence;
-use even_loads::{Aim, EvenLoads};
+use even_loads::Aim;
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
 use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface, UniformLoad, Unsolvable};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{Cholesky, holding, hull, median, normal_interval_95};
-use patches::{Part, centre_of, find_patches, holds, mean_position};
+use patch_number::{PatchLoads, Tables};
+use patches::{centre_of, find_patches, holds, mean_position, nearest};
 use smoothness::{Mixture, Problem};
 
 /// One channel of a reading.
@@ -162,8 +164,8 @@ pub struct Profiler<'a> {
 /// A load, as one reading tells it.
 #[derive(Clone, Debug)]
 pub struct LoadProfile {
-    /// Status of the profile: located, no contact, or outside the model, when no load explains the reading within
-    /// its noise.
+    /// Status of the profile: located; ambiguous, when the number of patches is not resolved; no contact; or outside the model, when no load
+    /// explains the reading within its noise.
     pub status: Status,
     /// The cells of the surface.
     pub cells: Cells,
@@ -260,19 +262,23 @@ impl<'a> Profiler<'a> {
         let everything: Vec<usize> = (0..cells).collect();
         let mut centre = centre_of(&self.cells, &everything, &forces_n, &covariance);
         let mut total_n = forces.sum();
-        let mut bounds = self.bounds(&y, total_n);
-        let even = self.even_loads(&y, &patches);
-        let misfit = even.as_ref().map_or(least_misfit, |even| least_misfit.min(even.misfit()));
+        let shapes = Bounds::new(&self.problem.influence, &y);
+        let mut bounds = self.bounds(&shapes, &y, total_n);
+        let even = self.patch_loads(&shapes, &y, &patches);
+        let misfit = even.as_ref().map_or(least_misfit, |even| least_misfit.min(even.reported.misfit()));
         if let Some(centre) = &mut centre {
             match &even {
                 Some(even) => self.follow(even, &mut patches, (centre, &mut total_n, &mut bounds)),
-                None => self.widen_beside_edges(&y, &mut patches, centre),
+                None => self.take_bounds(&shapes, &mut patches, centre),
             }
         }
+        let is_resolved = even.is_none_or(|even| even.unresolved.is_none());
         let status = match smoothness {
-            Some(_) if misfit <= self.worst_misfit => Status::Located,
+            Some(_) if misfit > self.worst_misfit => Status::OutsideModel,
+            Some(_) if is_resolved => Status::Located,
+            Some(_) => Status::Ambiguous,
             None if silent => Status::NoContact,
-            _ => Status::OutsideModel,
+            None => Status::OutsideModel,
         };
         let (fitted, residuals) = self.fitted(&y, &forces);
         Ok(LoadProfile {
@@ -282,7 +288,7 @@ impl<'a> Profiler<'a> {
             total_sd_n: covariance.sum().sqrt(),
             bounds,
             centre,
-            patches: patches.into_iter().map(|(_, patch)| patch).collect(),
+            patches,
             forces_n,
             covariance_n2: covariance,
             fitted,
@@ -294,10 +300,10 @@ impl<'a> Profiler<'a> {
     }
 
     /// Bounds of the force by a whitened reading, over loads of any shape.
-    fn bounds(&self, y: &Array1<f64>, total_n: f64) -> ForceBounds {
+    fn bounds(&self, shapes: &Bounds, y: &Array1<f64>, total_n: f64) -> ForceBounds {
         let influence = &self.problem.influence;
         let cells = self.cells.len();
-        let total_95_n = holding(Bounds::new(influence, y).of_sum(&Array1::ones(cells)), total_n);
+        let total_95_n = holding(shapes.of_sum(&Array1::ones(cells)), total_n);
         if total_n <= 0.0 {
             return ForceBounds { total_95_n, margin_m: 0.0, seen_95_n: total_95_n };
         }
@@ -308,61 +314,76 @@ impl<'a> Profiler<'a> {
         ForceBounds { total_95_n, margin_m, seen_95_n: holding(of_seen, total_n) }
     }
 
-    /// Even loads in the places of patches, where such explain the reading.
-    fn even_loads(&'a self, y: &'a Array1<f64>, patches: &[(Part, Patch)]) -> Option<EvenLoads<'a>> {
-        let extent = self.cells.extent;
-        let starts: Vec<UniformLoad> = patches.iter().map(|(_, patch)| patch.as_load(extent)).collect();
-        EvenLoads::new(&self.cumulative, y, extent, &starts).filter(|even| even.misfit() <= self.worst_misfit)
+    /// Even loads that explain a whitened reading; `None` where they leave a misfit that noise seldom exceeds.
+    fn patch_loads(
+        &'a self,
+        shapes: &Bounds,
+        y: &'a Array1<f64>,
+        patches: &[Patch],
+    ) -> Option<PatchLoads<'a>> {
+        let starts: Vec<UniformLoad> = patches.iter().map(|patch| patch.as_load(self.cells.extent)).collect();
+        let tables = Tables {
+            cells: &self.cells,
+            cumulative: &self.cumulative,
+            influence: &self.problem.influence,
+            least_misfit: shapes.least_misfit(),
+        };
+        PatchLoads::new(&tables, y, &starts).filter(|even| even.reported.misfit() <= self.worst_misfit)
     }
 
-    /// Gives patches, their centre and their sum the intervals of even loads, and what is outside of these the values of such loads.
+    /// Gives patches, their centre and their sum the number and the intervals of even loads, and the values of such loads where the intervals do
+    /// not contain those of the profile.
     fn follow(
         &self,
-        even: &EvenLoads,
-        patches: &mut [(Part, Patch)],
+        PatchLoads { reported, unresolved }: &PatchLoads,
+        patches: &mut Vec<Patch>,
         (centre, total_n, bounds): (&mut CentreOfPressure, &mut f64, &mut ForceBounds),
     ) {
         let extent = self.cells.extent;
-        for (number, (_, patch)) in patches.iter_mut().enumerate() {
-            patch.follow(even, number, extent);
+        if patches.len() != reported.count() {
+            *patches =
+                (0..reported.count()).map(|number| Patch::of_even_loads(reported, number, extent)).collect();
         }
-        let of_total = even.interval_95(Aim::Total);
-        let is_held = centre.follow(even, extent, Aim::CentreOfPressure) && holds(of_total, *total_n);
+        for (number, patch) in patches.iter_mut().enumerate() {
+            patch.follow(reported, number, extent);
+        }
+        if let Some(even) = unresolved {
+            let nearest: Vec<Option<usize>> =
+                (0..even.count()).map(|load| nearest(patches, even.fitted_load(load).centre())).collect();
+            for (number, patch) in patches.iter_mut().enumerate() {
+                let loads = (0..even.count()).filter(|load| nearest[*load] == Some(number));
+                patch.widen(even, &loads.collect::<Vec<usize>>(), extent);
+            }
+        }
+        let mut of_total = reported.interval_95(Aim::Total);
+        centre.follow(reported, extent, Aim::CentreOfPressure);
+        if let Some(even) = unresolved {
+            of_total = hull(of_total, even.interval_95(Aim::Total));
+            centre.widen(even, extent, [Aim::CentreOfPressure].into_iter());
+        }
+        let is_held = centre.contains(centre.position) && holds(of_total, *total_n);
         if !is_held {
             centre.move_to(mean_position(patches));
-            *total_n = patches.iter().map(|(_, patch)| patch.force_n).sum();
+            *total_n = patches.iter().map(|patch| patch.force_n).sum();
         }
         // Even loads may be narrower than a cell.
         bounds.total_95_n = holding(hull(bounds.total_95_n, of_total), *total_n);
         bounds.seen_95_n = holding(bounds.seen_95_n, *total_n);
     }
 
-    /// Widens the intervals of patches beside an edge, where no even loads explain the reading: they are then of all loads between the patch and
-    /// the edge.
-    fn widen_beside_edges(
-        &self,
-        y: &Array1<f64>,
-        patches: &mut [(Part, Patch)],
-        centre: &mut CentreOfPressure,
-    ) {
-        let bounds = Bounds::new(&self.problem.influence, y);
-        let (cells, length_m) = (self.cells.len(), self.cells.extent.length_m());
-        let blind = self.blind_cells(patches.iter().map(|(_, patch)| patch.force_n).sum());
-        for i in 0..patches.len() {
-            let others = patches.iter().enumerate().filter(|(other, _)| *other != i);
-            let others: Vec<usize> = others.flat_map(|(_, (part, _))| part.all.iter().copied()).collect();
-            let (part, patch) = &mut patches[i];
-            // Its force could as well act at one place beside an edge, or does.
-            let could_be = |cell: &usize| bounds.is_open(&[&others[..], &[*cell]].concat());
-            if part.core.iter().any(|cell| blind.contains(cell)) || blind.iter().any(could_be) {
-                let mut c = Array1::zeros(cells);
-                part.all.iter().chain(&blind).for_each(|cell| c[*cell] = 1.0);
-                patch.force_95_n = holding(bounds.of_sum(&c), patch.force_n);
-                let is_left = patch.centre.position.x_m < 0.5 * length_m;
-                patch.centre.x_95_m = holding(patch.centre.x_95_m, if is_left { 0.0 } else { length_m });
-                centre.x_95_m = hull(centre.x_95_m, patch.centre.x_95_m);
-            }
+    /// Gives patches and their centre the bounds of loads of any shape. The loads of a patch are those in the cells nearest to it.
+    fn take_bounds(&self, bounds: &Bounds, patches: &mut [Patch], centre: &mut CentreOfPressure) {
+        let nearest: Vec<Option<usize>> = self.cells.centres().map(|place| nearest(patches, place)).collect();
+        for (number, patch) in patches.iter_mut().enumerate() {
+            let listed: Vec<usize> =
+                (0..nearest.len()).filter(|cell| nearest[*cell] == Some(number)).collect();
+            let mut c = Array1::zeros(nearest.len());
+            listed.iter().for_each(|cell| c[*cell] = 1.0);
+            patch.force_95_n = holding(bounds.of_sum(&c), patch.force_n);
+            patch.centre.take_bounds(bounds, &self.cells, &listed);
         }
+        let everything: Vec<usize> = (0..nearest.len()).collect();
+        centre.take_bounds(bounds, &self.cells, &everything);
     }
 
     /// Cells beside an edge in which a load of this force is not told from one at the edge: its distance from there is within 1.96 standard

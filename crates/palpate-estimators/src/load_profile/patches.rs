@@ -1,12 +1,13 @@
 //! The patches of a load: the connected parts of a surface that carry it.
 
+use super::bounds::Bounds;
 use super::cells::Cells;
 use super::even_loads::{Aim, EvenLoads};
 use crate::status::OUTSIDE_MODEL_RATE;
 use ndarray::Array2;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, UniformLoad};
-use palpate_numerics::{holding, normal_interval_95, normal_quantile};
+use palpate_numerics::{holding, hull, normal_interval_95, normal_quantile};
 use serde::Serialize;
 
 /// A patch is where the load is above this share of its highest density.
@@ -53,13 +54,45 @@ impl CentreOfPressure {
         Self { position, sd_x_m, sd_y_m, x_95_m, y_95_m }
     }
 
-    /// Gives it the intervals of even loads; true where they hold it.
+    /// Takes the intervals of even loads; true where they contain the place.
     pub(super) fn follow(&mut self, even: &EvenLoads, extent: Extent, aim: impl Fn(usize) -> Aim) -> bool {
         self.x_95_m = even.interval_95(aim(0));
         if extent.dimensions() > 1 {
             self.y_95_m = even.interval_95(aim(1));
         }
-        holds(self.x_95_m, self.position.x_m) && holds(self.y_95_m, self.position.y_m)
+        self.contains(self.position)
+    }
+
+    /// True where the intervals contain a position.
+    pub(super) fn contains(&self, position: Position) -> bool {
+        holds(self.x_95_m, position.x_m) && holds(self.y_95_m, position.y_m)
+    }
+
+    /// Widens the intervals by those of other even loads.
+    pub(super) fn widen(
+        &mut self,
+        even: &EvenLoads,
+        extent: Extent,
+        aims: impl Iterator<Item = impl Fn(usize) -> Aim>,
+    ) {
+        for aim in aims {
+            self.x_95_m = hull(self.x_95_m, even.interval_95(aim(0)));
+            if extent.dimensions() > 1 {
+                self.y_95_m = hull(self.y_95_m, even.interval_95(aim(1)));
+            }
+        }
+    }
+
+    /// Takes the bounds of the mean over some cells of loads of any shape.
+    pub(super) fn take_bounds(&mut self, bounds: &Bounds, cells: &Cells, listed: &[usize]) {
+        let along = |coordinate: fn(Position) -> f64| {
+            let at: Vec<f64> = listed.iter().map(|cell| coordinate(cells.centre(*cell))).collect();
+            bounds.of_mean(listed, &at)
+        };
+        self.x_95_m = holding(along(|p| p.x_m), self.position.x_m);
+        if cells.extent.dimensions() > 1 {
+            self.y_95_m = holding(along(|p| p.y_m), self.position.y_m);
+        }
     }
 
     /// Moves it, and its intervals with it where they do not hold it there.
@@ -71,7 +104,23 @@ impl CentreOfPressure {
 }
 
 impl Patch {
-    /// Gives the patch the intervals of an even load in its place, and that load where they do not hold its own force or centre.
+    /// A patch of even loads, which has their standard deviations to first order.
+    pub(super) fn of_even_loads(even: &EvenLoads, number: usize, extent: Extent) -> Self {
+        let load = even.middle_load(number);
+        let sd = |aim| even.sd(aim).unwrap_or(f64::INFINITY);
+        let sd_y_m = if extent.dimensions() > 1 { sd(Aim::Centre(number, 1)) } else { 0.0 };
+        let force_n = load.force_n();
+        Self {
+            from: load.from(),
+            to: load.to(),
+            centre: CentreOfPressure::new(load.centre(), (sd(Aim::Centre(number, 0)), sd_y_m)),
+            force_n,
+            force_sd_n: sd(Aim::Force(number)),
+            force_95_n: (force_n, force_n),
+        }
+    }
+
+    /// Takes the intervals of an even load, and its place and force where the intervals do not contain those of the patch.
     pub(super) fn follow(&mut self, even: &EvenLoads, number: usize, extent: Extent) {
         self.force_95_n = even.interval_95(Aim::Force(number));
         let is_held = self.centre.follow(even, extent, |axis| Aim::Centre(number, axis));
@@ -81,6 +130,25 @@ impl Patch {
             self.centre.move_to(load.centre());
             self.force_95_n = holding(self.force_95_n, self.force_n);
         }
+    }
+
+    /// Widens the intervals by those of several loads that the patch may be.
+    pub(super) fn widen(&mut self, even: &EvenLoads, numbers: &[usize], extent: Extent) {
+        for number in numbers {
+            self.force_95_n = hull(self.force_95_n, even.interval_95(Aim::Force(*number)));
+        }
+        self.centre.widen(even, extent, numbers.iter().map(|number| |axis| Aim::Centre(*number, axis)));
+        let sum_n = numbers.iter().map(|number| even.fitted_load(*number).force_n()).sum();
+        if !numbers.is_empty() {
+            self.force_95_n = holding(self.force_95_n, sum_n);
+        }
+    }
+
+    /// Distance of a position from the patch, in metres; 0 inside.
+    pub(super) fn distance_m(&self, position: Position) -> f64 {
+        let beyond = |at_m: f64, from_m: f64, to_m: f64| (from_m - at_m).max(at_m - to_m).max(0.0);
+        let along = beyond(position.x_m, self.from.x_m, self.to.x_m);
+        along.hypot(beyond(position.y_m, self.from.y_m, self.to.y_m))
     }
 
     /// An even load of its force and sizes around its centre, as far as the surface reaches: what its limit is of.
@@ -102,12 +170,17 @@ pub(super) fn holds((low, high): (f64, f64), value: f64) -> bool {
     (low..=high).contains(&value)
 }
 
+/// The number of the patch nearest to a position; `None` without patches.
+pub(super) fn nearest(patches: &[Patch], position: Position) -> Option<usize> {
+    let distance_m = |number: &usize| patches[*number].distance_m(position);
+    (0..patches.len()).min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)))
+}
+
 /// The mean position of patches, by their forces.
-pub(super) fn mean_position(patches: &[(Part, Patch)]) -> Position {
-    let force_n: f64 = patches.iter().map(|(_, patch)| patch.force_n).sum();
+pub(super) fn mean_position(patches: &[Patch]) -> Position {
+    let force_n: f64 = patches.iter().map(|patch| patch.force_n).sum();
     let along = |coordinate: fn(Position) -> f64| {
-        patches.iter().map(|(_, patch)| patch.force_n * coordinate(patch.centre.position)).sum::<f64>()
-            / force_n
+        patches.iter().map(|patch| patch.force_n * coordinate(patch.centre.position)).sum::<f64>() / force_n
     };
     Position { x_m: along(|p| p.x_m), y_m: along(|p| p.y_m) }
 }
@@ -141,10 +214,10 @@ fn sd_of_sum(listed: &[usize], slopes: &[f64], covariance: &Array2<f64>) -> f64 
     listed.iter().zip(slopes).map(row).sum::<f64>().max(0.0).sqrt()
 }
 
-/// A patch in the making: cells above the share, and all cells with its flanks.
-pub(super) struct Part {
-    pub core: Vec<usize>,
-    pub all: Vec<usize>,
+/// Cells of a patch: those above the share, and all with its flanks.
+struct Part {
+    core: Vec<usize>,
+    all: Vec<usize>,
 }
 
 /// The patches of a profile, along x.
@@ -152,7 +225,7 @@ pub(super) struct Part {
 /// Connected cells above the share of the highest are patches; each takes the cells downhill from it as its flanks, up to the
 /// valley to the next. A patch whose force does not stand out of its own uncertainty becomes a part of the one beside it, or,
 /// where there is none, is none.
-pub(super) fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<(Part, Patch)> {
+pub(super) fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<Patch> {
     let mut parts = grow(cells, forces_n, cores(cells, forces_n));
     let least_ratio = normal_quantile(1.0 - OUTSIDE_MODEL_RATE);
     let stands_out = |part: &Part| {
@@ -170,9 +243,9 @@ pub(super) fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<
             beside.all.extend(part.all);
         }
     }
-    let of_part = |part: Part| patch(cells, &part, forces_n, covariance).map(|patch| (part, patch));
-    let mut patches: Vec<(Part, Patch)> = parts.into_iter().filter_map(of_part).collect();
-    patches.sort_by(|(_, a), (_, b)| a.centre.position.x_m.total_cmp(&b.centre.position.x_m));
+    let mut patches: Vec<Patch> =
+        parts.iter().filter_map(|part| patch(cells, part, forces_n, covariance)).collect();
+    patches.sort_by(|a, b| a.centre.position.x_m.total_cmp(&b.centre.position.x_m));
     patches
 }
 

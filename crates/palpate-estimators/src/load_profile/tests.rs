@@ -50,6 +50,7 @@ pub(super) fn noisy(sensors: &LoadSensors, clean: &[f64], rng: &mut Xoshiro256Pl
 /// Counts and errors of two patches of 2 N each, 120 mm apart, as many readings tell them.
 #[derive(Debug, Default)]
 struct Tally {
+    resolved: usize,
     two: usize,
     within_3_limits: usize,
     within_2_percent: usize,
@@ -73,7 +74,8 @@ fn tally(strain: bool, readings: usize) -> Tally {
     let holds = |(low, high): (f64, f64), value: f64| usize::from((low..=high).contains(&value));
     for _ in 0..readings {
         let profile = profiler.profile(&noisy(&sensors, &clean, &mut rng)).unwrap();
-        assert_eq!(profile.status, Status::Located);
+        assert!(matches!(profile.status, Status::Located | Status::Ambiguous), "{:?}", profile.status);
+        tally.resolved += usize::from(profile.status == Status::Located);
         let percent = 100.0 * (profile.total_n / 4.0 - 1.0).abs();
         tally.worst_force_percent = tally.worst_force_percent.max(percent);
         tally.within_2_percent += usize::from(percent <= 2.0);
@@ -108,6 +110,8 @@ fn two_patches_are_told_at_their_limits() {
     assert!(tally.worst_force_percent < 2.0 && tally.two * 100 >= 95 * readings, "{tally:?}");
     assert!(tally.within_3_limits * 100 >= 92 * readings, "{tally:?}");
     assert!(tally.centre_squares < 1.4 * 1.4 * 2.0 * tally.two as f64, "{tally:?}");
+    // A third load is significant at 5 % in one of twenty readings.
+    assert!(tally.resolved * 100 >= 88 * readings, "{tally:?}");
     // Intervals that say 95 %.
     let shares =
         [tally.centres_covered, tally.forces_covered, 2 * tally.total_covered, 2 * tally.pressure_covered];
@@ -152,7 +156,8 @@ fn an_even_load_is_smooth_and_one_patch() {
     let load = UniformLoad::along(0.02, 0.38, 4.0);
     let reading = noisy(&sensors, &clean(&sensors, &[load]), &mut Xoshiro256PlusPlus::seed_from_u64(3));
     let profile = Profiler::new(sensors).profile(&reading).unwrap();
-    assert_eq!((profile.status, profile.patches.len()), (Status::Located, 1));
+    // A second load is significant at 5 % in this reading, though not at one in a thousand.
+    assert_eq!((profile.status, profile.patches.len()), (Status::Ambiguous, 1));
     assert!((profile.total_n - 4.0).abs() < 0.2, "{}", profile.total_n);
     // Half of its length, from 100 mm to 300 mm: the sums are told better than the shape.
     let middle: f64 = profile.forces_n[20..60].iter().sum();
@@ -282,7 +287,8 @@ fn on_a_plane_two_squares_are_told_apart() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
     for _ in 0..3 {
         let profile = profiler.profile(&noisy(&sensors, &clean, &mut rng)).unwrap();
-        assert_eq!((profile.status, profile.patches.len()), (Status::Located, 2));
+        assert!(matches!(profile.status, Status::Located | Status::Ambiguous), "{:?}", profile.status);
+        assert_eq!(profile.patches.len(), 2);
         assert!((profile.total_n / 3.0 - 1.0).abs() < 0.02, "{}", profile.total_n);
         for (patch, load) in profile.patches.iter().zip(&loads) {
             assert!(patch.centre.position.distance_m(load.centre()) < 2e-3, "{patch:?}");
@@ -365,4 +371,53 @@ fn a_load_next_to_a_support_is_not_told_as_a_lighter_one() {
     let profile = Profiler::new(sensors.clone()).profile(&clean(&sensors, &[even])).unwrap();
     let (low, high) = profile.bounds.total_95_n;
     assert!(low < 4.0 && 4.0 < high, "{low} to {high}");
+}
+
+/// The smooth profile shows 20 N on 370–390 mm alone, because 2 N on 100–160 mm are less than a tenth of its density.
+#[test]
+fn finds_a_light_patch_that_a_dense_one_hides_from_the_profile() {
+    let beam = beam();
+    let sensors = LoadSensors::new(&beam, &layout(true)).unwrap();
+    let loads = [UniformLoad::along(0.1, 0.16, 2.0), UniformLoad::along(0.37, 0.39, 20.0)];
+    let clean = clean(&sensors, &loads);
+    let profiler = Profiler::new(sensors.clone());
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+    let centre_m = (2.0 * 0.13 + 20.0 * 0.38) / 22.0;
+    let mut covered = 0;
+    for _ in 0..3 {
+        let profile = profiler.profile(&noisy(&sensors, &clean, &mut rng)).unwrap();
+        // The profile splits the light patch in some readings.
+        let [light, .., heavy] = profile.patches[..] else { panic!("{:?}", profile.patches) };
+        assert!(light.force_95_n.0 > 0.0 && light.centre.position.x_m < 0.2, "{light:?}");
+        let centre = profile.centre.unwrap();
+        for ((low, high), truth) in [
+            (heavy.force_95_n, 20.0),
+            (heavy.centre.x_95_m, 0.38),
+            (centre.x_95_m, centre_m),
+            (profile.bounds.total_95_n, 22.0),
+        ] {
+            covered += usize::from(low <= truth && truth <= high);
+        }
+    }
+    assert!(covered >= 10, "{covered} of 12");
+}
+
+/// Where even loads do not explain the reading, intervals are those of loads of any shape, and contain the truth.
+#[test]
+fn uneven_loads_have_the_intervals_of_any_shape() {
+    let beam = beam();
+    let mut layout = layout(true);
+    layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd *= 0.01)).unwrap();
+    let sensors = LoadSensors::new(&beam, &layout).unwrap();
+    // A wedge: density in proportion to the distance from its left end.
+    let wedge: Vec<UniformLoad> = (0..12)
+        .map(|i| UniformLoad::along(0.14 + 0.01 * f64::from(i), 0.15 + 0.01 * f64::from(i), f64::from(i + 1)))
+        .collect();
+    let total_n: f64 = wedge.iter().map(UniformLoad::force_n).sum();
+    let centre_m = wedge.iter().map(|load| load.force_n() * load.centre().x_m).sum::<f64>() / total_n;
+    let reading = noisy(&sensors, &clean(&sensors, &wedge), &mut Xoshiro256PlusPlus::seed_from_u64(2));
+    let profile = Profiler::new(sensors).profile(&reading).unwrap();
+    let (low_m, high_m) = profile.centre.unwrap().x_95_m;
+    assert!(low_m <= centre_m && centre_m <= high_m, "{centre_m}: {low_m} to {high_m}");
+    assert!(holds(profile.bounds.total_95_n, total_n), "{total_n} {:?}", profile.bounds);
 }
