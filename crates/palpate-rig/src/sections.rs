@@ -57,7 +57,7 @@ pub(crate) struct RigFile {
     pub contact: Option<ContactKeys>,
     /// The presses of a calibration.
     pub training: Option<At<TrainingKeys>>,
-    /// The method that locates; the founding paper's network by default, on a `measured` surface `auto` among `influence` and `gaussian-process`.
+    /// The method that locates; the founding paper's network, on a `measured` surface `auto` among `influence` and `gaussian-process`, by default.
     pub estimator: Option<EstimatorKeys>,
     /// Columns of a CSV file by their roles.
     pub recording: Option<At<RecordingKeys>>,

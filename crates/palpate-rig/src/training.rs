@@ -22,7 +22,7 @@ pub(crate) struct ContactKeys {
     pub force: Option<At<Positive<Force>>>,
     /// The greatest that an unknown force can be, on a surface with a model; ten times that of the presses by default.
     pub greatest_force: Option<At<Positive<Force>>>,
-    /// Least and greatest force of contacts of unknown force: 1 in 200 is lighter, none is harder; a decade either side of the presses unless said otherwise.
+    /// Least and greatest force of contacts of unknown force: 1 in 200 is lighter, none is harder; a decade either side of the presses by default.
     pub force_range: Option<At<ForceRangeKeys>>,
 }
 

@@ -3,7 +3,6 @@
 use super::trial_splits::TrialSplits;
 use super::{Estimator, FitCost};
 use crate::evaluation::{Split, TimedEvaluation};
-use crate::influence::{Influence, Structure};
 use crate::setup::Setup;
 use palpate_numerics::watch::{Cancelled, Watch};
 
@@ -14,56 +13,6 @@ pub struct Comparison {
     pub estimator: Estimator,
     /// The evaluation, with its times.
     pub tried: TimedEvaluation,
-}
-
-/// The estimators that `auto` chooses from, and that a comparison shows: every contender, with the settings of `own`
-/// where that is of its kind. Networks trained by back-propagation stop after as many presentations as
-/// take some seconds.
-pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator> {
-    const MOST_PRESENTATIONS: usize = 20_000_000;
-    let mut contenders = Estimator::contenders(setup);
-    for contender in &mut contenders {
-        match (&*contender, own) {
-            (Estimator::Influence(Influence { structure, .. }), Estimator::Influence(own))
-                if *structure != Structure::Auto =>
-            {
-                *contender = Estimator::Influence(Influence { structure: *structure, ..*own });
-            }
-            _ if contender.kind() == own.kind() => *contender = own.clone(),
-            _ => {}
-        }
-        if let Estimator::Network(config) = contender {
-            let most = u32::try_from(MOST_PRESENTATIONS / rows.max(1)).unwrap_or(u32::MAX).max(1);
-            config.training.max_epochs = config.training.max_epochs.min(most);
-        }
-    }
-    contenders
-}
-
-/// Names that suit no contender.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no estimator `{name}` suits the bench; it can be: {}", known.join(", "))]
-pub struct UnknownEstimator {
-    /// The name.
-    pub name: String,
-    /// Kinds of the contenders.
-    pub known: Vec<&'static str>,
-}
-
-/// The contenders that `only` names by kind or by [`Estimator::name`]; all of them where it is empty.
-///
-/// # Errors
-/// [`UnknownEstimator`] for a name that is none of theirs.
-pub fn select(mut contenders: Vec<Estimator>, only: &[String]) -> Result<Vec<Estimator>, UnknownEstimator> {
-    let is_named = |contender: &Estimator, name: &str| [contender.kind(), contender.name()].contains(&name);
-    if let Some(name) = only.iter().find(|name| !contenders.iter().any(|contender| is_named(contender, name)))
-    {
-        let mut known: Vec<&'static str> = contenders.iter().map(Estimator::kind).collect();
-        known.dedup();
-        return Err(UnknownEstimator { name: name.clone(), known });
-    }
-    contenders.retain(|contender| only.is_empty() || only.iter().any(|name| is_named(contender, name)));
-    Ok(contenders)
 }
 
 /// How estimators are compared.

@@ -2,6 +2,7 @@
 
 mod auto;
 mod compare;
+mod contenders;
 mod cost;
 mod locator_file;
 mod memory;
@@ -18,7 +19,8 @@ pub use crate::tracking::{
 };
 pub use crate::tried::Tried;
 pub use auto::{Auto, CHOICE_FOLDS, Choice, TimeLimit, choose, take_off_drift};
-pub use compare::{CompareOptions, Compared, Comparison, UnknownEstimator, compare, contenders, select};
+pub use compare::{CompareOptions, Compared, Comparison, compare};
+pub use contenders::{UnknownEstimator, contenders, select};
 pub use cost::FitCost;
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
 pub use memory::{MemoryExceeded, MemoryLimit, MemoryLimitError, Size};
