@@ -4,7 +4,7 @@
 //! several decades it is nearly flat in ln W: a place where the surface is stiff, and a greater force has to explain the reading, is as probable as
 //! any other. A prior flat in W would prefer the stiff places beside supports, in proportion to the force that they need.
 //!
-//! Locators of files without a range have a [normal](cut_normal) prior, that of the presses.
+//! Locators of files without a range have a normal prior, that of the presses.
 
 mod cut_normal;
 mod log_normal;

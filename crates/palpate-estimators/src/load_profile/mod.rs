@@ -10,9 +10,9 @@
 //!    sensor sees, as next to a support, is not invented.
 //! 3. Smoothness is weighed by its evidence, the probability of the reading under it, in the Gaussian approximation on the
 //!    cells that are not zero; profile and covariance are the mixture over all λ.
-//! 4. Patches are the connected parts that carry load, and more where the reading needs more even loads to be explained ([`patch_number`]). Their
+//! 4. Patches are the connected parts that carry load, and more where the reading needs more even loads to be explained (`patch_number`). Their
 //!    forces and centres, and the centre of pressure, have the intervals of even loads, which no prior decides, and the values of such loads where
-//!    the mixture's are outside of these. Where no even loads explain the reading, the intervals are those of loads of any shape ([`bounds`]).
+//!    the mixture's are outside of these. Where no even loads explain the reading, the intervals are those of loads of any shape (`bounds`).
 //! 5. The whole force is bounded over loads of any shape.
 //!
 //! The method is penalised non-negative least squares in Bayesian dress: MacKay, *Bayesian Interpolation*, Neural
