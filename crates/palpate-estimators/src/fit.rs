@@ -436,7 +436,7 @@ pub struct LocatorProvenance {
     pub seed: u64,
     /// The recording that it was fitted to.
     pub recording: Provenance,
-    /// Estimators among which `auto` chose this one, best first; empty of an estimator that was named.
+    /// Estimators among which this one was chosen, itself first, then the others by rising score; empty of an estimator that was named.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub choice: Vec<Tried>,
 }

@@ -141,7 +141,7 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
         say_drift(&rig.setup, spans);
     }
     remark!(
-        "chosen: {}, with the smallest mean error × interval score at held-out positions ({CHOICE_FOLDS} folds)",
+        "chosen: {}, by mean error × interval score at held-out positions ({CHOICE_FOLDS} folds)",
         choice.best.name()
     );
     remark!("{:<24} {:>12} {:>20} {:>14}", "", "mean error", "score of 95 %", "95 % covers");
@@ -157,7 +157,7 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     Ok((rig, choice.tried))
 }
 
-/// The estimators that `auto` tried, best first; `None` for an estimator that the rig names.
+/// The candidates, the chosen one first; `None` for an estimator that the rig names.
 fn choice_json(tried: &[Tried]) -> Option<Vec<impl Serialize>> {
     let one = |tried: &Tried| {
         object! {

@@ -53,7 +53,7 @@ pub fn locator(locator: &Locator) -> Vec<String> {
     lines
 }
 
-/// The choice of `auto`: the estimator, and by how much it is better than the next one.
+/// The choice at held-out positions: the estimator, and by how much it is better than the next one.
 pub fn choice(tried: &[Tried]) -> Option<String> {
     let figures = |one: &Tried| {
         let [error, score] = [one.mean_error_m, one.interval_score_m].map(format_length_mm);
@@ -61,12 +61,20 @@ pub fn choice(tried: &[Tried]) -> Option<String> {
     };
     let (best, others) = tried.split_first()?;
     let Some(next) = others.first() else {
-        return Some(format!("chosen by `auto`: {}, the only one that suits", figures(best)));
+        return Some(format!("chosen at held-out positions: {}, the only one that suits", figures(best)));
     };
+    if next.score_m() < best.score_m() {
+        let others: Vec<String> = others.iter().map(figures).collect();
+        return Some(format!(
+            "chosen at held-out positions: {}, which is simpler and not significantly worse than {}",
+            figures(best),
+            others.join(", ")
+        ));
+    }
     let percent = 100.0 * (1.0 - best.score_m() / next.score_m());
     let behind: Vec<String> = others.iter().map(figures).collect();
     Some(format!(
-        "chosen by `auto`: {}, {percent:.0} % better at held-out positions than {}",
+        "chosen at held-out positions: {}, {percent:.0} % better than {}",
         figures(best),
         behind.join(", ")
     ))

@@ -2,16 +2,17 @@
 
 use super::trial_splits::TrialSplits;
 use super::{Estimator, FitError, contenders};
-use crate::evaluation::{Evaluation, Split};
+use crate::evaluation::{Evaluation, Located, Split};
 use crate::fit::FitTask;
-use crate::influence::{Influence, InfluenceFitError};
+use crate::influence::{Influence, InfluenceFitError, Structure};
 use crate::offset_course::OffsetCourse;
 use crate::reading_check::ReadingCheck;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::tried::Tried;
-use palpate_numerics::FEWEST_FOR_95;
+use palpate_mechanics::contact::Position;
 use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_numerics::{FEWEST_FOR_95, NORMAL_95, mean, mean_and_variance};
 use std::borrow::Cow;
 
 /// Choice among estimators (`kind = "auto"`).
@@ -92,14 +93,61 @@ impl Estimator {
 /// The chosen estimator, and the figures of the others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// The estimator with the least [`Tried::score_m`].
+    /// The estimator with the least [`Tried::score_m`], or the simplest structure that is not significantly worse.
     pub best: Estimator,
-    /// Estimators that were tried, best first.
+    /// Estimators that were tried: the chosen one, then the others by rising score.
     pub tried: Vec<Tried>,
     /// Names of those that were not, with the reason.
     pub left_out: Vec<(&'static str, String)>,
     /// Greatest change of each channel by the drift that was subtracted from the held-out readings; `None` without a drift.
     pub drift: Option<Vec<f64>>,
+}
+
+/// A candidate with its held-out estimates.
+struct Trial {
+    estimator: Estimator,
+    tried: Tried,
+    evaluation: Evaluation,
+}
+
+impl Trial {
+    /// Rank of the structure of influence functions, the simplest first; `None` of another estimator.
+    fn structure_rank(&self) -> Option<usize> {
+        let Estimator::Influence(Influence { structure, .. }) = self.estimator else { return None };
+        [Structure::ForceLinear, Structure::ForceMonotone, Structure::Free]
+            .into_iter()
+            .position(|other| other == structure)
+    }
+
+    /// True where the mean score of another is smaller by more than two standard errors over the places. The cost of an estimate is half the sum of
+    /// its error and its interval score over the means of the other, which is the score to the first order.
+    fn is_significantly_worse_than(&self, best: &Self) -> bool {
+        let [error_m, score_m] = [best.tried.mean_error_m, best.tried.interval_score_m];
+        let cost = |one: &Located| {
+            0.5 * (one.error_m() / error_m + one.interval_score_m.map_or(1.0, |score| score / score_m))
+        };
+        let pairs = self.evaluation.located.iter().zip(&best.evaluation.located);
+        let mut by_place: Vec<(Position, f64)> =
+            pairs.map(|(own, best)| (best.truth, cost(own) - cost(best))).collect();
+        by_place.sort_by(|a, b| a.0.cmp_by_x_then_y(&b.0));
+        let places = by_place.chunk_by(|a, b| a.0 == b.0);
+        let differences: Vec<f64> =
+            places.map(|place| mean(place.iter().map(|(_, difference)| *difference))).collect();
+        let (difference, variance) = mean_and_variance(differences.iter().copied());
+        difference > NORMAL_95 * (variance / differences.len() as f64).sqrt()
+    }
+}
+
+/// Number of the chosen trial, of trials by rising score: the first; of structures the simplest that is not significantly worse. The simpler structure
+/// extrapolates to forces that were not pressed.
+fn chosen(trials: &[Trial]) -> usize {
+    let Some(best) = trials.first() else { return 0 };
+    let is_simpler = |trial: &Trial| {
+        let ranks = trial.structure_rank().zip(best.structure_rank());
+        ranks.is_some_and(|(own, of_best)| own < of_best) && !trial.is_significantly_worse_than(best)
+    };
+    let simpler = (1..trials.len()).filter(|i| is_simpler(&trials[*i]));
+    simpler.min_by_key(|i| trials[*i].structure_rank()).unwrap_or(0)
 }
 
 /// Figures of an estimator that was tried; `None` without intervals.
@@ -158,7 +206,7 @@ pub(super) fn compared_rows<'a>(candidates: &[Estimator], recording: &'a Recordi
 }
 
 /// Chooses among [candidates](Estimator::candidates) for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds: the least geometric mean of mean error
-/// and interval score. A drift that the presses show is subtracted from the held-out readings, as a tare does in use.
+/// and interval score, and of structures the simplest that is not significantly worse. A drift that the presses show is subtracted from the held-out readings, as a tare does in use.
 ///
 /// # Errors
 /// [`FitError::NoCandidate`] without a candidate; [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason;
@@ -207,8 +255,8 @@ pub fn choose(
         watch.counted("trying estimators", "estimators", done, count)?;
         match trials.evaluate(&estimator, limited) {
             Ok(one) => {
-                if let Some(outcome) = figures(name, &one.evaluation) {
-                    tried.push((estimator, outcome));
+                if let Some(figures) = figures(name, &one.evaluation) {
+                    tried.push(Trial { estimator, tried: figures, evaluation: one.evaluation });
                 }
             }
             Err(error) if Cancelled::caused(&error) => {
@@ -224,11 +272,14 @@ pub fn choose(
             }
         }
     }
-    tried.sort_by(|a, b| a.1.score_m().total_cmp(&b.1.score_m()));
-    let Some(best) = tried.first().map(|(estimator, _)| estimator.clone()) else {
+    tried.sort_by(|a, b| a.tried.score_m().total_cmp(&b.tried.score_m()));
+    if tried.is_empty() {
         return Err(last.map_or_else(|| Cancelled.into(), unsuited));
-    };
-    Ok(Choice { best, tried: tried.into_iter().map(|(_, outcome)| outcome).collect(), left_out, drift })
+    }
+    let first = tried.remove(chosen(&tried));
+    let best = first.estimator.clone();
+    tried.insert(0, first);
+    Ok(Choice { best, tried: tried.into_iter().map(|trial| trial.tried).collect(), left_out, drift })
 }
 
 #[cfg(test)]

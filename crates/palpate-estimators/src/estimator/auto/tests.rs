@@ -3,9 +3,8 @@
 use super::*;
 use crate::fit::Fit;
 use crate::fixtures::paper;
-use crate::influence::Structure;
 use crate::recording::Row;
-use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Progress;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -105,6 +104,39 @@ fn influence_chooses_its_structure_at_held_out_places() {
     assert_eq!(choice.tried.len(), 3, "{choice:?}");
     assert_eq!(choice.tried[2].name, "influence force-linear", "{choice:?}");
     assert_eq!(choice.best.name(), choice.tried[0].name);
+}
+
+#[test]
+fn the_simplest_structure_that_is_not_significantly_worse_is_chosen() {
+    let trial = |structure: Structure, errors_mm: &dyn Fn(usize) -> f64| {
+        let estimator = Estimator::Influence(Influence { structure, ..Influence::default() });
+        let located = (0..40).map(|i| {
+            let truth = Position::along(1e-3 * i as f64);
+            let error_m = 1e-3 * errors_mm(i);
+            Located {
+                truth,
+                force_n: None,
+                estimate: Position::along(truth.x_m + error_m),
+                covered: Some(true),
+                interval_score_m: Some(4.0 * error_m),
+                status: None,
+                force: None,
+            }
+        });
+        let evaluation = Evaluation { extent: Extent::line(0.1).unwrap(), located: located.collect() };
+        let tried = figures(estimator.name(), &evaluation).unwrap();
+        Trial { estimator, tried, evaluation }
+    };
+    let scattered = |i: usize| if i % 2 == 0 { 1.0 } else { 2.0 };
+    let other_places = |i: usize| if i % 2 == 0 { 2.0 } else { 1.1 };
+    let equal = [trial(Structure::ForceMonotone, &scattered), trial(Structure::ForceLinear, &other_places)];
+    assert_eq!(chosen(&equal), 1);
+    let worse = |i: usize| 1.3 * scattered(i);
+    let worse = [trial(Structure::ForceMonotone, &scattered), trial(Structure::ForceLinear, &worse)];
+    assert_eq!(chosen(&worse), 0);
+    let simpler = [trial(Structure::ForceLinear, &scattered), trial(Structure::Free, &other_places)];
+    assert_eq!(chosen(&simpler), 0);
+    assert_eq!(chosen(&[]), 0);
 }
 
 #[test]
