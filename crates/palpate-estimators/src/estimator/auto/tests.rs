@@ -127,8 +127,8 @@ fn the_simplest_structure_that_is_not_significantly_worse_is_chosen() {
         let tried = figures(estimator.name(), &evaluation).unwrap();
         Trial { estimator, tried, evaluation }
     };
-    let scattered = |i: usize| if i % 2 == 0 { 1.0 } else { 2.0 };
-    let other_places = |i: usize| if i % 2 == 0 { 2.0 } else { 1.1 };
+    let scattered = |i: usize| if i.is_multiple_of(2) { 1.0 } else { 2.0 };
+    let other_places = |i: usize| if i.is_multiple_of(2) { 2.0 } else { 1.1 };
     let equal = [trial(Structure::ForceMonotone, &scattered), trial(Structure::ForceLinear, &other_places)];
     assert_eq!(chosen(&equal), 1);
     let worse = |i: usize| 1.3 * scattered(i);
