@@ -168,7 +168,9 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       for (let i = 1; i < times.length; i++) expect(times[i]).toBeGreaterThanOrEqual(times[i - 1]!);
       await says(page, "events", /Source opened: a simulated board/);
       expect(readFileSync(await downloaded(page, "#export-png")).subarray(1, 4).toString()).toBe("PNG");
-      expect(await page.locator("#chart-position").getAttribute("aria-label")).toMatch(/^Position over .*\. Position: [\d.]+ mm to [\d.]+ mm, .* now\.$/);
+      // The board may be untouched at this moment.
+      const label = () => page.locator("#chart-position").getAttribute("aria-label");
+      await expect.poll(label, { timeout: 10_000 }).toMatch(/^Position over .*\. Position: [\d.]+ mm to [\d.]+ mm, .* now\.$/);
       await page.locator("#window").selectOption("10");
     });
 
