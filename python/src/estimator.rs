@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Instant;
 
-use palpate::estimators::estimator::{self, Choice, TimeLimit, choose};
+use palpate::estimators::estimator::{self, Choice, TimeLimit};
 use palpate::estimators::fit::{Fit, FitTask, SeedQueue};
 use palpate::estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate::estimators::{recording, setup};
@@ -113,22 +113,21 @@ impl Estimator {
         recording.inner.check_distinct_positions(needed).map_err(refused)?;
         check_memory(memory_limit, &self.inner, &self.setup, &recording.inner)?;
         let task = FitTask::new(&self.setup, &recording.inner).seed(seed);
+        let begun = Instant::now();
+        let clock = || begun.elapsed().as_secs_f64();
+        let limit = TimeLimit { clock: &clock, seconds: auto_seconds };
         let choice = match self.inner.candidates(task) {
-            Some(candidates) => {
-                let begun = Instant::now();
-                let clock = || begun.elapsed().as_secs_f64();
-                let limit = TimeLimit { clock: &clock, seconds: auto_seconds };
-                Some(work::run(py, progress, None, |watch| {
-                    choose(task.watch(watch), candidates, Some(limit))
-                })?)
+            Some(_) => {
+                work::run(py, progress, None, |watch| self.inner.decide(task.watch(watch), Some(limit)))?
             }
             None => None,
         };
         let chosen = choice.as_ref().map_or(&self.inner, |choice| &choice.best);
         let rounds = Some(chosen.most_rounds()).filter(|most| *most > 0);
-        let fitted = work::run_with(py, progress, rounds, |watch| chosen.fit_task(task.watch(watch)))?;
-        let mut locator = fitted.map_err(|error| of_work(&error))?;
-        locator.provenance.choice = choice.as_ref().map_or_else(Vec::new, |choice| choice.tried.clone());
+        let fitted = work::run_with(py, progress, rounds, |watch| {
+            self.inner.fit_decided(task.watch(watch), choice.as_ref())
+        })?;
+        let locator = fitted.map_err(|error| of_work(&error))?;
         if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) =
             locator.training_outcome()
         {

@@ -2,6 +2,7 @@
 
 use crate::force_prior::ForceRange;
 use crate::untouched_drift::UntouchedDrift;
+use crate::untouched_scatter::UntouchedScatter;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -13,6 +14,20 @@ pub struct CalibrationVariance {
     pub position_m2: [f64; 3],
     /// Variance of the force in N², where it is not known.
     pub force_n2: f64,
+}
+
+/// Scatter and drift of the untouched surface of a calibration.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct UntouchedSurface {
+    pub scatter: Option<UntouchedScatter>,
+    pub drift: Option<UntouchedDrift>,
+}
+
+impl UntouchedSurface {
+    /// True for a reading within the scatter.
+    pub fn contains(&self, reading: &[f64]) -> bool {
+        self.scatter.as_ref().is_some_and(|scatter| scatter.contains(reading))
+    }
 }
 
 /// A fitted method that can say how well contacts explain a reading.

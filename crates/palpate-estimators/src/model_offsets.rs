@@ -1,5 +1,6 @@
 //! Offsets of methods that compute from the model and the rig alone: those of the untouched rows of a recording, and how uncertain they are.
 
+use crate::locator_fault::LocatorFault;
 use crate::recording::Recording;
 use palpate_mechanics::sensing::Layout;
 use std::borrow::Cow;
@@ -26,6 +27,17 @@ pub(crate) fn offsets_of(recording: &Recording, layout: &Layout) -> (Vec<f64>, L
         }
     });
     (offsets, widened)
+}
+
+/// Checks the offsets of a locator file.
+///
+/// # Errors
+/// [`LocatorFault`] for another number of channels, and an offset that is not finite.
+pub(crate) fn check_offsets(offsets: &[f64], channels: usize) -> Result<(), LocatorFault> {
+    if !offsets.is_empty() {
+        LocatorFault::check_count("offsets", channels, offsets.len())?;
+    }
+    LocatorFault::check_numbers("offset", offsets.iter().copied(), |_| true, "a finite number")
 }
 
 /// A reading less offsets; as it is where there are none.

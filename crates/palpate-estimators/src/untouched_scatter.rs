@@ -84,8 +84,7 @@ impl Rests {
     }
 
     fn new(recording: &Recording, rests: &[Vec<usize>]) -> Option<Self> {
-        let by_row = || (0..recording.rows.len()).map(|row| row as f64).collect();
-        let times_s: Vec<f64> = recording.times_s().unwrap_or_else(by_row);
+        let times_s = recording.times_or_order();
         if rests.len() < FEWEST_RESTS {
             return None;
         }

@@ -11,8 +11,8 @@ use crate::tare::say_drift;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
 use palpate_estimators::description;
-use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, FitCost, FitError, TimeLimit, Tried, choose};
-use palpate_estimators::fit::{Fit, FitTask};
+use palpate_estimators::estimator::{CHOICE_FOLDS, Choice, FitCost, TimeLimit, Tried};
+use palpate_estimators::fit::FitTask;
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
 use palpate_mechanics::units::{format_count, format_length_mm};
@@ -61,14 +61,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let cost = cost(&rig, &recording, arguments);
     arguments.memory.check(&rig.estimator, cost, &rig.setup, &recording)?;
-    let (rig, choice) = decided(rig, &recording, arguments)?;
-    let needed = rig.estimator.positions_needed();
+    let choice = decide(&rig, &recording, arguments)?;
+    let chosen = choice.as_ref().map_or(&rig.estimator, |choice| &choice.best);
+    let needed = chosen.positions_needed();
     recording.check_distinct_positions(needed).map_err(Complaint::new)?;
     let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
-    let mut locator = Observer::of_rounds(rig.estimator.most_rounds())
-        .watch(|watch| rig.estimator.fit_task(task.watch(watch)))
+    let locator = Observer::of_rounds(chosen.most_rounds())
+        .watch(|watch| rig.estimator.fit_decided(task.watch(watch), choice.as_ref()))
         .map_err(|error| Failure::from_error(&error))?;
-    locator.provenance.choice = choice;
     let training = locator.training_outcome();
     if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) = training {
         let epochs = format_count(u64::from(epochs));
@@ -120,22 +120,23 @@ fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
     FitCost { seconds: choice + slowest.with_interval_check(recording).seconds, ..slowest }
 }
 
-/// The rig with the estimator that cross-validation chooses, and the figures of its candidates.
-fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result<(Rig, Vec<Tried>), Failure> {
+/// The choice of the rig's estimator at held-out positions, with its figures for people.
+fn decide(rig: &Rig, recording: &Recording, arguments: &Arguments) -> Result<Option<Choice>, Failure> {
     let task = FitTask::new(&rig.setup, recording).seed(arguments.seed);
-    let Some(candidates) = rig.estimator.candidates(task) else { return Ok((rig, Vec::new())) };
     let start = Instant::now();
     let clock = || start.elapsed().as_secs_f64();
-    let limit = TimeLimit { clock: &clock, seconds: f64::from(arguments.auto_seconds) };
-    let choice = match Observer::of_stages().watch(|watch| choose(task.watch(watch), candidates, Some(limit)))
-    {
-        Err(FitError::NotInTime { seconds, .. }) if matches!(rig.estimator, Estimator::Influence(_)) => {
+    let seconds = arguments.auto_seconds;
+    let limit = TimeLimit { clock: &clock, seconds: f64::from(seconds) };
+    let choice = Observer::of_stages()
+        .watch(|watch| rig.estimator.decide(task.watch(watch), Some(limit)))
+        .map_err(|error| Failure::from_error(&error))?;
+    let Some(choice) = choice else {
+        if rig.estimator.candidates(task).is_some() {
             remark!(
-                "structure: by the evidence of the presses, as no structure was compared within {seconds} s"
+                "structure: by the evidence of the presses, because none was compared within {seconds} s"
             );
-            return Ok((rig, Vec::new()));
         }
-        chosen => chosen.map_err(|error| Failure::from_error(&error))?,
+        return Ok(None);
     };
     if let Some(spans) = &choice.drift {
         say_drift(&rig.setup, spans);
@@ -153,8 +154,7 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     for (name, reason) in &choice.left_out {
         remark!("{name:<24} left out: {reason}");
     }
-    rig.estimator = choice.best;
-    Ok((rig, choice.tried))
+    Ok(Some(choice))
 }
 
 /// The candidates, the chosen one first; `None` for an estimator that the rig names.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::force_prior::DECADE;
-use crate::model_offsets::{less_offsets, offsets_of};
+use crate::model_offsets::{check_offsets, less_offsets, offsets_of};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::spread::{About, spread_bound, spread_score};
@@ -307,10 +307,7 @@ impl Locate for ClosedFormLocator {
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         LocatorFault::check_count("sensors", setup.layout().len(), self.layout.len())?;
-        if !self.offsets.is_empty() {
-            LocatorFault::check_count("offsets", self.layout.len(), self.offsets.len())?;
-        }
-        LocatorFault::check_numbers("offset", self.offsets.iter().copied(), |_| true, "a finite number")?;
+        check_offsets(&self.offsets, self.layout.len())?;
         let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);
         let on_beam = |x: f64| self.beam.contains(Position::along(x));
         LocatorFault::check_numbers("sensor position", places, on_beam, "on the beam")?;

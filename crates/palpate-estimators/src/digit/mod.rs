@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::likelihood::ContactFit;
-use crate::model_offsets::{less_offsets, offsets_of};
+use crate::model_offsets::{check_offsets, less_offsets, offsets_of};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::simulate::CleanSensors;
@@ -307,10 +307,7 @@ impl Locate for DigitLocator {
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         LocatorFault::check_count("gauges", setup.layout().len(), self.layout.len())?;
-        if !self.offsets.is_empty() {
-            LocatorFault::check_count("offsets", self.layout.len(), self.offsets.len())?;
-        }
-        LocatorFault::check_numbers("offset", self.offsets.iter().copied(), |_| true, "a finite number")?;
+        check_offsets(&self.offsets, self.layout.len())?;
         let others = self.layout.kinds().into_iter().filter(|kind| *kind != SensorKind::Strain).count();
         LocatorFault::check_count("sensors that are no gauges", 0, others)?;
         let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);

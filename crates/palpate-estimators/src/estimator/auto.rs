@@ -1,9 +1,9 @@
 //! Choice of an estimator at held-out positions.
 
 use super::trial_splits::TrialSplits;
-use super::{Estimator, FitError, contenders};
+use super::{Estimator, FitError, Locator, contenders};
 use crate::evaluation::{Evaluation, Located, Split};
-use crate::fit::FitTask;
+use crate::fit::{FitTask, fit_with_interval_check};
 use crate::influence::{Influence, InfluenceFitError, Structure};
 use crate::offset_course::OffsetCourse;
 use crate::reading_check::ReadingCheck;
@@ -69,24 +69,42 @@ impl Estimator {
 }
 
 impl Estimator {
-    /// The estimator that it chooses; itself where it has no candidates.
+    /// The choice among its candidates; `None` of an estimator without candidates. If no structure of influence functions is compared within the
+    /// limit, there is no choice either, and the evidence of the presses decides.
     ///
     /// # Errors
-    /// Those of [`choose`].
-    pub fn choose_alone(&self, task: FitTask) -> Result<Self, FitError> {
-        match self.candidates(task) {
-            Some(candidates) => Ok(choose(task, candidates, None)?.best),
-            None => Ok(self.clone()),
+    /// [`FitError::NoCandidate`] without a candidate; [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then
+    /// the last one's reason; [`FitError::NotInTime`] when `auto` finished none in time; and [`FitError::Cancelled`] when the watch stopped it.
+    pub fn decide(&self, task: FitTask, limit: Option<TimeLimit>) -> Result<Option<Choice>, FitError> {
+        let Some(candidates) = self.candidates(task) else { return Ok(None) };
+        match choose(task, candidates, limit) {
+            Err(FitError::NotInTime { .. }) if matches!(self, Self::Influence(_)) => Ok(None),
+            choice => choice.map(Some),
         }
+    }
+
+    /// Fits the chosen estimator, or this one without a choice. The locator keeps the choice.
+    ///
+    /// # Errors
+    /// [`FitError`] when the recording does not suit the setup or the method, or the watch stopped it.
+    pub fn fit_decided(&self, task: FitTask, choice: Option<&Choice>) -> Result<Locator, FitError> {
+        let mut locator = fit_with_interval_check(choice.map_or(self, |choice| &choice.best), task)?;
+        locator.provenance.choice = choice.map_or_else(Vec::new, |choice| choice.tried.clone());
+        Ok(locator)
+    }
+
+    /// The estimator that it chooses; itself without a choice.
+    pub(super) fn decided(&self, task: FitTask) -> Result<Self, FitError> {
+        Ok(self.decide(task, None)?.map_or_else(|| self.clone(), |choice| choice.best))
     }
 
     /// The estimator for an evaluation in folds. The structure of influence functions is chosen once, by all presses: the folds would choose
     /// among the same three at sixteen times the cost. The choice of `auto` is repeated in each fold.
     ///
     /// # Errors
-    /// Those of [`choose`].
+    /// Those of [`Estimator::decide`].
     pub fn for_folds(&self, task: FitTask) -> Result<Self, FitError> {
-        if let Self::Auto(_) = self { Ok(self.clone()) } else { self.choose_alone(task) }
+        if let Self::Auto(_) = self { Ok(self.clone()) } else { self.decided(task) }
     }
 }
 
@@ -207,15 +225,7 @@ pub(super) fn compared_rows<'a>(candidates: &[Estimator], recording: &'a Recordi
 
 /// Chooses among [candidates](Estimator::candidates) for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds: the least geometric mean of mean error
 /// and interval score, and of structures the simplest that is not significantly worse. A drift that the presses show is subtracted from the held-out readings, as a tare does in use.
-///
-/// # Errors
-/// [`FitError::NoCandidate`] without a candidate; [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason;
-/// [`FitError::NotInTime`] when none was done in time; and [`FitError::Cancelled`] when the watch stopped it.
-pub fn choose(
-    task: FitTask,
-    candidates: Vec<Estimator>,
-    limit: Option<TimeLimit>,
-) -> Result<Choice, FitError> {
+fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -> Result<Choice, FitError> {
     if candidates.is_empty() {
         return Err(FitError::NoCandidate);
     }

@@ -18,7 +18,7 @@ pub use crate::tracking::{
     Across, Creep, Drift, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig,
 };
 pub use crate::tried::Tried;
-pub use auto::{Auto, CHOICE_FOLDS, Choice, TimeLimit, choose, take_off_drift};
+pub use auto::{Auto, CHOICE_FOLDS, Choice, TimeLimit, take_off_drift};
 pub use compare::{CompareOptions, Compared, Comparison, compare};
 pub use contenders::{UnknownEstimator, contenders, select};
 pub use cost::FitCost;
@@ -34,16 +34,13 @@ use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
 use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
 use crate::evaluation::EvaluationError;
-use crate::fit::{
-    ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue,
-    fit_with_interval_check,
-};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue};
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{
     BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, InfluencesAtNodes,
     PlateLikelihood, Structure,
 };
-use crate::likelihood::Likelihood;
+use crate::likelihood::{Likelihood, UntouchedSurface};
 use crate::load_profile::LoadChannel;
 use crate::neighbours::{Neighbours, NeighboursFitError, NeighboursLocator};
 use crate::network::{
@@ -129,19 +126,13 @@ macro_rules! estimators {
                 let task = FitTask { recording: &learnt_from, ..task };
                 match self {
                     $(Self::$variant(estimator) => Ok(estimator.fit_method(task)?.into()),)*
-                    Self::Auto(_) => self.choose_alone(asked)?.fit_method(asked),
+                    Self::Auto(_) => self.decided(asked)?.fit_method(asked),
                 }
             }
 
             fn fit_task(&self, task: FitTask) -> Result<Locator, FitError> {
-                let Some(candidates) = self.candidates(task) else {
-                    return fit_with_interval_check(self, task);
-                };
-                // The folds of the check need no choice of their own.
-                let Choice { best, tried, .. } = choose(task, candidates, None)?;
-                let mut locator = best.fit_task(task)?;
-                locator.provenance.choice = tried;
-                Ok(locator)
+                let choice = self.decide(task, None)?;
+                self.fit_decided(task, choice.as_ref())
             }
 
             fn drift_course(&self, task: FitTask, asked: &Recording) -> Option<OffsetCourse> {
@@ -151,7 +142,7 @@ macro_rules! estimators {
             /// Fits with a seed, watched. A method that is learnt has a [`ReadingCheck`] beside it.
             fn fit_without_interval_check(&self, task: FitTask) -> Result<Locator, FitError> {
                 if let Self::Auto(_) = self {
-                    return self.choose_alone(task)?.fit_without_interval_check(task);
+                    return self.decided(task)?.fit_without_interval_check(task);
                 }
                 self.fit_beside(task, || ReadingCheck::fit(task))
             }
@@ -165,7 +156,7 @@ macro_rules! estimators {
                         let map = |_, locator: Fitted<$method>| locator.into_locator();
                         Ok(estimator.fit_many(task, &mut Mapped { queue, map })?)
                     })*
-                    Self::Auto(_) => self.choose_alone(asked)?.fit_many(asked, queue),
+                    Self::Auto(_) => self.decided(asked)?.fit_many(asked, queue),
                 }
             }
         }
@@ -685,16 +676,15 @@ impl Locator {
         if config.swing.is_some() && !matches!(self.setup.surface(), SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);
         }
-        let (scatter, drift) = (self.untouched_scatter.clone(), self.untouched_drift.clone());
+        let untouched =
+            UntouchedSurface { scatter: self.untouched_scatter.clone(), drift: self.untouched_drift.clone() };
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
-                let likelihood =
-                    BeamLikelihood::new(beam).with_untouched_scatter(scatter).with_untouched_drift(drift);
+                let likelihood = BeamLikelihood::new(beam).with_untouched(untouched);
                 Ok(Tracking { likelihood: Arc::new(likelihood) })
             }
             Method::Influence(InfluenceLocator::Plane(plane)) => {
-                let likelihood =
-                    PlateLikelihood::new(plane).with_untouched_scatter(scatter).with_untouched_drift(drift);
+                let likelihood = PlateLikelihood::new(plane).with_untouched(untouched);
                 Ok(Tracking { likelihood: Arc::new(likelihood) })
             }
             method => Err(NotTrackable::Kind {

@@ -44,19 +44,19 @@ impl UntouchedRows {
         let mean = recording.untouched_mean()?;
         let rests = recording.rests();
         let drifts = UntouchedDrift::of_recording(recording).is_some();
-        let times = times(recording);
+        let times = recording.times_or_order();
         let rest = |rows: &Vec<usize>| Rest {
             time: self::mean(rows.iter().map(|row| times[*row])),
-            mean: (0..recording.channels.len()).map(|c| column_mean(recording, rows, c)).collect(),
+            mean: recording.mean_reading(rows),
             count: rows.len() as f64,
         };
         let all: Vec<Vec<usize>> = if drifts { rests.clone() } else { vec![rests.concat()] };
+        let means: Vec<Vec<f64>> = all.iter().map(|rows| recording.mean_reading(rows)).collect();
         let scatter = |c: usize| -> f64 {
-            let of_group = |rows: &Vec<usize>| -> f64 {
-                let mean = column_mean(recording, rows, c);
-                rows.iter().map(|row| (recording.rows[*row].reading[c] - mean).powi(2)).sum()
+            let of_group = |(rows, mean): (&Vec<usize>, &Vec<f64>)| -> f64 {
+                rows.iter().map(|row| (recording.rows[*row].reading[c] - mean[c]).powi(2)).sum()
             };
-            all.iter().map(of_group).sum()
+            all.iter().zip(&means).map(of_group).sum()
         };
         let count: usize = rests.iter().map(Vec::len).sum();
         Some(Self {
@@ -97,7 +97,7 @@ impl UntouchedRows {
     ///
     /// One mean of all untouched rows errs alike in all rows, and is left to the learning: its variance is not counted in the rows.
     pub fn tared_presses(&self, recording: &Recording) -> Vec<(Row, f64)> {
-        let times = times(recording);
+        let times = recording.times_or_order();
         let rows = recording.rows.iter().zip(times).filter(|(row, _)| row.touches());
         rows.map(|(row, time)| {
             let RowOffset { values, relative_variance } = self.offset_at(time);
@@ -120,13 +120,4 @@ pub(super) fn offset_course(recording: &Recording, asked: &Recording) -> Option<
         at_rows: (0..untouched.mean.len()).map(|c| Some(column(c))).collect(),
         means: untouched.mean.iter().copied().map(Some).collect(),
     })
-}
-
-/// Time of each row in seconds, or its number where rows have no times.
-fn times(recording: &Recording) -> Vec<f64> {
-    recording.times_s().unwrap_or_else(|| (0..recording.rows.len()).map(|row| row as f64).collect())
-}
-
-fn column_mean(recording: &Recording, rows: &[usize], channel: usize) -> f64 {
-    mean(rows.iter().map(|row| recording.rows[*row].reading[channel]))
 }

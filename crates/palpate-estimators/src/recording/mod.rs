@@ -179,6 +179,11 @@ impl Recording {
         self.rows.iter().map(|row| row.time_s).collect()
     }
 
+    /// The time of every row in seconds, or its number where some row has none.
+    pub(crate) fn times_or_order(&self) -> Vec<f64> {
+        self.times_s().unwrap_or_else(|| (0..self.rows.len()).map(|row| row as f64).collect())
+    }
+
     /// The same with the number of each row as its time where some row has none, so that parts of it keep their order.
     #[must_use]
     pub fn in_order(mut self) -> Self {

@@ -1,8 +1,8 @@
 //! Belief about a surface with no, one or two contacts; on a plane there is at most one.
 
 use super::bank::{
-    ACROSS, ALONG, Bank, FORCE, LineDynamics, PLANE_NUMBERS, PlaneDynamics, Step, V, W, X, contact, contacts,
-    observed_on_line, observed_on_plane,
+    ACROSS, ALONG, Bank, FORCE, LineDynamics, ObservedEntries, PLANE_NUMBERS, PlaneDynamics, Step, V, W, X,
+    contact, contacts, observed_on_line, observed_on_plane,
 };
 use super::gaussian::Gaussian;
 use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood, PlaneLikelihood};
@@ -76,18 +76,16 @@ impl Belief {
 
     /// After a reading, and the logarithm of how probable it was; `None` where that is too little for numbers.
     pub fn updated(&self, observation: Observation) -> Option<(Self, f64)> {
-        let extent = observation.likelihood.extent();
-        let (length_m, greatest_n) = (extent.length_m(), observation.greatest_force_n());
         match (self, observation.likelihood.geometry()) {
             (Self::Nothing(bank), _) => {
                 let expand =
                     |about: &[f64; 1]| observation.likelihood.fit_nothing(observation.whitened, about[0]);
-                let updated = bank.updated(&observed_on_line(length_m, greatest_n), expand, None);
+                let updated = bank.updated(&observation.entries_on_line(), expand, None);
                 updated.map(|(bank, evidence)| (Self::Nothing(bank), evidence))
             }
             (Self::One(bank), Geometry::Line(line)) => {
                 let updated = bank.updated(
-                    &observed_on_line(length_m, greatest_n),
+                    &observation.entries_on_line(),
                     |about| observation.fit_one(line, about),
                     None,
                 );
@@ -95,7 +93,7 @@ impl Belief {
             }
             (Self::Two(bank), Geometry::Line(line)) => {
                 let updated = bank.updated(
-                    &observed_on_line(length_m, greatest_n),
+                    &observation.entries_on_line(),
                     |about| observation.fit_two(line, about),
                     None,
                 );
@@ -103,7 +101,7 @@ impl Belief {
             }
             (Self::OnPlane(bank), Geometry::Plane(plane)) => {
                 let expand = |about: &[f64; 3]| observation.fit_on_plane(plane, about);
-                let updated = bank.updated(&observed_on_plane(extent, greatest_n), expand, None);
+                let updated = bank.updated(&observation.entries_on_plane(), expand, None);
                 updated.map(|(bank, evidence)| (Self::OnPlane(Box::new(bank)), evidence))
             }
             // Contacts of a line are not believed in on a plane, nor the other way round.
@@ -168,8 +166,18 @@ impl Moments {
 
 impl Observation<'_> {
     /// The greatest force of a contact, in newtons; infinite where the force is known.
-    pub fn greatest_force_n(&self) -> f64 {
+    fn greatest_force_n(&self) -> f64 {
         self.likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1)
+    }
+
+    /// Entries of contacts on a line, with their bounds.
+    pub fn entries_on_line<const K: usize>(&self) -> ObservedEntries<K> {
+        observed_on_line(self.likelihood.extent().length_m(), self.greatest_force_n())
+    }
+
+    /// Entries of a contact on a plane, with their bounds.
+    pub fn entries_on_plane(&self) -> ObservedEntries<3> {
+        observed_on_plane(self.likelihood.extent(), self.greatest_force_n())
     }
 
     pub fn fit_one(&self, line: &dyn LineLikelihood, about: &[f64; 3]) -> ContactFit<3> {

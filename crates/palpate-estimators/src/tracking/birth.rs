@@ -8,8 +8,7 @@
 
 use super::TrackerConfig;
 use super::bank::{
-    A, ACROSS, ALONG, Bank, FORCE, OF_CONTACT, PLANE_NUMBERS, U, U_RATE, V, W, X, contact, observed_on_line,
-    observed_on_plane, sides_m,
+    A, ACROSS, ALONG, Bank, FORCE, OF_CONTACT, PLANE_NUMBERS, U, U_RATE, V, W, X, contact, sides_m,
 };
 use super::belief::{Belief, Observation};
 use super::gaussian::Gaussian;
@@ -128,11 +127,7 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         let born: Bank<6, 1> = Bank::uniform(self.augmented(&Gaussian::<2>::default(), component));
         let start = [self.balance_n(component.contact), position.x_m, force_n];
         let expand = |about: &[f64; 3]| self.observation.fit_one(self.likelihood, about);
-        let (bank, evidence) = born.updated(
-            &observed_on_line(self.length_m(), self.observation.greatest_force_n()),
-            expand,
-            Some(start),
-        )?;
+        let (bank, evidence) = born.updated(&self.observation.entries_on_line(), expand, Some(start))?;
         Some((evidence + component.prior.ln(), Belief::One(Bank::uniform(bank.members[0]))))
     }
 
@@ -154,11 +149,7 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         let mode_n = self.balance_n(first) + self.balance_n(second);
         let start = [mode_n, first.position.x_m, first.force_n, second.position.x_m, second.force_n];
         let expand = |about: &[f64; 5]| self.observation.fit_two(self.likelihood, about);
-        born.updated(
-            &observed_on_line(self.length_m(), self.observation.greatest_force_n()),
-            expand,
-            Some(start),
-        )
+        born.updated(&self.observation.entries_on_line(), expand, Some(start))
     }
 
     /// A belief whose state is augmented by a contact, under which the first mode is nearly in balance: u grows by W·φ(x) and its unrest.
@@ -269,8 +260,7 @@ impl BirthModel<'_, dyn PlaneLikelihood + '_> {
         belief.covariance[FORCE][FORCE] = component.variance_n2;
         let born: Bank<PLANE_NUMBERS, 1> = Bank::uniform(belief);
         let expand = |about: &[f64; 3]| self.observation.fit_on_plane(self.likelihood, about);
-        let observed =
-            observed_on_plane(self.observation.likelihood.extent(), self.observation.greatest_force_n());
+        let observed = self.observation.entries_on_plane();
         let (bank, evidence) = born.updated(&observed, expand, Some([x_m, y_m, force_n]))?;
         Some((evidence + component.prior.ln(), Belief::OnPlane(Box::new(Bank::uniform(bank.members[0])))))
     }

@@ -140,6 +140,20 @@ fn the_simplest_structure_that_is_not_significantly_worse_is_chosen() {
 }
 
 #[test]
+fn without_time_for_a_comparison_the_evidence_decides() {
+    let (setup, recording) = pressed_line(19, 1.0);
+    let task = FitTask::new(&setup, &recording);
+    let looks = AtomicUsize::new(0);
+    let clock = || looks.fetch_add(1, Ordering::Relaxed) as f64;
+    let limit = TimeLimit { clock: &clock, seconds: 2.0 };
+    let influence = Estimator::Influence(Influence::default());
+    let choice = influence.decide(task, Some(limit)).unwrap();
+    assert_eq!(choice, None);
+    let locator = influence.fit_decided(task, choice.as_ref()).unwrap();
+    assert!(locator.provenance.choice.is_empty() && locator.interval_check.is_some());
+}
+
+#[test]
 fn few_places_choose_the_structure_by_their_evidence() {
     let (setup, recording) = pressed_line(18, 1.0);
     let influence = Estimator::Influence(Influence::default());

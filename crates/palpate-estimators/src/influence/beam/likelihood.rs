@@ -13,10 +13,9 @@ use super::table::InfluenceTable;
 use crate::fit::Locate;
 use crate::force_prior::ForceRange;
 use crate::likelihood::{
-    CalibrationVariance, ContactFit, Geometry, Likelihood, LineLikelihood, Linearisation,
+    CalibrationVariance, ContactFit, Geometry, Likelihood, LineLikelihood, Linearisation, UntouchedSurface,
 };
 use crate::untouched_drift::UntouchedDrift;
-use crate::untouched_scatter::UntouchedScatter;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -29,8 +28,7 @@ pub struct BeamLikelihood {
     locator: BeamLocator,
     /// g of the channels in use.
     first_mode: Vec<f64>,
-    untouched_scatter: Option<UntouchedScatter>,
-    untouched_drift: Option<UntouchedDrift>,
+    untouched: UntouchedSurface,
 }
 
 impl BeamLikelihood {
@@ -38,19 +36,13 @@ impl BeamLikelihood {
     pub fn new(locator: &BeamLocator) -> Self {
         let table = &locator.search().table;
         let first_mode = (0..table.sensors).map(|s| share_of_first_mode(table, s)).collect();
-        Self { locator: locator.clone(), first_mode, untouched_scatter: None, untouched_drift: None }
+        Self { locator: locator.clone(), first_mode, untouched: UntouchedSurface::default() }
     }
 
-    /// The same, by which readings within a scatter are residue of a touch.
+    /// The likelihood with the scatter and the drift of the untouched surface.
     #[must_use]
-    pub fn with_untouched_scatter(self, untouched_scatter: Option<UntouchedScatter>) -> Self {
-        Self { untouched_scatter, ..self }
-    }
-
-    /// The likelihood of a surface whose untouched rows drift.
-    #[must_use]
-    pub fn with_untouched_drift(self, untouched_drift: Option<UntouchedDrift>) -> Self {
-        Self { untouched_drift, ..self }
+    pub(crate) fn with_untouched(self, untouched: UntouchedSurface) -> Self {
+        Self { untouched, ..self }
     }
 
     /// f, f′ and v of the channels in use.
@@ -182,11 +174,11 @@ impl Likelihood for BeamLikelihood {
     }
 
     fn is_residue(&self, reading: &[f64]) -> bool {
-        self.untouched_scatter.as_ref().is_some_and(|scatter| scatter.contains(reading))
+        self.untouched.contains(reading)
     }
 
     fn untouched_drift(&self) -> Option<&UntouchedDrift> {
-        self.untouched_drift.as_ref()
+        self.untouched.drift.as_ref()
     }
 
     fn extent(&self) -> Extent {

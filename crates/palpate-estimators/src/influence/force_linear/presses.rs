@@ -321,8 +321,7 @@ fn rounding_variance(values: &[f64]) -> f64 {
 
 /// The time of each row as a share of the recording's; by the rows' order where it has no times.
 fn relative_times(recording: &Recording) -> Vec<f64> {
-    let by_order = || (0..recording.rows.len()).map(|row| row as f64).collect();
-    let times: Vec<f64> = recording.times_s().unwrap_or_else(by_order);
+    let times = recording.times_or_order();
     shares(&times, &times)
 }
 

@@ -8,10 +8,9 @@ use crate::fit::Locate;
 use crate::force_prior::ForceRange;
 use crate::influence::config::ForceBelief;
 use crate::likelihood::{
-    CalibrationVariance, ContactFit, Geometry, Likelihood, Linearisation, PlaneLikelihood,
+    CalibrationVariance, ContactFit, Geometry, Likelihood, Linearisation, PlaneLikelihood, UntouchedSurface,
 };
 use crate::untouched_drift::UntouchedDrift;
-use crate::untouched_scatter::UntouchedScatter;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -23,8 +22,7 @@ pub struct PlateLikelihood {
     locator: PlaneLocator,
     /// The locator's, without what is believed of an unknown force: that is told once, and not with every reading.
     search: Search,
-    untouched_scatter: Option<UntouchedScatter>,
-    untouched_drift: Option<UntouchedDrift>,
+    untouched: UntouchedSurface,
 }
 
 impl PlateLikelihood {
@@ -34,21 +32,14 @@ impl PlateLikelihood {
         Self {
             locator: locator.clone(),
             search: locator.search_with(force),
-            untouched_scatter: None,
-            untouched_drift: None,
+            untouched: UntouchedSurface::default(),
         }
     }
 
-    /// The same, by which readings within a scatter are residue of a touch.
+    /// The likelihood with the scatter and the drift of the untouched surface.
     #[must_use]
-    pub fn with_untouched_scatter(self, untouched_scatter: Option<UntouchedScatter>) -> Self {
-        Self { untouched_scatter, ..self }
-    }
-
-    /// The likelihood of a surface whose untouched rows drift.
-    #[must_use]
-    pub fn with_untouched_drift(self, untouched_drift: Option<UntouchedDrift>) -> Self {
-        Self { untouched_drift, ..self }
+    pub(crate) fn with_untouched(self, untouched: UntouchedSurface) -> Self {
+        Self { untouched, ..self }
     }
 }
 
@@ -119,11 +110,11 @@ impl Likelihood for PlateLikelihood {
     }
 
     fn is_residue(&self, reading: &[f64]) -> bool {
-        self.untouched_scatter.as_ref().is_some_and(|scatter| scatter.contains(reading))
+        self.untouched.contains(reading)
     }
 
     fn untouched_drift(&self) -> Option<&UntouchedDrift> {
-        self.untouched_drift.as_ref()
+        self.untouched.drift.as_ref()
     }
 
     fn extent(&self) -> Extent {
