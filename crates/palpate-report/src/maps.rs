@@ -41,10 +41,13 @@ pub(super) fn error_map(
     let limited = limit.is_some();
     panels.extend(limit);
     let (dots_mm, label) = (sensors_mm(setup.layout()), "error, mm".to_owned());
+    let shows_sensors = !dots_mm.is_empty();
     let map = HeatMap { title: title.to_owned(), cells, panels, dots_mm, label, most, width_px: 860 };
     let [along, across] = cells.sides_m().map(|side_m| number(side_m * 1e3));
     let caption = html! {
-        (what) ", by cells of " (along) " × " (across) " mm. Dots: the sensors. Grey: no contact was tried."
+        (what) ", by cells of " (along) " × " (across) " mm."
+        @if shows_sensors { " Dots: the sensors." }
+        " Grey: no contact was tried."
         @if limited {
             " The limit is the mean error of the best unbiased estimator for noisy readings and a known force (Cramér–Rao \
              bound); the median of its errors is 0.85 to 0.94 times their mean, the less the longer their ellipse is."

@@ -292,7 +292,7 @@ impl<'a> ProfileReport<'a> {
             Extent::Plane { .. } => across(along(table, ["along, mm", "centre x, mm"])),
         };
         let caption = html! {
-            "The patches: connected parts where the load is above a tenth of its highest density, and their limits, the least \
+            "The patches: as many evenly loaded parts as the reading needs, and their limits, the least \
              standard deviations that an unbiased estimator of evenly loaded patches of this number and these sizes can have. Intervals are of \
              evenly loaded patches of this number and of any size. Beside an edge force, place and size trade off."
         };
