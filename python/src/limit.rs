@@ -84,12 +84,18 @@ pub fn limit<'py>(
     }
     let told = work::run_with(py, progress, None, |watch| match &subject {
         Subject::Locator(locator) if let Some(linear) = locator.force_linear() => {
-            asked.tell(&linear.cramer_rao_bound(extent), &linear.lightest_touch(), watch)
+            let touch = locator.beyond_scatter(linear.lightest_touch());
+            asked.tell(&linear.cramer_rao_bound(extent), &touch, watch)
         }
         _ => {
             let limit = setup.cramer_rao_bound_watched(watch)?;
             let touch = Influence { false_alarm_rate: asked.rate, ..Influence::default() };
-            asked.tell(&limit, &touch.lightest_touch(&limit), watch)
+            let touch = touch.lightest_touch(&limit);
+            let touch = match &subject {
+                Subject::Locator(locator) => locator.beyond_scatter(touch),
+                _ => touch,
+            };
+            asked.tell(&limit, &touch, watch)
         }
     })?;
     let told = told.map_err(|error| complaint(&error))?;

@@ -8,8 +8,8 @@ use std::fmt::Debug;
 use palpate_core::{ContactEstimate, Estimate, Position, Status, Uncertainty};
 use palpate_mechanics::sensing::{Layout, Sensor};
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::FEWEST_FOR_95;
 use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_numerics::{FEWEST_FOR_95, binomial_tail};
 
 use crate::interval_check::{HeldOutEstimate, IntervalCheck};
 pub use crate::locator_fault::LocatorFault;
@@ -17,7 +17,7 @@ use crate::offset_course::OffsetCourse;
 use crate::recording::{Provenance, Recording};
 use crate::setup::Setup;
 use crate::split::Split;
-use crate::status::{FalseAlarmRate, SIGNIFICANCE, unless_left_open};
+use crate::status::{FalseAlarmRate, unless_left_open};
 use crate::thinning::thinned;
 use crate::tried::Tried;
 use crate::untouched_drift::UntouchedDrift;
@@ -231,8 +231,14 @@ pub trait Fit {
     }
 }
 
-/// Folds by which intervals are checked.
-pub(crate) const CHECK_FOLDS: usize = 5;
+/// Folds in which intervals are checked: each place alone where places are few, since a fold of several of them leaves holes that contacts in use do not
+/// meet. Intervals over holes are wide, and say little of those between presses.
+pub(crate) fn check_folds(places: usize) -> usize {
+    const MOST_ALONE: usize = 40;
+    const OF_MANY: usize = 5;
+    if places <= MOST_ALONE { places } else { OF_MANY }
+}
+
 /// Presses of a fold that are located, at most.
 const MOST_PRESSES_CHECKED: usize = 400;
 
@@ -256,7 +262,8 @@ fn check_intervals<E: Fit + ?Sized>(
         return Ok(None);
     }
     let recording = &task.recording.clone().in_order();
-    let Ok(mut splits) = Split::by_folds(recording, CHECK_FOLDS) else { return Ok(None) };
+    let folds = check_folds(recording.distinct_positions().len());
+    let Ok(mut splits) = Split::by_folds(recording, folds) else { return Ok(None) };
     let drifts = estimator.drift_course(FitTask { recording, ..task }, recording).is_some();
     for Split { training, judged, offsets, .. } in &mut splits {
         let kept: Vec<usize> = thinned(judged.rows.len(), MOST_PRESSES_CHECKED).collect();
@@ -265,7 +272,7 @@ fn check_intervals<E: Fit + ?Sized>(
             drifts.then(|| estimator.drift_course(FitTask { recording: training, ..task }, judged)).flatten();
     }
     let fit = |fold: usize, task: FitTask<'_>| {
-        task.watch.counted("checking intervals", "folds", fold, CHECK_FOLDS)?;
+        task.watch.counted("checking intervals", "folds", fold, folds)?;
         Ok((estimator.fit_without_interval_check(task)?, 0.0))
     };
     let FitTask { setup, seed, watch, .. } = task;
@@ -524,41 +531,17 @@ impl<M: Locate> Fitted<M> {
         }
     }
 
-    /// The locator with the scatter of the untouched rows of the recording that it was fitted to, where its noise does not explain it: where more of these
-    /// rows are contacts by noise alone than the false-alarm rate allows, at the 5 % level. A scatter that hides most
-    /// presses is not that of an untouched surface, and is left out. A method without a rule of `no_contact` has the scatter as its rule.
+    /// The locator with the scatter of the untouched rows of the recording that it was fitted to. A scatter that hides most presses is not that of an
+    /// untouched surface, and is left out. A method without a rule of `no_contact` has one by single untouched rows, or by repeats, where there are no rests.
     #[must_use]
     pub fn with_scatter_of(self, recording: &Recording) -> Self {
-        /// Rows that are located, at most.
-        const MOST: usize = 400;
         let of_check = || self.check.as_ref()?.false_alarm_rate();
-        let Some(rate) = self.method.false_alarm_rate().or_else(of_check) else {
-            return self.by_untouched_rows(recording);
-        };
-        let Some(centre) = self.method.offsets().or_else(|| self.untouched.clone()) else { return self };
-        let Some(rests) = Rests::of_recording(recording) else { return self };
-        let is_contact = |reading: &[f64]| self.locate(reading).is_ok_and(|e| e.status != Status::NoContact);
-        if is_contact(&centre) {
-            // Offsets that presses leave open do not tell untouched readings from contacts.
-            return self;
-        }
-        let readings: Vec<Vec<f64>> = rests.readings(&centre).collect();
-        let located: Vec<usize> = thinned(readings.len(), MOST).collect();
-        let contacts = located.iter().filter(|i| is_contact(&readings[**i])).count();
-        if binomial_tail(located.len(), contacts, rate.share()) > SIGNIFICANCE {
-            return self;
-        }
-        let scatter = rests.scatter(centre, self.setup.layout(), rate);
-        self.with_scatter(scatter, recording)
-    }
-
-    /// The locator of a method without a rule of `no_contact`, with the scatter of the untouched rows about their mean as its rule.
-    fn by_untouched_rows(self, recording: &Recording) -> Self {
-        let rests = Rests::of_recording(recording)
-            .or_else(|| Rests::of_single_rows(recording))
-            .or_else(|| Rests::of_repeats(recording));
-        let Some((centre, rests)) = self.untouched.clone().zip(rests) else { return self };
-        let scatter = rests.scatter(centre, self.setup.layout(), FalseAlarmRate::default());
+        let rate = self.method.false_alarm_rate().or_else(of_check);
+        let by_noise = || Rests::of_single_rows(recording).or_else(|| Rests::of_repeats(recording));
+        let rests = Rests::of_recording(recording).or_else(|| if rate.is_none() { by_noise() } else { None });
+        let centre = self.method.offsets().or_else(|| self.untouched.clone());
+        let Some((centre, rests)) = centre.zip(rests) else { return self };
+        let scatter = rests.scatter(centre, self.setup.layout(), rate.unwrap_or_default());
         self.with_scatter(scatter, recording)
     }
 

@@ -1,8 +1,9 @@
 //! Check of 95 % intervals at places that a locator was not fitted to, and their widening.
 //!
 //! An interval is right where the bench is as its method assumes. Presses at held-out places test this: a locator of the same estimator, fitted to the
-//! other folds, locates them. The ratio of a press is its error over the half-width of its interval toward it; on a plane, the square root of
-//! (e − t)ᵀ·C⁻¹·(e − t) over that of [`ELLIPSE_95`]. Intervals that are multiplied by a factor contain the presses whose ratio is at most this factor.
+//! other folds, locates them. Up to 40 places, each is a fold. The ratio of a press is the least factor by which its interval, lengthened to both sides alike,
+//! contains it (Romano, Patterson and Candès, *NeurIPS*, 2019: conformalized quantile regression); on a plane, the square root of
+//! (e − t)ᵀ·C⁻¹·(e − t) over that of [`ELLIPSE_95`]. Intervals that are lengthened by a factor contain the presses whose ratio is at most this factor.
 //!
 //! The factor is the 95 % quantile of the ratios, with the correction for their number by which it covers a press at a further place with a probability of 0.95
 //! (cross-conformal prediction: Vovk, *Annals of Mathematics and Artificial Intelligence* 74, 2015; the jackknife+ and CV+: Barber and others, *Annals of
@@ -17,7 +18,7 @@ use crate::status::{OUTSIDE_MODEL_RATE, SIGNIFICANCE, SPREAD_RATE};
 use palpate_core::{ContactEstimate, Estimate, Position, Status, Uncertainty};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::Ldl;
-use palpate_numerics::{ELLIPSE_95, binomial_tail, conformal_95_of_groups};
+use palpate_numerics::{ELLIPSE_95, FEWEST_FOR_95, binomial_tail, conformal_95_of_groups};
 use serde::{Deserialize, Serialize};
 
 /// Check of a locator's 95 % intervals at held-out places; see [the module](self).
@@ -92,7 +93,8 @@ impl IntervalCheck {
 
     /// The factors of its intervals.
     pub(crate) fn widening(&self) -> Widening {
-        Widening { position: self.position.factor, force: self.force.map_or(1.0, |force| force.factor) }
+        let of = |coverage: Coverage| coverage.factor.min(UNBOUNDED);
+        Widening { position: of(self.position), force: self.force.map_or(1.0, of) }
     }
 
     /// Checks what a file may have got wrong.
@@ -137,27 +139,34 @@ pub(crate) fn widen_by_other_folds(estimates: &mut [HeldOutEstimate], extent: Ex
 /// Ratios of the presses of each place, with the fold of the place.
 struct PlaceRatios {
     groups: Vec<(usize, Vec<f64>)>,
+    /// Places whose presses all are `no_contact`: they have no interval that could be wrong.
+    unclaimed: usize,
 }
 
 impl PlaceRatios {
     /// The ratios of the estimates that have one.
     fn new(estimates: &[HeldOutEstimate], ratio: &dyn Fn(&HeldOutEstimate) -> Option<f64>) -> Self {
-        let mut found: Vec<(Position, usize, f64)> = estimates
-            .iter()
-            // Such an estimate has no place.
-            .filter(|held_out| held_out.estimate.status != Status::NoContact)
-            .filter_map(|held_out| Some((held_out.truth, held_out.fold, ratio(held_out)?)))
-            .collect();
-        found.sort_by(|a, b| a.0.cmp_by_x_then_y(&b.0));
-        let groups = found.chunk_by(|a, b| a.0 == b.0);
-        let ratios = |group: &[(Position, usize, f64)]| group.iter().map(|(_, _, ratio)| *ratio).collect();
-        Self { groups: groups.map(|group| (group[0].1, ratios(group))).collect() }
+        let mut sorted: Vec<&HeldOutEstimate> = estimates.iter().collect();
+        sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
+        let mut ratios = Self { groups: Vec::new(), unclaimed: 0 };
+        for place in sorted.chunk_by(|a, b| a.truth == b.truth) {
+            let claimed = || place.iter().filter(|one| one.estimate.status != Status::NoContact);
+            let group: Vec<f64> = claimed().filter_map(|one| ratio(one)).collect();
+            if !group.is_empty() {
+                ratios.groups.push((place[0].fold, group));
+            }
+            ratios.unclaimed += usize::from(claimed().next().is_none());
+        }
+        ratios
     }
 
-    /// The factor of all places but those of a fold; `None` of too few.
+    /// The factor of all places but those of a fold; `None` of too few. Places without a claim count as far as the others alone are too few: the largest
+    /// ratio is the factor then.
     fn factor_without(&self, fold: Option<usize>) -> Option<f64> {
         let others = self.groups.iter().filter(|(of, _)| Some(*of) != fold);
-        let groups: Vec<&[f64]> = others.map(|(_, ratios)| ratios.as_slice()).collect();
+        let mut groups: Vec<&[f64]> = others.map(|(_, ratios)| ratios.as_slice()).collect();
+        let lacking = FEWEST_FOR_95.saturating_sub(groups.len()).min(self.unclaimed);
+        groups.extend(std::iter::repeat_n(&[0.0][..], lacking));
         conformal_95_of_groups(&groups).map(|factor| factor.max(1.0))
     }
 
@@ -183,30 +192,42 @@ impl PlaceRatios {
     }
 }
 
-/// Ratio of an error to the half-width of an interval toward the truth.
+/// Factor from which on intervals count as unbounded: one of a micrometre is then a metre long.
+pub const UNBOUNDED: f64 = 1e6;
+
+/// Least factor by which an interval contains the truth: within the interval the share of its half-width toward the truth; beyond it the distance from the
+/// nearer end counts in halves of its whole length, so that an interval that ends at its own estimate is widened too.
 fn ratio_of((low, high): (f64, f64), estimate: f64, truth: f64) -> f64 {
+    let beyond = (low - truth).max(truth - high);
     let (error, half) = if truth >= estimate {
         (truth - estimate, high - estimate)
     } else {
         (estimate - truth, estimate - low)
     };
-    match (error, half) {
-        (0.0, _) => 0.0,
-        (error, half) if half > 0.0 => (error / half).min(f64::MAX),
-        _ => f64::MAX,
-    }
+    let ratio = if beyond > 0.0 {
+        1.0 + beyond / (0.5 * (high - low).max(0.0))
+    } else if half > 0.0 {
+        (error / half).min(1.0)
+    } else {
+        0.0
+    };
+    ratio.min(UNBOUNDED)
 }
 
 fn position_ratio(held_out: &HeldOutEstimate, extent: Extent) -> Option<f64> {
     let ContactEstimate { position, uncertainty, .. } = held_out.estimate.contact;
-    let Uncertainty { covariance: [xx, xy, _, yy, ..], x_95_m, .. } = uncertainty?;
+    let Uncertainty { covariance: [xx, xy, _, yy, ..], x_95_m, y_95_m, .. } = uncertainty?;
     let truth = held_out.truth;
+    let along_x = ratio_of(x_95_m, position.x_m, truth.x_m);
     if let Extent::Line { .. } = extent {
-        return Some(ratio_of(x_95_m, position.x_m, truth.x_m));
+        return Some(along_x);
     }
     let error = [position.x_m - truth.x_m, position.y_m - truth.y_m];
-    let squared = Ldl::new(&[[xx, xy], [xy, yy]]).map(|factors| factors.quadratic(error) / ELLIPSE_95);
-    Some(squared.filter(|squared| squared.is_finite()).map_or(f64::MAX, f64::sqrt))
+    let ellipse = Ldl::new(&[[xx, xy], [xy, yy]]).map(|factors| factors.quadratic(error) / ELLIPSE_95);
+    // An ellipse without an area says nothing of the errors across it; its intervals do.
+    let of_intervals = || along_x.max(ratio_of(y_95_m, position.y_m, truth.y_m));
+    let ratio = ellipse.map(f64::sqrt).filter(|ratio| ratio.is_finite()).unwrap_or_else(of_intervals);
+    Some(ratio.min(UNBOUNDED))
 }
 
 fn force_ratio(held_out: &HeldOutEstimate, extent: Extent) -> Option<f64> {
@@ -238,24 +259,24 @@ impl Widening {
         let Some(uncertainty) = contact.uncertainty else { return contact };
         let Self { position: p, force: f } = *self;
         let [xx, xy, xf, yy, yf, ff] = uncertainty.covariance;
-        let (x_m, y_m) = (contact.position.x_m, contact.position.y_m);
-        let of_force = |force_95_n, force_n| widened_interval(force_95_n, force_n, f, f64::INFINITY);
         let uncertainty = Uncertainty {
             covariance: [p * p * xx, p * p * xy, p * f * xf, p * p * yy, p * f * yf, f * f * ff],
-            x_95_m: widened_interval(uncertainty.x_95_m, x_m, p, extent.length_m()),
+            x_95_m: widened_interval(uncertainty.x_95_m, p, extent.length_m()),
             y_95_m: extent
                 .width_m()
-                .map_or(uncertainty.y_95_m, |width_m| widened_interval(uncertainty.y_95_m, y_m, p, width_m)),
-            force_95_n: uncertainty.force_95_n.zip(contact.force_n).map(|(n, force_n)| of_force(n, force_n)),
+                .map_or(uncertainty.y_95_m, |width_m| widened_interval(uncertainty.y_95_m, p, width_m)),
+            force_95_n: uncertainty
+                .force_95_n
+                .map(|force_95_n| widened_interval(force_95_n, f, f64::INFINITY)),
         };
         ContactEstimate { uncertainty: Some(uncertainty), ..contact }
     }
 }
 
-/// An interval about a value with both half-widths multiplied, within 0 and `size` where it was.
-fn widened_interval((low, high): (f64, f64), value: f64, factor: f64, size: f64) -> (f64, f64) {
-    let wider = |end: f64| value + factor * (end - value);
-    (wider(low).min(low).max(low.min(0.0)), wider(high).max(high).min(high.max(size)))
+/// An interval whose length is multiplied by a factor, to both sides alike. It ends at 0 and `size` where it ended within them.
+fn widened_interval((low, high): (f64, f64), factor: f64, size: f64) -> (f64, f64) {
+    let more = (factor - 1.0) * 0.5 * (high - low).max(0.0);
+    ((low - more).max(low.min(0.0)), (high + more).min(high.max(size)))
 }
 
 #[cfg(test)]

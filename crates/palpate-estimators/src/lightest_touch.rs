@@ -1,8 +1,10 @@
 //! The lightest touch that is distinguished from noise: the force from which on a contact is found at a given false-alarm rate.
 //!
-//! The probability that a contact is found follows from its signal-to-noise ratio, by the rule of `no_contact` ([`crate::status`]).
+//! The probability that a contact is found follows from its signal-to-noise ratio, by the rule of `no_contact` ([`crate::status`]). A locator with
+//! the scatter of untouched rows finds a contact that exceeds this scatter too; for that the scatter has the place of the noise.
 
 use crate::status::{Detection, FalseAlarmRate};
+use crate::untouched_scatter::UntouchedScatter;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::{bisect, percentile};
 
@@ -25,10 +27,28 @@ use palpate_numerics::{bisect, percentile};
 /// ```
 pub struct LightestTouch<'a> {
     rate: FalseAlarmRate,
-    /// Signal-to-noise ratios that are found with the probabilities [`LightestTouch::FOUND`].
+    /// Rules that all have to be passed.
+    rules: Vec<Rule>,
+    /// Change of each channel by a contact, over the standard deviation of its noise.
+    change: Box<dyn Fn(Contact) -> Vec<f64> + 'a>,
+}
+
+/// A contact is found where the length of its weighted change is large enough.
+struct Rule {
+    /// Lengths that are found with the probabilities [`LightestTouch::FOUND`].
     needed: [f64; 2],
-    /// Signal-to-noise ratio of a contact.
-    signal: Box<dyn Fn(Contact) -> f64 + 'a>,
+    /// Weight of each channel.
+    weights: Vec<f64>,
+}
+
+impl Rule {
+    fn new(detection: Detection, weights: Vec<f64>) -> Self {
+        Self { needed: LightestTouch::FOUND.map(|found| detection.signal(found)), weights }
+    }
+
+    fn length(&self, change: &[f64]) -> f64 {
+        change.iter().zip(&self.weights).map(|(value, weight)| (value * weight).powi(2)).sum::<f64>().sqrt()
+    }
 }
 
 /// The lightest touch all over a surface, found with one probability.
@@ -53,9 +73,27 @@ impl<'a> LightestTouch<'a> {
     pub(crate) fn new(
         detection: Detection,
         rate: FalseAlarmRate,
-        signal: Box<dyn Fn(Contact) -> f64 + 'a>,
+        change: Box<dyn Fn(Contact) -> Vec<f64> + 'a>,
     ) -> Self {
-        Self { rate, needed: Self::FOUND.map(|found| detection.signal(found)), signal }
+        let rules = vec![Rule::new(detection, vec![1.0; detection.channels])];
+        Self { rate, rules, change }
+    }
+
+    /// The same, of a locator with the scatter of untouched rows. `noise_sd` has the standard deviation of each channel's noise; `None` of those that are not
+    /// in use.
+    #[must_use]
+    pub fn beyond(mut self, scatter: &UntouchedScatter, noise_sd: &[Option<f64>]) -> Self {
+        let weight = |(noise, scatter): (&Option<f64>, &f64)| {
+            let noise = (*noise)?;
+            Some(if *scatter > 0.0 { noise / scatter } else { 0.0 })
+        };
+        let weights: Vec<f64> = noise_sd.iter().zip(&scatter.sd).filter_map(weight).collect();
+        let channels = weights.iter().filter(|weight| **weight > 0.0).count();
+        if channels > 0 {
+            let detection = Detection { channels, unknowns: 1, square: scatter.bound, taken: scatter.bound };
+            self.rules.push(Rule::new(detection, weights));
+        }
+        self
     }
 
     /// The false-alarm rate at which it is found.
@@ -65,12 +103,15 @@ impl<'a> LightestTouch<'a> {
 
     /// The forces, in newtons, that are found with the probabilities [`LightestTouch::FOUND`] at a position; `None` where no force is.
     pub fn forces_at(&self, position: Position) -> [Option<f64>; 2] {
-        self.needed.map(|needed| self.force_n(position, needed))
+        [0, 1].map(|i| {
+            let forces = self.rules.iter().map(|rule| self.force_n(position, rule, rule.needed[i]));
+            forces.reduce(|a, b| Some(f64::max(a?, b?))).flatten()
+        })
     }
 
-    /// The force whose signal-to-noise ratio is `needed`.
-    fn force_n(&self, position: Position, needed: f64) -> Option<f64> {
-        let signal = |force_n: f64| (self.signal)(Contact { position, force_n });
+    /// The force whose weighted change has the length `needed`.
+    fn force_n(&self, position: Position, rule: &Rule, needed: f64) -> Option<f64> {
+        let signal = |force_n: f64| rule.length(&(self.change)(Contact { position, force_n }));
         let guess_n = needed / signal(1.0);
         if guess_n <= Self::MOST_N && (signal(guess_n) / needed - 1.0).abs() < 1e-9 {
             return Some(guess_n);

@@ -6,6 +6,7 @@ use crate::untouched_scatter::UntouchedScatter;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
+use std::f64::consts::SQRT_2;
 
 /// Variance of a contact that calibration leaves, and no further reading takes away.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,6 +25,30 @@ pub(crate) struct UntouchedSurface {
 }
 
 impl UntouchedSurface {
+    /// The surface as a filter sees it that follows the drift by itself. Where the random walk makes most of the scatter, in units of the noise over all
+    /// channels, the noise of two readings remains: the walk of a single channel is known too badly to be subtracted.
+    pub fn beside_walk(
+        scatter: Option<UntouchedScatter>,
+        drift: Option<UntouchedDrift>,
+        noise_sd: &[Option<f64>],
+    ) -> Self {
+        let walks = drift.as_ref().map(UntouchedDrift::walk_variances).unwrap_or_default();
+        let scatter = scatter.map(|mut scatter| {
+            let in_noise = |variances: &mut dyn Iterator<Item = f64>| -> f64 {
+                variances
+                    .zip(noise_sd)
+                    .map(|(variance, noise)| noise.map_or(0.0, |sd| variance / (sd * sd)))
+                    .sum()
+            };
+            let by_walk = in_noise(&mut walks.iter().copied());
+            if by_walk > 0.5 * in_noise(&mut scatter.sd.iter().map(|sd| sd * sd)) {
+                scatter.sd = noise_sd.iter().map(|sd| SQRT_2 * sd.unwrap_or(0.0)).collect();
+            }
+            scatter
+        });
+        Self { scatter, drift }
+    }
+
     /// True for a reading within the scatter.
     pub fn contains(&self, reading: &[f64]) -> bool {
         self.scatter.as_ref().is_some_and(|scatter| scatter.contains(reading))

@@ -61,8 +61,11 @@ pub struct Recordings {
     pub calibration: Recording,
     /// Contacts in use, with untouched rows between them.
     pub touches: Recording,
-    /// Light touches, in the same way.
-    pub light: Recording,
+    /// Places of the contacts in use.
+    places: Vec<Position>,
+    /// The bench in use.
+    used: Setup,
+    seed: u64,
 }
 
 impl Bench<'_> {
@@ -89,14 +92,14 @@ impl Bench<'_> {
         let used = setup.clone().with_imperfections(with_many_untouched_rows(&setup)?)?;
         // Streams of noise of their own.
         let touches = simulate_use_watched(&used, provenance, &touched, seed.wrapping_add(1), Watch::NONE)?;
-        let light = light_touches(&setup, &places)?;
-        let light = simulate_use_watched(&used, provenance, &light, seed.wrapping_add(2), Watch::NONE)?;
         let known = self.known(&setup)?;
         let known_by = |recording: Recording| Recording { kinds: known.layout().kinds(), ..recording };
         Ok(Recordings {
             calibration: known_by(calibration),
             touches: known_by(touches),
-            light: known_by(light),
+            places,
+            used,
+            seed,
             known,
         })
     }
@@ -152,17 +155,43 @@ impl Recordings {
     ) -> Result<()> {
         let task = FitTask::new(&self.known, &self.calibration).seed(seed);
         let locator = estimator.fit_task(task)?;
+        let light = self.light_touches(&locator)?;
+        for tally in &mut *tallies {
+            tally.add_interval_check(locator.interval_check.as_ref());
+        }
         for (zero, tally) in zeros.iter().zip(tallies) {
             let touches = tared(&locator, &self.touches, *zero)?;
             for row in touches.rows.iter().filter(|row| !row.touches()) {
                 tally.add_untouched(&locator.locate(&row.reading)?);
             }
             tally.add_touches(Evaluation::new(&locator, &touches)?);
-            for row in tared(&locator, &self.light, *zero)?.rows.iter().filter(|row| row.touches()) {
+            for row in tared(&locator, &light, *zero)?.rows.iter().filter(|row| row.touches()) {
                 tally.add_light_touch(&locator.locate(&row.reading)?);
             }
         }
         Ok(())
+    }
+}
+
+impl Recordings {
+    /// Contacts of five times the force that the locator finds with a probability of 95 %, by the noise of the bench and the scatter of its
+    /// untouched rows, where there is one.
+    fn light_touches(&self, locator: &Locator) -> Result<Recording> {
+        let limit = self.used.cramer_rao_bound()?;
+        let by_noise = Influence::default().lightest_touch(&limit);
+        let touch = match &locator.untouched_scatter {
+            Some(scatter) => by_noise.beyond(scatter, &self.used.layout().reading_sds()?),
+            None => by_noise,
+        };
+        let light = self.places.iter().step_by(LIGHT_EACH).filter_map(|position| {
+            let [_, surely_n] = touch.forces_at(*position);
+            Some(Contact { position: *position, force_n: LIGHT * surely_n? })
+        });
+        let (light, provenance): (Vec<Contact>, _) = (light.collect(), &self.calibration.provenance);
+        // A stream of noise of its own.
+        let seed = self.seed.wrapping_add(2);
+        let recording = simulate_use_watched(&self.used, provenance, &light, seed, Watch::NONE)?;
+        Ok(Recording { kinds: self.known.layout().kinds(), ..recording })
     }
 }
 
@@ -194,17 +223,6 @@ fn tared(locator: &Locator, recording: &Recording, zero: Zero) -> Result<Recordi
 fn in_turn(places: &[Position], force_n: f64) -> Vec<Contact> {
     let shares = places.iter().zip(Calibration::UNKNOWN_FORCES.iter().cycle());
     shares.map(|(position, share)| Contact { position: *position, force_n: share * force_n }).collect()
-}
-
-/// Contacts of five times the force that is found with a probability of 95 % by the noise of the channels, where one is.
-fn light_touches(setup: &Setup, places: &[Position]) -> Result<Vec<Contact>> {
-    let limit = setup.cramer_rao_bound()?;
-    let touch = Influence::default().lightest_touch(&limit);
-    let light = places.iter().step_by(LIGHT_EACH).filter_map(|position| {
-        let [_, surely_n] = touch.forces_at(*position);
-        Some(Contact { position: *position, force_n: LIGHT * surely_n? })
-    });
-    Ok(light.collect())
 }
 
 /// About so many positions in the middles of equal cells, as square as they can be on a plane.

@@ -214,13 +214,13 @@ impl Results {
             self.seeds.len(),
             self.contacts
         );
-        text += "| bench | surface | estimator | world | tared | median, mean error (mm) | position in 95 % | force in 95 % | outside model | ambiguous | missed | untouched `no_contact` | light found |\n";
-        text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+        text += "| bench | surface | estimator | world | tared | median, mean error (mm) | said at held-out places | position in 95 % | force in 95 % | outside model | ambiguous | missed | untouched `no_contact` | light found |\n";
+        text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
         for row in &self.rows {
             let TableRow { bench, knowledge, estimator, world, tared, figures, failure } = row;
             let _ = write!(text, "| {bench} | {knowledge} | {estimator} | {world} | {tared} | ");
             let _ = match failure {
-                Some(failure) => writeln!(text, "{} | | | | | | | |", failure.replace('|', "/")),
+                Some(failure) => writeln!(text, "{} | | | | | | | | |", failure.replace('|', "/")),
                 None => writeln!(text, "{} |", cells(figures).join(" | ")),
             };
         }
@@ -232,6 +232,8 @@ fn cells(figures: &Figures) -> Vec<String> {
     let percent = |share: Option<f64>| share.map_or("–".to_owned(), |share| format!("{share:.1} %"));
     let mm = |length: Option<f64>| length.map_or("–".to_owned(), |length| format!("{length:.2}"));
     let mut cells = vec![format!("{}, {}", mm(figures.median_error_mm), mm(figures.mean_error_mm))];
+    let whole = |share: Option<f64>| share.map_or("–".to_owned(), |share| format!("{share:.0}"));
+    cells.push(format!("{} → {} %", whole(figures.said_before), whole(figures.said_after)));
     let shares = [
         figures.position_coverage,
         figures.force_coverage,

@@ -1,5 +1,6 @@
 //! Estimates beside the truth, summed into figures.
 
+use palpate::estimators::interval_check::IntervalCheck;
 use palpate::prelude::{Estimate, Evaluation, Extent, Status};
 use serde::Serialize;
 
@@ -9,6 +10,8 @@ pub struct Tally {
     touches: Evaluation,
     untouched: Count,
     light: Count,
+    /// Coverage of the position that each fit said of held-out places, in %: by the method, and once widened.
+    said: Vec<[f64; 2]>,
 }
 
 /// Number of cases, and of those that are so.
@@ -27,6 +30,10 @@ pub struct Figures {
     pub median_error_mm: Option<f64>,
     /// Mean distance, in mm.
     pub mean_error_mm: Option<f64>,
+    /// Held-out presses that the method's regions of the position contain, as `fit` says; `None` where it does not check them.
+    pub said_before: Option<f64>,
+    /// The same of the regions that it widens.
+    pub said_after: Option<f64>,
     /// 95 % regions of the position that contain it.
     pub position_coverage: Option<f64>,
     /// 95 % intervals of the force that contain it.
@@ -58,7 +65,12 @@ impl Tally {
     /// A tally without estimates, on a surface of this extent.
     pub fn new(extent: Extent) -> Self {
         let touches = Evaluation { extent, located: Vec::new() };
-        Self { touches, untouched: Count::default(), light: Count::default() }
+        Self { touches, untouched: Count::default(), light: Count::default(), said: Vec::new() }
+    }
+
+    /// Adds what a fit said of its intervals, where it checked them.
+    pub fn add_interval_check(&mut self, check: Option<&IntervalCheck>) {
+        self.said.extend(check.map(|check| [check.position.before_percent, check.position.after_percent]));
     }
 
     /// Adds estimates of touches.
@@ -83,10 +95,16 @@ impl Tally {
         let statuses = touches.status_percents();
         let percent =
             |status| statuses.as_ref()?.iter().find(|(of, _)| *of == status).map(|(_, share)| *share);
+        let said = |i: usize| {
+            let sum: f64 = self.said.iter().map(|percents| percents[i]).sum();
+            (!self.said.is_empty()).then(|| sum / self.said.len() as f64)
+        };
         Figures {
             touches: touches.located.len(),
             median_error_mm: errors.map(|errors| 1e3 * errors.median_m),
             mean_error_mm: errors.map(|errors| 1e3 * errors.average_m),
+            said_before: said(0),
+            said_after: said(1),
             position_coverage: touches.coverage_percent(),
             force_coverage: touches.force_summary().map(|forces| forces.coverage_percent),
             outside_model: percent(Status::OutsideModel),

@@ -83,7 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         None => a_few(extent),
     };
     check_cost(&setup, listed.len(), arguments)?;
-    let (limit, touch);
+    let (limit, mut touch);
     match learnt(&bench) {
         Some(linear) => {
             limit = linear.cramer_rao_bound(extent);
@@ -95,6 +95,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             touch = Influence { false_alarm_rate: false_alarm_rate(&bench), ..Influence::default() }
                 .lightest_touch(&limit);
         }
+    }
+    if let RigOrLocator::Locator(locator) = &bench {
+        touch = locator.beyond_scatter(touch);
     }
     let limits = Observer::of_stages()
         .watch(|watch| limits(&limit, &touch, &setup, listed, arguments, watch))

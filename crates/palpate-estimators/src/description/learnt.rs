@@ -22,8 +22,16 @@ pub fn learnt(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
 
 /// A value and its noise, of which three digits are shown.
 fn with_noise(value: f64, noise: f64) -> String {
-    let decimals = (2.0 - noise.log10().floor()).clamp(0.0, 15.0) as usize;
+    let decimals = decimals(noise, 3);
     format!("{value:.decimals$} ± {noise:.decimals$}")
+}
+
+/// Decimals by which a value has so many digits; none of 0.
+fn decimals(value: f64, digits: i32) -> usize {
+    if value == 0.0 {
+        return 0;
+    }
+    (f64::from(digits - 1) - value.abs().log10().floor()).clamp(0.0, 15.0) as usize
 }
 
 /// Structure, drift, scatter and what was set aside, for the summary of a fit.
@@ -56,8 +64,8 @@ fn structure(linear: &ForceLinearLocator) -> String {
 /// Drift, scatter, and what was set aside.
 fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     let by_channel = |sizes: &[(usize, f64)]| {
-        let sizes: Vec<String> = sizes.iter().map(|(c, sd)| format!("{} by {sd:.1}", names[*c])).collect();
-        sizes.join(", ")
+        let size = |(c, sd): &(usize, f64)| format!("{} by {:.*}", names[*c], decimals(*sd, 2), sd);
+        sizes.iter().map(size).collect::<Vec<_>>().join(", ")
     };
     let mut lines = Vec::new();
     if let Some(course) = linear.drift_course() {
@@ -139,12 +147,14 @@ fn influences(linear: &ForceLinearLocator) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::with_noise;
+    use super::{decimals, with_noise};
 
     #[test]
     fn noise_has_three_digits_of_any_size() {
         assert_eq!(with_noise(282.5181, 1.0234), "282.52 ± 1.02");
         assert_eq!(with_noise(0.000_123_4, 0.002_011), "0.00012 ± 0.00201");
         assert_eq!(with_noise(51_234.6, 1234.5), "51235 ± 1234");
+        // A walk of a few microstrain, and none.
+        assert_eq!([decimals(3.2e-6, 2), decimals(0.0, 2)], [7, 0]);
     }
 }

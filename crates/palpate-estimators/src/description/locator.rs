@@ -5,7 +5,7 @@ use crate::centroid::Weighing;
 use crate::estimator::{Locator, Method, Tried};
 use crate::influence::InfluenceLocator;
 use crate::influence::measured::{MeasuredLocator, NuisanceRole};
-use crate::interval_check::{Coverage, IntervalCheck};
+use crate::interval_check::{Coverage, IntervalCheck, UNBOUNDED};
 use crate::network::Topology;
 use palpate_mechanics::units::{format_count, format_length_mm};
 use palpate_numerics::FEWEST_FOR_95;
@@ -88,9 +88,12 @@ pub fn interval_check(check: Option<&IntervalCheck>) -> Vec<String> {
         )];
     };
     let line = |what: &str, Coverage { before_percent, after_percent, factor }: Coverage| {
-        let widened = match factor > 1.0 {
-            true => format!("; {after_percent:.1} % once widened by the factor {factor:.2}"),
-            false => String::new(),
+        let widened = if factor >= UNBOUNDED {
+            "; some lie where an interval has no length, so that intervals are unbounded".to_owned()
+        } else if factor > 1.0 {
+            format!("; {after_percent:.1} % once widened by the factor {factor:.2}")
+        } else {
+            String::new()
         };
         format!(
             "95 % intervals at {} places held out: {before_percent:.1} % contain the {what}{widened}",

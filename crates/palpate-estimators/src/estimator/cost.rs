@@ -6,7 +6,7 @@
 use super::auto::compared_rows;
 use super::{CHOICE_FOLDS, Estimator, is_learnt};
 use crate::features::FeatureKind;
-use crate::fit::{CHECK_FOLDS, FitTask};
+use crate::fit::{FitTask, check_folds};
 use crate::gaussian_process::folds_taken;
 use crate::influence::measured::{MeasuredInfluence, most_nodes, most_nuisance_nodes};
 use crate::influence::{Influence, Structure, force_linear, learning, sizes_over_a_model};
@@ -33,10 +33,10 @@ impl FitCost {
     /// The cost with that of the check of intervals at held-out places, where the recording has enough of these.
     #[must_use]
     pub fn with_interval_check(self, recording: &Recording) -> Self {
-        let folds = CHECK_FOLDS as f64;
-        let has_check = recording.distinct_positions().len() >= FEWEST_FOR_95;
-        let checked = if has_check { (folds - 1.0) * self.seconds } else { 0.0 };
+        let places = recording.distinct_positions().len();
         // Each fold is fitted to all others.
+        let fitted = check_folds(places).saturating_sub(1) as f64;
+        let checked = if places >= FEWEST_FOR_95 { fitted * self.seconds } else { 0.0 };
         Self { seconds: self.seconds + checked, ..self }
     }
 

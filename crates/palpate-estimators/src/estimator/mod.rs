@@ -40,6 +40,7 @@ use crate::influence::{
     BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, InfluencesAtNodes,
     PlateLikelihood, Structure,
 };
+use crate::lightest_touch::LightestTouch;
 use crate::likelihood::{Likelihood, UntouchedSurface};
 use crate::load_profile::LoadChannel;
 use crate::neighbours::{Neighbours, NeighboursFitError, NeighboursLocator};
@@ -526,6 +527,17 @@ impl Locator {
         tare.follow(reading, tared, |tared| self.locate(tared).unwrap_or_else(|_| self.anywhere()))
     }
 
+    /// The lightest touch that this locator finds, of one that is found by noise alone: contacts have to exceed the scatter of its untouched rows too.
+    #[must_use]
+    pub fn beyond_scatter<'a>(&self, touch: LightestTouch<'a>) -> LightestTouch<'a> {
+        let Some(scatter) = &self.untouched_scatter else { return touch };
+        let noise_sd = match self.force_linear() {
+            Some(linear) => linear.noise_of_channels(self.layout().len()),
+            None => self.layout().reading_sds().unwrap_or_default(),
+        };
+        touch.beyond(scatter, &noise_sd)
+    }
+
     /// False-alarm rate; `None` of a method without `no_contact`.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         let of_check = || self.check.as_ref()?.false_alarm_rate();
@@ -676,8 +688,11 @@ impl Locator {
         if config.swing.is_some() && !matches!(self.setup.surface(), SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);
         }
-        let untouched =
-            UntouchedSurface { scatter: self.untouched_scatter.clone(), drift: self.untouched_drift.clone() };
+        let untouched = UntouchedSurface::beside_walk(
+            self.untouched_scatter.clone(),
+            self.untouched_drift.clone(),
+            &self.layout().reading_sds().unwrap_or_default(),
+        );
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
                 let likelihood = BeamLikelihood::new(beam).with_untouched(untouched);

@@ -111,7 +111,7 @@ impl Influence {
         LightestTouch::new(
             detection,
             self.false_alarm_rate,
-            Box::new(|contact| limit.signal_to_noise(contact)),
+            Box::new(|contact| limit.whitened_reading(contact)),
         )
     }
 

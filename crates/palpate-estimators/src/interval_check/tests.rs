@@ -96,6 +96,20 @@ fn eighteen_places_bound_nothing() {
 }
 
 #[test]
+fn places_without_a_claim_are_no_reason_to_check_nothing() {
+    let mut held_out = estimates(20, 2, 2.0, 1);
+    let hidden = held_out[3].truth;
+    for one in held_out.iter_mut().filter(|one| one.truth == hidden || one.truth.x_m > 0.85) {
+        one.estimate.status = Status::NoContact;
+    }
+    let check = IntervalCheck::of_estimates(&held_out, line()).unwrap();
+    let claimed = held_out.iter().filter(|one| one.estimate.status != Status::NoContact);
+    let ratios: Vec<f64> = claimed.filter_map(|one| position_ratio(one, line())).collect();
+    let beyond = ratios.iter().filter(|ratio| **ratio > check.position.factor).count();
+    assert!(check.places < FEWEST_FOR_95 && beyond <= 1 && ratios.len() == 36, "{check:?}");
+}
+
+#[test]
 fn untouched_estimates_and_known_forces_are_left_out() {
     let mut held_out = estimates(30, 1, 1.0, 1);
     for one in &mut held_out {
@@ -114,11 +128,41 @@ fn untouched_estimates_and_known_forces_are_left_out() {
 
 #[test]
 fn widened_intervals_end_where_the_surface_does() {
-    assert_eq!(widened_interval((0.0, 0.3), 0.1, 2.0, 1.0), (0.0, 0.5));
-    assert_eq!(widened_interval((0.6, 0.95), 0.9, 4.0, 1.0), (0.0, 1.0));
-    // One that went beyond an end, or does not contain its value, is not made shorter.
-    assert_eq!(widened_interval((-0.2, 0.3), 0.0, 2.0, 1.0), (-0.2, 0.6));
-    assert_eq!(widened_interval((0.4, 0.5), 0.3, 2.0, 1.0), (0.4, 0.7));
+    assert_eq!(widened_interval((0.0, 0.3), 2.0, 1.0), (0.0, 0.3 + 0.15));
+    assert_eq!(widened_interval((0.6, 0.95), 4.0, 1.0).1, 1.0);
+    // One that went beyond an end is not made shorter.
+    assert_eq!(widened_interval((-0.2, 0.2), 2.0, 1.0), (-0.2, 0.4));
+    assert_eq!(widened_interval((0.3, 0.3), UNBOUNDED, 1.0), (0.3, 0.3));
+}
+
+#[test]
+fn an_interval_contains_the_truth_once_lengthened_by_its_ratio() {
+    for ((low, high), estimate, truth) in [
+        ((0.4, 0.6), 0.5, 0.8),
+        // Ends at its estimate, or does not contain it.
+        ((0.4, 0.5), 0.5, 0.52),
+        ((0.4, 0.5), 0.7, 0.9),
+        ((0.4, 0.5), 0.45, 0.1),
+    ] {
+        let ratio = ratio_of((low, high), estimate, truth);
+        assert!(ratio > 1.0 && ratio < 20.0, "{ratio}");
+        let contains = |factor: f64| {
+            let (low, high) = widened_interval((low, high), factor, 1.0);
+            (low..=high).contains(&truth)
+        };
+        assert!(contains(1.001 * ratio) && !contains(0.999 * ratio), "{ratio}");
+    }
+    assert!((ratio_of((0.4, 0.6), 0.5, 0.55) - 0.5).abs() < 1e-12);
+    assert_eq!((ratio_of((0.4, 0.4), 0.4, 0.5), ratio_of((0.4, 0.4), 0.4, 0.4)), (UNBOUNDED, 0.0));
+}
+
+#[test]
+fn an_ellipse_without_an_area_is_judged_by_its_intervals() {
+    let mut held_out = estimates(1, 1, 1.0, 1)[0];
+    let uncertainty = held_out.estimate.contact.uncertainty.as_mut().unwrap();
+    uncertainty.covariance[3] = 0.0;
+    let ratio = position_ratio(&held_out, plane()).unwrap();
+    assert!(ratio > 0.0 && ratio < 10.0, "{ratio}");
 }
 
 #[test]

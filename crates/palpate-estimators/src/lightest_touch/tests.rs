@@ -10,6 +10,7 @@ use crate::recording::Row;
 use crate::setup::Setup;
 use crate::simulate::CleanSensors;
 use crate::status::FalseAlarmRate;
+use crate::untouched_scatter::UntouchedScatter;
 use palpate_core::Status;
 use palpate_mechanics::limit::{CramerRaoBound, Force};
 use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
@@ -123,13 +124,33 @@ fn on_a_surface_without_a_model_it_is_true_within_a_tenth() {
 }
 
 #[test]
+fn the_scatter_of_untouched_rows_hides_touches_that_noise_would_not() {
+    let bench = paper(5e-6, 300);
+    let setup = bench.setup.clone().unknown_force();
+    let estimator = Estimator::Influence(Influence::default());
+    let mut locator = estimator.fit_without_interval_check(FitTask::new(&setup, &bench.simulate(0))).unwrap();
+    let limit = bench.setup.cramer_rao_bound().unwrap();
+    let by_noise = || Influence::default().lightest_touch(&limit);
+    let positions = ALONG.map(Position::along);
+    let noise_alone = locator.beyond_scatter(by_noise());
+    assert_eq!(noise_alone.forces_at(positions[1]), by_noise().forces_at(positions[1]));
+    let (centre, sd) = (vec![0.0; 8], vec![5e-6; 8]);
+    locator.untouched_scatter = Some(UntouchedScatter { centre, sd, bound: 100.0 });
+    let touch = locator.beyond_scatter(by_noise());
+    let [noise_n, scatter_n] = [by_noise(), locator.beyond_scatter(by_noise())]
+        .map(|touch| touch.forces_at(positions[1])[1].unwrap());
+    assert!(scatter_n > 1.5 * noise_n, "{scatter_n} {noise_n}");
+    check("scatter", &bench, &locator, &touch, &positions);
+}
+
+#[test]
 fn a_surface_that_does_not_notice_has_no_lightest_touch() {
     let detection = Detection { channels: 3, unknowns: 2, square: 16.0, taken: 11.0 };
-    let touch = LightestTouch::new(detection, FalseAlarmRate::default(), Box::new(|_| 0.0));
+    let touch = LightestTouch::new(detection, FalseAlarmRate::default(), Box::new(|_| vec![0.0; 3]));
     assert_eq!(touch.forces_at(Position::along(0.1)), [None, None]);
     assert_eq!(touch.summaries(&[Position::along(0.1)]), [None, None]);
     // One that saturates is found where its readings do not.
-    let saturating = |contact: Contact| (4.0 * contact.force_n).min(8.0);
+    let saturating = |contact: Contact| vec![(4.0 * contact.force_n).min(8.0), 0.0, 0.0];
     let touch = LightestTouch::new(detection, FalseAlarmRate::default(), Box::new(saturating));
     let [half_n, surely_n] = touch.forces_at(Position::along(0.1)).map(Option::unwrap);
     assert!(half_n < surely_n && 4.0 * surely_n < 8.0);

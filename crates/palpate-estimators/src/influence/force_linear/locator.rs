@@ -468,13 +468,23 @@ impl ForceLinearLocator {
             square: self.noise_bound,
             taken: self.detection_bound,
         };
-        let signal = move |Contact { position, force_n }: Contact| {
+        let change = move |Contact { position, force_n }: Contact| {
             let values = self.influences_at(position);
             let open = &self.stored.functions.offset_variances;
-            let square: f64 = values.iter().zip(open).map(|(f, open)| f * f / (1.0 + open)).sum();
-            self.stored.prior.response_n(force_n) * square.sqrt()
+            let response_n = self.stored.prior.response_n(force_n);
+            values.iter().zip(open).map(|(f, open)| response_n * f / (1.0 + open).sqrt()).collect()
         };
-        LightestTouch::new(detection, self.stored.false_alarm_rate, Box::new(signal))
+        LightestTouch::new(detection, self.stored.false_alarm_rate, Box::new(change))
+    }
+
+    /// Standard deviation of each channel's noise and offset together; `None` of those that are not in use.
+    pub fn noise_of_channels(&self, channels: usize) -> Vec<Option<f64>> {
+        let Tables { noise_sd, offset_variances, .. } = &self.stored.functions;
+        let mut sds = vec![None; channels];
+        for (channel, (sd, open)) in self.stored.live.iter().zip(noise_sd.iter().zip(offset_variances)) {
+            sds[*channel] = Some(sd * (1.0 + open).sqrt());
+        }
+        sds
     }
 
     /// The influences at a position, over the noise; beyond the grid those of its edge.
