@@ -356,6 +356,11 @@ pub trait Locate {
         None
     }
 
+    /// Standard deviation of each channel's noise, `None` of channels that are not in use; `None` of a method that learns none.
+    fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
+        None
+    }
+
     /// Share of untouched readings that may be taken for a contact; `None` of a method that tells no untouched reading.
     fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         None
@@ -372,6 +377,11 @@ pub trait Locate {
 pub trait CheckEstimate: Clone + Debug + PartialEq + Serialize + DeserializeOwned {
     /// Share of untouched readings that may be taken for a contact; `None` of a check that tells no untouched reading.
     fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
+        None
+    }
+
+    /// Standard deviation of each channel's noise, as [`Locate::noise_sd`].
+    fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
         None
     }
 
@@ -531,8 +541,9 @@ impl<M: Locate> Fitted<M> {
         }
     }
 
-    /// The locator with the scatter of the untouched rows of the recording that it was fitted to. A scatter that hides most presses is not that of an
-    /// untouched surface, and is left out. A method without a rule of `no_contact` has one by single untouched rows, or by repeats, where there are no rests.
+    /// The locator with the scatter of the untouched rows of the recording that it was fitted to, where its noise does not explain it at the 5 % level. A
+    /// scatter that hides most presses is not that of an untouched surface, and is left out. A method without a rule of `no_contact` has the scatter as
+    /// its rule: by single untouched rows, or by repeats, where there are no rests.
     #[must_use]
     pub fn with_scatter_of(self, recording: &Recording) -> Self {
         let of_check = || self.check.as_ref()?.false_alarm_rate();
@@ -541,8 +552,18 @@ impl<M: Locate> Fitted<M> {
         let rests = Rests::of_recording(recording).or_else(|| if rate.is_none() { by_noise() } else { None });
         let centre = self.method.offsets().or_else(|| self.untouched.clone());
         let Some((centre, rests)) = centre.zip(rests) else { return self };
+        if rate.is_some() && self.noise_sd().is_some_and(|noise_sd| rests.are_noise(&noise_sd)) {
+            return self;
+        }
         let scatter = rests.scatter(centre, self.setup.layout(), rate.unwrap_or_default());
         self.with_scatter(scatter, recording)
+    }
+
+    /// Standard deviation of each channel's noise by the method, its check or the layout; `None` of a channel that is not in use.
+    pub(crate) fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
+        let of_check = || self.check.as_ref()?.noise_sd();
+        let of_layout = || self.setup.layout().reading_sds().ok();
+        self.method.noise_sd().or_else(of_check).or_else(of_layout)
     }
 
     /// The locator with a scatter, unless this hides most presses.

@@ -196,6 +196,13 @@ impl CheckEstimate for ReadingCheck {
         self.false_alarm_rate()
     }
 
+    fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
+        match &self.by {
+            Forward::Influence(influence) => influence.noise_sd(),
+            Forward::Digit(digit) => digit.noise_sd(),
+        }
+    }
+
     fn checked(&self, reading: &[f64], estimate: Estimate, extent: Extent) -> Estimate {
         let explained = match &self.by {
             Forward::Influence(influence) => influence.locate(reading),

@@ -19,9 +19,9 @@ pub struct UntouchedDrift {
     /// Standard deviation of each channel's random walk after a second, in its unit; none where the rows have no times.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub walk_per_root_s: Vec<f64>,
-    /// Mean time from one rest to the next, in seconds, where the rows have times.
+    /// Time from the first rest to the last, in seconds, where the rows have times.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rest_interval_s: Option<f64>,
+    pub duration_s: Option<f64>,
 }
 
 impl UntouchedDrift {
@@ -46,23 +46,25 @@ impl UntouchedDrift {
         let rest_times_s = recording.times_s().map(|times_s| -> Vec<f64> {
             rests.iter().map(|rest| mean(rest.iter().map(|row| times_s[*row]))).collect()
         });
-        let interval_s =
-            |times_s: &Vec<f64>| (times_s[times_s.len() - 1] - times_s[0]) / (times_s.len() - 1) as f64;
+        let duration_s = |times_s: &Vec<f64>| times_s[times_s.len() - 1] - times_s[0];
         let walks = rest_times_s
             .as_ref()
             .map(|times_s| (0..channels).map(|channel| walk_per_root_s(&course(channel), times_s)).collect());
         Some(Self {
             walk_per_root_s: walks.unwrap_or_default(),
-            rest_interval_s: rest_times_s.as_ref().map(interval_s),
+            duration_s: rest_times_s.as_ref().map(duration_s),
             last: levels.last()?.clone(),
             range: (0..channels).map(range).collect(),
         })
     }
 
-    /// Variance of each channel's change from one rest to the next by the random walk; none where it is not known.
+    /// Variance that the random walk of each channel has in the scatter of the rests: twice its mean square deviation w²·T/15 from a straight line over the time T.
+    /// None where it is not known.
     pub fn walk_variances(&self) -> Vec<f64> {
-        let of = |interval_s: f64| self.walk_per_root_s.iter().map(|walk| walk * walk * interval_s).collect();
-        self.rest_interval_s.map_or_else(Vec::new, of)
+        let of = |duration_s: f64| {
+            self.walk_per_root_s.iter().map(|walk| 2.0 / 15.0 * walk * walk * duration_s).collect()
+        };
+        self.duration_s.map_or_else(Vec::new, of)
     }
 
     /// Largest change of each channel after the last rest that counts as more drift: the range of the recording. Disabled channels may change by any
@@ -89,13 +91,8 @@ impl UntouchedDrift {
             |walk| walk >= 0.0,
             "finite and at least 0",
         )?;
-        let is_time = |interval_s| interval_s >= 0.0;
-        LocatorFault::check_numbers(
-            "time between rests",
-            self.rest_interval_s,
-            is_time,
-            "finite and at least 0",
-        )?;
+        let is_time = |duration_s| duration_s >= 0.0;
+        LocatorFault::check_numbers("time of rests", self.duration_s, is_time, "finite and at least 0")?;
         LocatorFault::check_numbers(
             "range of untouched readings",
             &self.range,

@@ -1,25 +1,23 @@
 //! Scatter of an untouched surface from one rest to the next: the residue that hysteresis, creep and drift leave after a touch, with the noise.
 //!
 //! Noise is learnt from repeats, and hardly shows what a touch leaves behind. The untouched rows of a recording do, where presses are between
-//! them. Each run of untouched rows is a rest. The change d from the mean of one rest to a row of the next is what a tare before each contact leaves of an
-//! untouched reading. Its mean is a steady drift, and is subtracted.
+//! them. Each run of untouched rows is a rest. About a straight line in time, which takes a steady drift off, the rests have the variance s² in each
+//! channel; a reading less a baseline, which is a rest too, has 2·s².
 //!
-//! Symbols: d change of n channels with the variances v, ν degrees of freedom of these variances, R correlation matrix of the channels.
+//! Symbols: d reading less the untouched reading, n channels, ν degrees of freedom of the rests, R correlation matrix of the channels.
 //!
-//! T = Σ d²/v is Σ λ·χ²₁ with the eigenvalues λ of R. With c₁ = n, c₂ = tr R² and c₃ = tr R³ it is about n − g·b + g·χ²_b with g = c₃/c₂ and
-//! b = c₂³/c₃², which has its first three moments (Imhof, *Biometrika* 48, 1961). So channels whose residues go together count as fewer. As v is estimated, the
+//! T = Σ d²/(2·s²) is Σ λ·χ²₁ with the eigenvalues λ of R. With c₁ = n, c₂ = tr R² and c₃ = tr R³ it is about n − g·b + g·χ²_b with g = c₃/c₂ and
+//! b = c₂³/c₃², which has its first three moments (Imhof, *Biometrika* 48, 1961). So channels whose residues go together count as fewer. As s² is estimated, the
 //! critical value c of χ²_b becomes that of b·F with b and ν degrees of freedom, about ν·(e^(c/(ν + b/2 − 1)) − 1) (Bartlett, *Journal of the Royal
 //! Statistical Society B* 9, 1947). R is the sample's, whose eigenvalues scatter more than those of the
-//! surface: with few rests of unrelated channels the test is conservative. Changes that follow each other share a rest, so N of them determine v as
-//! 2·N/3 independent ones do (von Neumann, *Annals of Mathematical Statistics* 12, 1941).
+//! surface: with few rests of unrelated channels the test is conservative.
 
 use crate::locator_fault::LocatorFault;
 use crate::recording::{Recording, Row};
-use crate::status::FalseAlarmRate;
+use crate::status::{FalseAlarmRate, SIGNIFICANCE};
 use palpate_mechanics::sensing::Layout;
-use palpate_numerics::chi_squared_critical_value;
+use palpate_numerics::{chi_squared_critical_value, mean, normal_quantile};
 use serde::{Deserialize, Serialize};
-use std::f64::consts::SQRT_2;
 
 /// Scatter of an untouched surface from one rest to the next; see [the module](self).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,17 +34,18 @@ pub struct UntouchedScatter {
 /// Rests by which the untouched surface is known, at least: with fewer the critical value would be that of a t with hardly any degrees of freedom.
 pub(crate) const FEWEST_RESTS: usize = 5;
 
-/// Changes of the untouched reading from one rest of a recording to the next.
+/// Rests of a recording about their slow course.
 pub(crate) struct Rests {
-    /// Change of each untouched row from the rest before it, with the share that the row has of its rest.
-    changes: Vec<(Vec<f64>, f64)>,
-    /// Divisor by which sums of products of changes become covariances.
-    count: f64,
+    /// Deviation of each untouched row from the course, with the share that the row has of its rest.
+    deviations: Vec<(Vec<f64>, f64)>,
     /// ν.
     freedom: f64,
 }
 
 impl Rests {
+    /// Parameters of a line.
+    const OF_LINE: usize = 2;
+
     /// The rests of a recording; `None` where it has too few, or its rows have no order in time.
     pub fn of_recording(recording: &Recording) -> Option<Self> {
         Self::new(recording, &recording.rests())
@@ -74,46 +73,51 @@ impl Rests {
         if freedom < FEWEST_RESTS {
             return None;
         }
-        let changes = groups.into_iter().flat_map(|group| {
+        let deviations = groups.into_iter().flat_map(|group| {
             let mean = recording.mean_reading(group);
-            // A change from one reading to another has twice the variance of a reading about its mean.
-            let change = move |row: &usize| -> Vec<f64> {
-                let values = rows[*row].reading.iter().zip(&mean);
-                values.map(|(value, mean)| SQRT_2 * (value - mean)).collect()
+            let off = move |row: &usize| -> Vec<f64> {
+                rows[*row].reading.iter().zip(&mean).map(|(value, mean)| value - mean).collect()
             };
-            group.iter().map(move |row| (change(row), 1.0))
+            group.iter().map(move |row| (off(row), 1.0))
         });
-        let freedom = freedom as f64;
-        Some(Self { changes: changes.collect(), count: freedom, freedom })
+        Some(Self { deviations: deviations.collect(), freedom: freedom as f64 })
     }
 
     fn new(recording: &Recording, rests: &[Vec<usize>]) -> Option<Self> {
+        let times_s = recording.times_or_order();
         if rests.len() < FEWEST_RESTS {
             return None;
         }
+        let time_of = |rest: &Vec<usize>| mean(rest.iter().map(|row| times_s[*row]));
+        let rest_times_s: Vec<f64> = rests.iter().map(time_of).collect();
         let levels: Vec<Vec<f64>> = rests.iter().map(|rest| recording.mean_reading(rest)).collect();
-        let count = (rests.len() - 1) as f64;
-        let steady: Vec<f64> = levels[0]
-            .iter()
-            .zip(&levels[rests.len() - 1])
-            .map(|(first, last)| (last - first) / count)
-            .collect();
-        let change = |row: usize, before: &[f64]| {
-            let values = recording.rows[row].reading.iter().zip(before).zip(&steady);
-            values.map(|((value, before), steady)| value - before - steady).collect()
-        };
-        let pairs = levels.iter().zip(&rests[1..]);
-        let changes = pairs.flat_map(|(before, rest)| {
-            rest.iter().map(move |row| (change(*row, before), 1.0 / rest.len() as f64))
+        let of_channel = |c: usize| levels.iter().map(|level| level[c]).collect::<Vec<f64>>();
+        let lines: Vec<[f64; 2]> =
+            (0..recording.channels.len()).map(|c| line(&rest_times_s, &of_channel(c))).collect();
+        let deviations = rests.iter().flat_map(|rest| rest.iter().map(|row| (*row, 1.0 / rest.len() as f64)));
+        let deviations = deviations.map(|(row, share)| {
+            let values = recording.rows[row].reading.iter().zip(&lines);
+            (values.map(|(value, [level, slope])| value - level - slope * times_s[row]).collect(), share)
         });
-        Some(Self { changes: changes.collect(), count, freedom: count / 1.5 })
+        Some(Self { deviations: deviations.collect(), freedom: (rests.len() - Self::OF_LINE) as f64 })
+    }
+
+    /// True where noise of these standard deviations explains the deviations at the 5 % level: their mean square, in units of the noise, is about normal.
+    pub fn are_noise(&self, noise_sd: &[Option<f64>]) -> bool {
+        let channels: Vec<(usize, f64)> =
+            noise_sd.iter().enumerate().filter_map(|(channel, sd)| Some((channel, (*sd)?))).collect();
+        let square =
+            |row: &[f64]| -> f64 { channels.iter().map(|(channel, sd)| (row[*channel] / sd).powi(2)).sum() };
+        let sum: f64 = self.deviations.iter().map(|(row, share)| share * square(row)).sum();
+        let of_all = channels.len() as f64 * self.freedom;
+        sum <= of_all + normal_quantile(1.0 - SIGNIFICANCE) * (2.0 * of_all).sqrt()
     }
 
     /// Their scatter about `centre`, of the channels that are not disabled.
     pub fn scatter(&self, centre: Vec<f64>, layout: &Layout, rate: FalseAlarmRate) -> UntouchedScatter {
         let is_live = |c: usize| !layout.sensors()[c].channel.dead;
         let product = |a: usize, b: usize| {
-            self.changes.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.count
+            self.deviations.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.freedom
         };
         let variances: Vec<f64> =
             (0..layout.len()).map(|c| if is_live(c) { product(c, c) } else { 0.0 }).collect();
@@ -122,12 +126,12 @@ impl Rests {
         let correlations: Vec<Vec<f64>> =
             changing.iter().map(|a| changing.iter().map(|b| correlation(*a, *b)).collect()).collect();
         let bound = critical_value(&correlations, self.freedom, rate);
-        let sd = variances.iter().map(|variance| variance.sqrt()).collect();
+        let sd = variances.iter().map(|variance| (2.0 * variance).sqrt()).collect();
         UntouchedScatter { centre, sd, bound }
     }
 }
 
-/// Critical value of Σ d²/v for channels of a correlation matrix whose variances were estimated with so many degrees of freedom.
+/// Critical value of Σ d²/(2·s²) for channels of a correlation matrix whose variances were estimated with so many degrees of freedom.
 fn critical_value(correlations: &[Vec<f64>], freedom: f64, rate: FalseAlarmRate) -> f64 {
     let n = correlations.len();
     if n == 0 {
@@ -147,6 +151,15 @@ fn critical_value(correlations: &[Vec<f64>], freedom: f64, rate: FalseAlarmRate)
     let critical = of_whole(below) + (effective - below) * (of_whole(below + 1.0) - of_whole(below));
     let exponent = critical / (freedom + 0.5 * effective - 1.0);
     n as f64 - scale * effective + scale * freedom * (exponent.exp() - 1.0)
+}
+
+/// Level and slope of the straight line through values at some times by least squares; no slope where all times are one.
+fn line(times_s: &[f64], values: &[f64]) -> [f64; 2] {
+    let (time_s, value) = (mean(times_s.iter().copied()), mean(values.iter().copied()));
+    let products = times_s.iter().zip(values).map(|(t, y)| (t - time_s) * (y - value));
+    let squares: f64 = times_s.iter().map(|t| (t - time_s).powi(2)).sum();
+    let slope = if squares > 0.0 { products.sum::<f64>() / squares } else { 0.0 };
+    [value - slope * time_s, slope]
 }
 
 impl UntouchedScatter {

@@ -7,6 +7,7 @@ use palpate::estimators::estimator::Locator;
 use palpate::estimators::evaluation::Calibration;
 use palpate::estimators::imperfections::Imperfections;
 use palpate::estimators::simulate::{simulate_presses_watched, simulate_use_watched};
+use palpate::mechanics::sensing::SensorKind;
 use palpate::numerics::random_order;
 use palpate::prelude::{
     Contact, Estimator, Evaluation, Extent, Fit, FitTask, Influence, Position, Recording, Rig, Row, Setup,
@@ -40,11 +41,27 @@ pub enum Zero {
     Each,
 }
 
+/// Forces in turn, as multiples of the force of the rig's presses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forces {
+    /// Of the presses on raw channels; those of a surface with a model all have the force of the rig.
+    pub pressed: &'static [f64],
+    /// Of the contacts in use.
+    pub touched: &'static [f64],
+}
+
+impl Forces {
+    /// Once, half and twice the force, in calibration and in use.
+    pub const UNKNOWN: Self =
+        Self { pressed: &Calibration::UNKNOWN_FORCES, touched: &Calibration::UNKNOWN_FORCES };
+}
+
 /// A bench in a world, with what a locator is given of it.
 pub struct Bench<'a> {
     pub rig: &'a Rig,
     pub world: World,
     pub knowledge: Knowledge,
+    pub forces: Forces,
 }
 
 /// Untouched rows of each rest in use: as many as a person tares with.
@@ -81,13 +98,14 @@ impl Bench<'_> {
             Knowledge::Model => setup.simulate(&training, seed)?,
             Knowledge::Measured => {
                 let places = training.positions(setup.surface().extent())?;
-                let (pressed, presses) = (setup.pressed_by(&training)?, in_turn(&places, force_n));
+                let (pressed, presses) =
+                    (setup.pressed_by(&training)?, in_turn(&places, force_n, self.forces.pressed));
                 let (repeats, placement_sd_m) = (training.repeats, training.placement_sd_m);
                 simulate_presses_watched(&pressed, &presses, repeats, placement_sd_m, seed, Watch::NONE)?
             }
         };
         let places = shuffled(&all_over(setup.surface().extent(), contacts), seed);
-        let touched = in_turn(&places, force_n);
+        let touched = in_turn(&places, force_n, self.forces.touched);
         let provenance = &calibration.provenance;
         let used = setup.clone().with_imperfections(with_many_untouched_rows(&setup)?)?;
         // Streams of noise of their own.
@@ -174,6 +192,37 @@ impl Recordings {
 }
 
 impl Recordings {
+    /// Mean distance of the centre of force from the contact, in metres, where the sensors are load cells of known places: the formula of textbooks,
+    /// Σ r·x/Σ r over the cells' readings r, each less the rest before it.
+    pub fn centre_of_force_error_m(&self) -> Option<f64> {
+        let sensors = self.used.layout().sensors();
+        if sensors.iter().any(|sensor| sensor.kind != SensorKind::Reaction) {
+            return None;
+        }
+        let mut runs = self.touches.rows.chunk_by(|a, b| a.touches() == b.touches());
+        let mut errors_m = Vec::new();
+        let mut untouched = self.touches.mean_reading(&[0]);
+        for run in runs.by_ref() {
+            let indices: Vec<usize> = (0..run.len()).collect();
+            let mean = Recording { rows: run.to_vec(), ..self.touches.clone() }.mean_reading(&indices);
+            if !run[0].touches() {
+                untouched = mean;
+                continue;
+            }
+            for row in run {
+                let forces = row.reading.iter().zip(&untouched).map(|(value, zero)| value - zero);
+                let [mut total, mut x_m, mut y_m] = [0.0; 3];
+                for (force_n, sensor) in forces.zip(sensors) {
+                    total += force_n;
+                    x_m += force_n * sensor.position.x_m;
+                    y_m += force_n * sensor.position.y_m;
+                }
+                errors_m.push(row.position.distance_m(Position { x_m: x_m / total, y_m: y_m / total }));
+            }
+        }
+        (!errors_m.is_empty()).then(|| errors_m.iter().sum::<f64>() / errors_m.len() as f64)
+    }
+
     /// Contacts of five times the force that the locator finds with a probability of 95 %, by the noise of the bench and the scatter of its
     /// untouched rows, where there is one.
     fn light_touches(&self, locator: &Locator) -> Result<Recording> {
@@ -219,9 +268,9 @@ fn tared(locator: &Locator, recording: &Recording, zero: Zero) -> Result<Recordi
     Ok(Recording { rows, ..recording.clone() })
 }
 
-/// Contacts at places with [`Calibration::UNKNOWN_FORCES`] times a force in turn: in use, and in calibrations of raw channels.
-fn in_turn(places: &[Position], force_n: f64) -> Vec<Contact> {
-    let shares = places.iter().zip(Calibration::UNKNOWN_FORCES.iter().cycle());
+/// Contacts at places with multiples of a force in turn.
+fn in_turn(places: &[Position], force_n: f64, shares: &[f64]) -> Vec<Contact> {
+    let shares = places.iter().zip(shares.iter().cycle());
     shares.map(|(position, share)| Contact { position: *position, force_n: share * force_n }).collect()
 }
 

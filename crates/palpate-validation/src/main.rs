@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
-use palpate_validation::{load_profiles, real_benches};
+use palpate_validation::{load_profiles, one_weight, real_benches};
 use serde::Serialize;
 
 /// Accuracy, coverage and statuses of palpate's estimators.
@@ -33,6 +33,18 @@ enum Experiment {
         #[arg(long, value_name = "NAME", value_parser = real_benches::BENCHES.map(|(name, _)| name))]
         bench: Vec<String>,
         /// Folder for the figures, real-benches.json
+        #[arg(long, value_name = "FOLDER")]
+        out: Option<PathBuf>,
+    },
+    /// Surfaces that were calibrated with one weight
+    OneWeight {
+        /// Seeds of each row
+        #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=1000))]
+        seeds: u64,
+        /// Contacts of each seed, about
+        #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+        contacts: u32,
+        /// Folder for the figures, one-weight.json
         #[arg(long, value_name = "FOLDER")]
         out: Option<PathBuf>,
     },
@@ -71,6 +83,12 @@ fn run(experiment: Experiment) -> Result<()> {
             }
             let results = with_progress(|progress| real_benches::run(&options, progress))?;
             finish("real-benches", &results.markdown(), &results, out.as_deref())
+        }
+        Experiment::OneWeight { seeds, contacts, out } => {
+            make_folder(out.as_deref())?;
+            let options = one_weight::Options { seeds, contacts: contacts as usize };
+            let results = with_progress(|progress| one_weight::run(options, progress))?;
+            finish("one-weight", &results.markdown(), &results, out.as_deref())
         }
         Experiment::LoadProfiles { readings, seed, out } => {
             make_folder(out.as_deref())?;

@@ -1,6 +1,6 @@
 //! Benches as they come, beside the same benches in a clean world: errors, coverage of intervals, statuses.
 
-use crate::experiment::{Bench, Knowledge, World, Zero};
+use crate::experiment::{Bench, Forces, Knowledge, World, Zero};
 use crate::parallel::in_parallel;
 use crate::tally::{Figures, Tally};
 use anyhow::{Context, Result};
@@ -145,7 +145,8 @@ fn cases(benches: &[(&'static str, &'static str)]) -> Result<Vec<Case>> {
 impl Case {
     /// Rows of every estimator by every zero, over all seeds.
     fn rows(&self, options: &Options) -> Result<Vec<TableRow>> {
-        let bench = Bench { rig: &self.rig, world: self.world.0, knowledge: self.knowledge.0 };
+        let (world, knowledge) = (self.world.0, self.knowledge.0);
+        let bench = Bench { rig: &self.rig, world, knowledge, forces: Forces::UNKNOWN };
         let judged = judged(&bench, options).with_context(|| self.name.to_owned())?;
         let rows = judged.into_iter().flat_map(|(estimator, by_zero)| {
             by_zero.into_iter().map(move |(tared, figures, failure)| TableRow {
@@ -229,8 +230,6 @@ impl Results {
 }
 
 fn cells(figures: &Figures) -> Vec<String> {
-    let percent = |share: Option<f64>| share.map_or("–".to_owned(), |share| format!("{share:.1} %"));
-    let mm = |length: Option<f64>| length.map_or("–".to_owned(), |length| format!("{length:.2}"));
     let mut cells = vec![format!("{}, {}", mm(figures.median_error_mm), mm(figures.mean_error_mm))];
     let whole = |share: Option<f64>| share.map_or("–".to_owned(), |share| format!("{share:.0}"));
     cells.push(format!("{} → {} %", whole(figures.said_before), whole(figures.said_after)));
@@ -245,6 +244,16 @@ fn cells(figures: &Figures) -> Vec<String> {
     ];
     cells.extend(shares.map(percent));
     cells
+}
+
+/// A share in a table.
+pub(crate) fn percent(share: Option<f64>) -> String {
+    share.map_or("–".to_owned(), |share| format!("{share:.1} %"))
+}
+
+/// A length in a table.
+pub(crate) fn mm(length: Option<f64>) -> String {
+    length.map_or("–".to_owned(), |length| format!("{length:.2}"))
 }
 
 #[cfg(test)]

@@ -181,14 +181,14 @@ fn a_locator_of_a_measured_surface_has_a_limit_and_a_lightest_touch() {
     assert!((0.03..0.2).contains(&number(&surely["median_n"])), "{told}");
     assert!((0.5..10.0).contains(&number(&told["unknown_force"]["median_mm"])), "{told}");
 
-    // Touches of that force in the middle are found as often as it says.
+    // Touches of that force in the middle are found at least as often as it says: these are not tared, and the scatter has the noise of a tare.
     let middle = told["positions"].as_array().unwrap().iter().find(|at| at["x_mm"] == 150.0).unwrap();
     let force_n = number(&middle["lightest_touch_n"][1]);
     let touches = vec![Touch { position_mm: 150.0, force_n }; 1000];
     fs::write(folder.path().join("touches.csv"), board.recording(&touches)).unwrap();
     let located = said(&run(folder.path(), &["locate", "board.json", "touches.csv"]));
     let found = located.lines().skip(1).filter(|line| !line.ends_with("no_contact")).count();
-    assert!((915..=980).contains(&found), "{found}");
+    assert!((930..=995).contains(&found), "{found}");
 
     let refused = |options: &[&str]| complained(&run(folder.path(), options), 2);
     let rig = refused(&["limit", "rig.toml", "--force", "3 N"]);

@@ -347,6 +347,10 @@ impl Locate for Method {
         self.as_locate().offsets()
     }
 
+    fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
+        self.as_locate().noise_sd()
+    }
+
     fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         self.as_locate().false_alarm_rate()
     }
@@ -531,11 +535,7 @@ impl Locator {
     #[must_use]
     pub fn beyond_scatter<'a>(&self, touch: LightestTouch<'a>) -> LightestTouch<'a> {
         let Some(scatter) = &self.untouched_scatter else { return touch };
-        let noise_sd = match self.force_linear() {
-            Some(linear) => linear.noise_of_channels(self.layout().len()),
-            None => self.layout().reading_sds().unwrap_or_default(),
-        };
-        touch.beyond(scatter, &noise_sd)
+        touch.beyond(scatter, &self.noise_sd().unwrap_or_default())
     }
 
     /// False-alarm rate; `None` of a method without `no_contact`.

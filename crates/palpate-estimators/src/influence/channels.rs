@@ -36,6 +36,11 @@ impl Channels {
         (0..self.dead.len()).filter(|s| !self.dead[*s]).collect()
     }
 
+    /// Noise of each channel, in its SI unit; `None` of those that are left out.
+    pub fn noise_in_use(&self) -> Vec<Option<f64>> {
+        self.noise_sd.iter().zip(&self.dead).map(|(sd, dead)| (!dead).then_some(*sd)).collect()
+    }
+
     /// The greatest force of contacts of unknown force, in newtons: as it was said, or a multiple of the calibration's.
     pub fn greatest_force_n(&self) -> f64 {
         self.greatest_force_n.unwrap_or(DECADE * self.reference_force_n)

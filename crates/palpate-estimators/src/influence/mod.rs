@@ -268,6 +268,15 @@ impl Locate for InfluenceLocator {
         }
     }
 
+    fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
+        match self {
+            Self::Beam(beam) => Some(beam.channels().noise_in_use()),
+            Self::Plane(plane) => Some(plane.channels().noise_in_use()),
+            Self::ForceLinear(linear) => Some(linear.noise_of_channels()),
+            Self::Measured(_) => None,
+        }
+    }
+
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         match self {
             Self::Beam(beam) => beam.check(setup),

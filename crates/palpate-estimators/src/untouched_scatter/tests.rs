@@ -84,6 +84,21 @@ fn a_steady_drift_is_no_scatter() {
 }
 
 #[test]
+fn noise_explains_the_rests_of_19_recordings_in_20_and_no_residue() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
+    let mut explained = |residue: f64| {
+        let is_noise = |_: &usize| {
+            let rests = Rests::of_recording(&recording(&mut rng, 20, [1.0, residue], 0.0)).unwrap();
+            rests.are_noise(&[Some(1.0); CHANNELS])
+        };
+        (0..400).filter(is_noise).count()
+    };
+    // 380 expected of noise, and a little fewer where its square is not quite normal.
+    let (noise, residue) = (explained(0.0), explained(1.0));
+    assert!((362..=395).contains(&noise) && residue < 20, "{noise} {residue}");
+}
+
+#[test]
 fn few_rests_or_one_long_one_tell_no_scatter() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut few = recording(&mut rng, 4, [3.0, 0.0], 0.0);

@@ -100,7 +100,7 @@ impl BeamLocator {
     }
 
     /// Offsets, noise, and which channels are left out.
-    pub(super) fn channels(&self) -> &Channels {
+    pub(in crate::influence) fn channels(&self) -> &Channels {
         &self.stored.channels
     }
 

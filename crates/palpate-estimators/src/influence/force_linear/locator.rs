@@ -478,9 +478,9 @@ impl ForceLinearLocator {
     }
 
     /// Standard deviation of each channel's noise and offset together; `None` of those that are not in use.
-    pub fn noise_of_channels(&self, channels: usize) -> Vec<Option<f64>> {
+    pub fn noise_of_channels(&self) -> Vec<Option<f64>> {
         let Tables { noise_sd, offset_variances, .. } = &self.stored.functions;
-        let mut sds = vec![None; channels];
+        let mut sds = vec![None; self.stored.channels];
         for (channel, (sd, open)) in self.stored.live.iter().zip(noise_sd.iter().zip(offset_variances)) {
             sds[*channel] = Some(sd * (1.0 + open).sqrt());
         }
