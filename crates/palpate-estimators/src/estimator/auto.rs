@@ -4,7 +4,7 @@ use super::trial_splits::TrialSplits;
 use super::{Estimator, FitError, Locator, contenders};
 use crate::evaluation::{Evaluation, Located, Split};
 use crate::fit::{FitTask, fit_with_interval_check};
-use crate::influence::{Influence, InfluenceFitError, Structure};
+use crate::influence::{Influence, InfluenceFitError, Structure, is_one_weight};
 use crate::offset_course::OffsetCourse;
 use crate::reading_check::ReadingCheck;
 use crate::recording::Recording;
@@ -49,9 +49,15 @@ impl Estimator {
     /// Estimators among which it chooses at held-out positions; `None` of one that does not choose.
     ///
     /// `influence` with `structure = "auto"` chooses a structure from 19 positions on, the number from which intervals are checked. With fewer, and in
-    /// fits within folds, the evidence of the presses decides.
+    /// fits within folds, the evidence of the presses decides. Where one weight pressed, readings in proportion to the force are the only structure.
     pub fn candidates(&self, FitTask { setup, recording, .. }: FitTask) -> Option<Vec<Self>> {
-        let all = || contenders(setup, self, recording.rows.len());
+        let all = || {
+            let mut all = contenders(setup, self, recording.rows.len());
+            if setup.surface().model().is_none() && is_one_weight(setup, recording) {
+                all.retain(|contender| !contender.needs_forces());
+            }
+            all
+        };
         match self {
             Self::Auto(Auto { only }) => {
                 let is_named = |kind: &str| only.is_empty() || only.iter().any(|name| name == kind);
@@ -69,6 +75,14 @@ impl Estimator {
 }
 
 impl Estimator {
+    /// True of structures of influence functions that learn from presses how readings depend on the force.
+    fn needs_forces(&self) -> bool {
+        matches!(
+            self,
+            Self::Influence(Influence { structure: Structure::ForceMonotone | Structure::Free, .. })
+        )
+    }
+
     /// The choice among its candidates; `None` of an estimator without candidates. If no structure of influence functions is compared within the
     /// limit, there is no choice either, and the evidence of the presses decides.
     ///

@@ -64,6 +64,34 @@ fn touches_of_other_forces_are_located_whatever_the_one_weight_of_the_presses() 
 }
 
 #[test]
+fn nothing_but_proportion_to_the_force_is_learnt_from_one_weight() {
+    use crate::estimator::{Auto, Estimator};
+    use crate::fit::{Fit, FitTask};
+    use crate::influence::{Influence, InfluenceLocator};
+    let structures = |spread: f64| {
+        let mut bench = Bench::strip(11, 20, 20);
+        for (i, row) in bench.presses.iter_mut().enumerate() {
+            row.force_n = Some(500.0 * (1.0 + if i % 2 == 0 { spread } else { -spread }));
+        }
+        let untouched = (0..10).map(|_| bench.row(Position::default(), 0.0)).collect::<Vec<_>>();
+        bench.presses.extend(untouched);
+        let (setup, recording) = (bench.setup(), bench.recording());
+        let task = FitTask::new(&setup, &recording);
+        let candidates = |estimator: Estimator| {
+            estimator.candidates(task).map(|all| all.iter().map(Estimator::name).collect::<Vec<_>>())
+        };
+        let found =
+            [Estimator::Influence(Influence::default()), Estimator::Auto(Auto::quick())].map(candidates);
+        (found, Influence::default().fit_method(task).unwrap())
+    };
+    let ([own, auto], locator) = structures(0.02);
+    assert_eq!((own, auto.unwrap()), (None, vec!["influence force-linear", "gaussian-process"]));
+    assert!(matches!(locator, InfluenceLocator::ForceLinear(_)));
+    let ([own, _], _) = structures(0.5);
+    assert_eq!(own.unwrap().len(), 3);
+}
+
+#[test]
 fn presses_of_nearly_one_weight_leave_the_force_as_open() {
     let found @ [error_mm, held, force_held, outside] = judged(500.0, 0.02);
     assert!(error_mm < 10.0 && held >= 0.9 && force_held >= 0.9 && outside <= 0.03, "{found:?}");
