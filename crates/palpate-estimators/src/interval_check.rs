@@ -8,7 +8,7 @@
 //! The factor is the 95 % quantile of the ratios, with the correction for their number by which it covers a press at a further place with a probability of 0.95
 //! (cross-conformal prediction: Vovk, *Annals of Mathematics and Artificial Intelligence* 74, 2015; the jackknife+ and CV+: Barber and others, *Annals of
 //! Statistics* 49, 2021). Presses of one place may share an error, so places are what is counted: see [`conformal_95_of_groups`]. Fewer than
-//! [`FEWEST_FOR_95`](palpate_numerics::FEWEST_FOR_95) of them bound nothing.
+//! [`FEWEST_FOR_95`] of them bound nothing.
 //!
 //! Intervals are widened, and never narrowed: the factor of few places scatters, and intervals of a method that is right are right without it.
 
@@ -68,7 +68,7 @@ pub(crate) struct HeldOutEstimate {
 }
 
 impl IntervalCheck {
-    /// The check by estimates at held-out places; `None` of fewer than [`FEWEST_FOR_95`](palpate_numerics::FEWEST_FOR_95) places, and of a method without intervals.
+    /// The check by estimates at held-out places; `None` of fewer than [`FEWEST_FOR_95`] places, and of a method without intervals.
     pub(crate) fn of_estimates(estimates: &[HeldOutEstimate], extent: Extent) -> Option<Self> {
         let ratios = |ratio: &dyn Fn(&HeldOutEstimate) -> Option<f64>| PlaceRatios::new(estimates, ratio);
         let positions = ratios(&|held_out| position_ratio(held_out, extent));
