@@ -173,12 +173,12 @@ impl Influence {
 
     /// The same with readings in proportion to the force, where no structure is stated and one weight pressed: nothing else tells contacts of other forces.
     fn of_one_weight(self, FitTask { setup, recording, .. }: FitTask) -> Self {
-        let is_open = self.structure == Structure::Auto
-            && !has_nuisance(recording)
-            && force_linear::has_forces(setup, recording);
-        let structure =
-            if is_open && is_one_weight(setup, recording) { Structure::ForceLinear } else { self.structure };
-        Self { structure, ..self }
+        match self.structure {
+            Structure::Auto if is_one_weight(setup, recording) => {
+                Self { structure: Structure::ForceLinear, ..self }
+            }
+            _ => self,
+        }
     }
 
     /// Fits the influence functions of a plane with a model.
@@ -199,14 +199,17 @@ impl Influence {
     }
 }
 
-/// True of presses for contacts of unknown force whose own forces hardly differ: they do not show how readings depend on the force, and held-out presses
-/// like them do not show what a structure says of other forces.
+/// True of presses for contacts of unknown force whose own forces hardly differ, with untouched rows: they do not show how readings depend on the force, and
+/// held-out presses like them do not show what a structure says of other forces.
 pub(crate) fn is_one_weight(setup: &Setup, recording: &Recording) -> bool {
     /// Of the greatest and the least force. A policy: by half as much again a saturation of a few percent shows beside usual noise.
     const LEAST_RATIO: f64 = 1.5;
     let forces_n = || recording.rows.iter().filter(|row| row.touches()).filter_map(|row| row.force_n);
     let ends = forces_n().reduce(f64::min).zip(forces_n().reduce(f64::max));
-    setup.force_n().is_none() && ends.is_some_and(|(least_n, most_n)| most_n < LEAST_RATIO * least_n)
+    setup.force_n().is_none()
+        && ends.is_some_and(|(least_n, most_n)| most_n < LEAST_RATIO * least_n)
+        && !has_nuisance(recording)
+        && force_linear::has_forces(setup, recording)
 }
 
 /// True of a recording with coordinates beside position and force that shape the readings.
