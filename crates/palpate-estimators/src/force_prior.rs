@@ -36,6 +36,10 @@ pub struct ForceRange {
 /// Where readings are proportional to the force, contacts may be so many times lighter or harder than the presses of the calibration: a decade.
 pub(crate) const DECADE: f64 = 10.0;
 
+/// Ratio of the greatest to the least force of presses below which they are presses of one weight. A policy: over less, a saturation of some percent and a
+/// hand that varies are one.
+pub(crate) const ONE_WEIGHT: f64 = 1.5;
+
 impl ForceRange {
     /// From a least to a greatest force, in newtons.
     ///

@@ -192,7 +192,7 @@ impl PlaceRatios {
     }
 }
 
-/// Factor from which on intervals count as unbounded: one of a micrometre is then a metre long.
+/// Factor from which on intervals count as unbounded. A policy: one of a micrometre is then a metre long. Files keep finite numbers.
 pub const UNBOUNDED: f64 = 1e6;
 
 /// Least factor by which an interval contains the truth: within the interval the share of its half-width toward the truth; beyond it the distance from the

@@ -32,6 +32,8 @@ impl UntouchedSurface {
         drift: Option<UntouchedDrift>,
         noise_sd: &[Option<f64>],
     ) -> Self {
+        /// Share of the scatter that is most of it.
+        const MOST: f64 = 0.5;
         let walks = drift.as_ref().map(UntouchedDrift::walk_variances).unwrap_or_default();
         let scatter = scatter.map(|mut scatter| {
             let in_noise = |variances: &mut dyn Iterator<Item = f64>| -> f64 {
@@ -41,7 +43,7 @@ impl UntouchedSurface {
                     .sum()
             };
             let by_walk = in_noise(&mut walks.iter().copied());
-            if by_walk > 0.5 * in_noise(&mut scatter.sd.iter().map(|sd| sd * sd)) {
+            if by_walk > MOST * in_noise(&mut scatter.sd.iter().map(|sd| sd * sd)) {
                 scatter.sd = noise_sd.iter().map(|sd| SQRT_2 * sd.unwrap_or(0.0)).collect();
             }
             scatter

@@ -10,6 +10,8 @@ pub mod load_profiles;
 pub mod one_weight;
 mod parallel;
 pub mod real_benches;
+mod results;
 mod tally;
 
+pub use results::{Results, RigText};
 pub use tally::Figures;

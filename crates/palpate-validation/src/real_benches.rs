@@ -2,6 +2,7 @@
 
 use crate::experiment::{Bench, Forces, Knowledge, World, Zero};
 use crate::parallel::in_parallel;
+use crate::results::{Results, mm, percent};
 use crate::tally::{Figures, Tally};
 use anyhow::{Context, Result};
 use palpate::prelude::{Estimator, GaussianProcessEstimator, Influence, Rig};
@@ -57,32 +58,6 @@ pub struct TableRow {
     pub figures: Figures,
 }
 
-/// Rows of the table, as a file.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Results {
-    /// Version of palpate.
-    pub palpate: &'static str,
-    /// Name of the experiment.
-    pub experiment: &'static str,
-    /// Seeds.
-    pub seeds: Vec<u64>,
-    /// Contacts of each seed, about.
-    pub contacts: usize,
-    /// Rigs by their names.
-    pub rigs: Vec<RigText>,
-    /// The rows.
-    pub rows: Vec<TableRow>,
-}
-
-/// A rig as its file has it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RigText {
-    /// Name.
-    pub name: &'static str,
-    /// Text.
-    pub toml: &'static str,
-}
-
 const WORLDS: [(World, &str); 2] = [(World::Clean, "clean"), (World::Imperfect, "imperfect")];
 const KNOWLEDGE: [(Knowledge, &str); 2] = [(Knowledge::Model, "model"), (Knowledge::Measured, "measured")];
 const ZEROS: [(Zero, &str); 2] = [(Zero::Once, "once"), (Zero::Each, "each")];
@@ -91,27 +66,20 @@ const ZEROS: [(Zero, &str); 2] = [(Zero::Once, "once"), (Zero::Each, "each")];
 ///
 /// # Errors
 /// A bench that is not known, or cannot be simulated.
-pub fn run(options: &Options, progress: impl Fn(&str, usize, usize) + Sync) -> Result<Results> {
-    run_on(chosen(&options.benches)?, options, progress)
+pub fn run(options: &Options, progress: impl Fn(&str, usize, usize) + Sync) -> Result<Results<TableRow>> {
+    run_on(&chosen(&options.benches)?, options, progress)
 }
 
 fn run_on(
-    benches: Vec<(&'static str, &'static str)>,
+    benches: &[(&'static str, &'static str)],
     options: &Options,
     progress: impl Fn(&str, usize, usize) + Sync,
-) -> Result<Results> {
-    let cases = cases(&benches)?;
+) -> Result<Results<TableRow>> {
+    let cases = cases(benches)?;
     let name = |case: &Case| format!("{}, {}, {}", case.name, case.knowledge.1, case.world.1);
     let rows = in_parallel(&cases, |case| case.rows(options), name, progress);
     let rows = rows.into_iter().collect::<Result<Vec<_>>>()?.concat();
-    Ok(Results {
-        palpate: env!("CARGO_PKG_VERSION"),
-        experiment: "real-benches",
-        seeds: (0..options.seeds).collect(),
-        contacts: options.contacts,
-        rigs: benches.into_iter().map(|(name, toml)| RigText { name, toml }).collect(),
-        rows,
-    })
+    Ok(Results::new("real-benches", (options.seeds, options.contacts), benches, rows))
 }
 
 fn chosen(names: &[String]) -> Result<Vec<(&'static str, &'static str)>> {
@@ -206,17 +174,10 @@ fn judged(bench: &Bench, options: &Options) -> Result<Vec<Judged>> {
         .collect())
 }
 
-impl Results {
+impl Results<TableRow> {
     /// The table in Markdown.
     pub fn markdown(&self) -> String {
-        let mut text = format!(
-            "palpate {}, {} seeds, about {} contacts each, forces of 1, 0.5 and 2 times the presses in turn\n\n",
-            self.palpate,
-            self.seeds.len(),
-            self.contacts
-        );
-        text += "| bench | surface | estimator | world | tared | median, mean error (mm) | said at held-out places | position in 95 % | force in 95 % | outside model | ambiguous | missed | untouched `no_contact` | light found |\n";
-        text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+        let mut text = self.table_head("forces of 1, 0.5 and 2 times the presses in turn", &COLUMNS);
         for row in &self.rows {
             let TableRow { bench, knowledge, estimator, world, tared, figures, failure } = row;
             let _ = write!(text, "| {bench} | {knowledge} | {estimator} | {world} | {tared} | ");
@@ -228,6 +189,23 @@ impl Results {
         text
     }
 }
+
+const COLUMNS: [&str; 14] = [
+    "bench",
+    "surface",
+    "estimator",
+    "world",
+    "tared",
+    "median, mean error (mm)",
+    "said at held-out places",
+    "position in 95 %",
+    "force in 95 %",
+    "outside model",
+    "ambiguous",
+    "missed",
+    "untouched `no_contact`",
+    "light found",
+];
 
 fn cells(figures: &Figures) -> Vec<String> {
     let mut cells = vec![format!("{}, {}", mm(figures.median_error_mm), mm(figures.mean_error_mm))];
@@ -246,16 +224,6 @@ fn cells(figures: &Figures) -> Vec<String> {
     cells
 }
 
-/// A share in a table.
-pub(crate) fn percent(share: Option<f64>) -> String {
-    share.map_or("–".to_owned(), |share| format!("{share:.1} %"))
-}
-
-/// A length in a table.
-pub(crate) fn mm(length: Option<f64>) -> String {
-    length.map_or("–".to_owned(), |length| format!("{length:.2}"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -270,8 +238,7 @@ mod tests {
         let small = toml.replace("count = 19", "count = 10").replace("repeats = 5", "repeats = 2");
         let calls = AtomicUsize::new(0);
         let results =
-            run_on(vec![(name, small.leak())], &options, |_, _, of| calls.store(of, Ordering::Relaxed))
-                .unwrap();
+            run_on(&[(name, small.leak())], &options, |_, _, of| calls.store(of, Ordering::Relaxed)).unwrap();
         assert_eq!(calls.into_inner(), 4);
         assert_eq!(results.rows.len(), 2 * 2 * 2);
         assert!(

@@ -691,7 +691,7 @@ impl Locator {
         let untouched = UntouchedSurface::beside_walk(
             self.untouched_scatter.clone(),
             self.untouched_drift.clone(),
-            &self.layout().reading_sds().unwrap_or_default(),
+            &self.noise_sd().unwrap_or_default(),
         );
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {

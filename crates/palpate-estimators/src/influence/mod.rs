@@ -27,6 +27,7 @@ pub use noise::Whitening;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 
 use crate::fit::{Fit, FitTask, Locate, LocatorFault, NoCheck};
+use crate::force_prior::ONE_WEIGHT;
 use crate::lightest_touch::LightestTouch;
 use crate::offset_course::OffsetCourse;
 use crate::recording::Recording;
@@ -202,12 +203,10 @@ impl Influence {
 /// True of presses for contacts of unknown force whose own forces hardly differ, with untouched rows: they do not show how readings depend on the force, and
 /// held-out presses like them do not show what a structure says of other forces.
 pub(crate) fn is_one_weight(setup: &Setup, recording: &Recording) -> bool {
-    /// Of the greatest and the least force. A policy: by half as much again a saturation of a few percent shows beside usual noise.
-    const LEAST_RATIO: f64 = 1.5;
     let forces_n = || recording.rows.iter().filter(|row| row.touches()).filter_map(|row| row.force_n);
     let ends = forces_n().reduce(f64::min).zip(forces_n().reduce(f64::max));
     setup.force_n().is_none()
-        && ends.is_some_and(|(least_n, most_n)| most_n < LEAST_RATIO * least_n)
+        && ends.is_some_and(|(least_n, most_n)| most_n < ONE_WEIGHT * least_n)
         && !has_nuisance(recording)
         && force_linear::has_forces(setup, recording)
 }
