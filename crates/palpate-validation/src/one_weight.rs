@@ -185,12 +185,11 @@ mod tests {
     #[test]
     fn a_floor_pressed_with_one_weight_is_walked_on() {
         let (name, toml) = benches()[0];
-        let rig = Rig::from_toml(&toml.replace("repeats = 5", "repeats = 1")).unwrap();
-        let error_mm = |forces| {
-            let case = Case { name, rig: rig.clone(), weight_n: 100.0, forces };
-            case.row(Options { seeds: 1, contacts: 20 }).unwrap().figures.mean_error_mm.unwrap()
-        };
-        let [alike, walking] = [ALIKE, WALKING].map(error_mm);
-        assert!(walking < 1.2 * alike, "{alike} {walking}");
+        let rig = Rig::from_toml(toml).unwrap();
+        // What raw channels learn is beside its place as the presses are.
+        let placement_mm = 1e3 * rig.training().unwrap().placement_sd_m.unwrap();
+        let case = Case { name, rig, weight_n: 100.0, forces: WALKING };
+        let error_mm = case.row(Options { seeds: 1, contacts: 20 }).unwrap().figures.mean_error_mm.unwrap();
+        assert!(error_mm < 2.0 * placement_mm, "{error_mm}");
     }
 }
