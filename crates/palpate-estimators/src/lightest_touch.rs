@@ -27,10 +27,12 @@ use palpate_numerics::{bisect, percentile};
 /// ```
 pub struct LightestTouch<'a> {
     rate: FalseAlarmRate,
+    /// Channels in use, each with the standard deviation of its noise.
+    noise_sds: Vec<(usize, f64)>,
+    /// Change of each of them by a contact, over this standard deviation.
+    change: Box<dyn Fn(Contact) -> Vec<f64> + 'a>,
     /// Rules that all have to be passed.
     rules: Vec<Rule>,
-    /// Change of each channel by a contact, over the standard deviation of its noise.
-    change: Box<dyn Fn(Contact) -> Vec<f64> + 'a>,
 }
 
 /// A contact is found where the length of its weighted change is large enough.
@@ -73,21 +75,21 @@ impl<'a> LightestTouch<'a> {
     pub(crate) fn new(
         detection: Detection,
         rate: FalseAlarmRate,
+        noise_sds: Vec<(usize, f64)>,
         change: Box<dyn Fn(Contact) -> Vec<f64> + 'a>,
     ) -> Self {
-        let rules = vec![Rule::new(detection, vec![1.0; detection.channels])];
-        Self { rate, rules, change }
+        let rules = vec![Rule::new(detection, vec![1.0; noise_sds.len()])];
+        Self { rate, noise_sds, change, rules }
     }
 
-    /// The same, of a locator with the scatter of untouched rows. `noise_sd` has the standard deviation of each channel's noise; `None` of those that are not
-    /// in use.
+    /// The same, of a locator with the scatter of untouched rows. Channels without a scatter say nothing.
     #[must_use]
-    pub fn beyond(mut self, scatter: &UntouchedScatter, noise_sd: &[Option<f64>]) -> Self {
-        let weight = |(noise, scatter): (&Option<f64>, &f64)| {
-            let noise = (*noise)?;
-            Some(if *scatter > 0.0 { noise / scatter } else { 0.0 })
+    pub fn beyond(mut self, scatter: &UntouchedScatter) -> Self {
+        let weight = |(channel, noise_sd): &(usize, f64)| match scatter.sd.get(*channel) {
+            Some(scatter_sd) if *scatter_sd > 0.0 => noise_sd / scatter_sd,
+            _ => 0.0,
         };
-        let weights: Vec<f64> = noise_sd.iter().zip(&scatter.sd).filter_map(weight).collect();
+        let weights: Vec<f64> = self.noise_sds.iter().map(weight).collect();
         let channels = weights.iter().filter(|weight| **weight > 0.0).count();
         if channels > 0 {
             let detection = Detection { channels, unknowns: 1, square: scatter.bound, taken: scatter.bound };

@@ -227,11 +227,7 @@ impl Recordings {
     /// untouched rows, where there is one.
     fn light_touches(&self, locator: &Locator) -> Result<Recording> {
         let limit = self.used.cramer_rao_bound()?;
-        let by_noise = Influence::default().lightest_touch(&limit);
-        let touch = match &locator.untouched_scatter {
-            Some(scatter) => by_noise.beyond(scatter, &self.used.layout().reading_sds()?),
-            None => by_noise,
-        };
+        let touch = locator.beyond_scatter(Influence::default().lightest_touch(&limit));
         let light = self.places.iter().step_by(LIGHT_EACH).filter_map(|position| {
             let [_, surely_n] = touch.forces_at(*position);
             Some(Contact { position: *position, force_n: LIGHT * surely_n? })

@@ -534,8 +534,10 @@ impl Locator {
     /// The lightest touch that this locator finds, of one that is found by noise alone: contacts have to exceed the scatter of its untouched rows too.
     #[must_use]
     pub fn beyond_scatter<'a>(&self, touch: LightestTouch<'a>) -> LightestTouch<'a> {
-        let Some(scatter) = &self.untouched_scatter else { return touch };
-        touch.beyond(scatter, &self.noise_sd().unwrap_or_default())
+        match &self.untouched_scatter {
+            Some(scatter) => touch.beyond(scatter),
+            None => touch,
+        }
     }
 
     /// False-alarm rate; `None` of a method without `no_contact`.

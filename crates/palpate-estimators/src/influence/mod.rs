@@ -112,6 +112,7 @@ impl Influence {
         LightestTouch::new(
             detection,
             self.false_alarm_rate,
+            limit.noise_sds(),
             Box::new(|contact| limit.whitened_reading(contact)),
         )
     }

@@ -141,17 +141,28 @@ fn the_scatter_of_untouched_rows_hides_touches_that_noise_would_not() {
         .map(|touch| touch.forces_at(positions[1])[1].unwrap());
     assert!(scatter_n > 1.5 * noise_n, "{scatter_n} {noise_n}");
     check("scatter", &bench, &locator, &touch, &positions);
+    // The force by the scatter does not depend on the noise that is supposed.
+    let mut quiet = bench.setup.clone();
+    quiet
+        .edit_sensors(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 1e-6))
+        .unwrap();
+    let limit = quiet.cramer_rao_bound().unwrap();
+    let supposed = locator.beyond_scatter(Influence::default().lightest_touch(&limit));
+    let [_, supposed_n] = supposed.forces_at(positions[1]).map(Option::unwrap);
+    assert!((supposed_n / scatter_n - 1.0).abs() < 1e-6, "{supposed_n} {scatter_n}");
 }
 
 #[test]
 fn a_surface_that_does_not_notice_has_no_lightest_touch() {
     let detection = Detection { channels: 3, unknowns: 2, square: 16.0, taken: 11.0 };
-    let touch = LightestTouch::new(detection, FalseAlarmRate::default(), Box::new(|_| vec![0.0; 3]));
+    let noise_sds = vec![(0, 1.0), (1, 1.0), (2, 1.0)];
+    let new = |change| LightestTouch::new(detection, FalseAlarmRate::default(), noise_sds.clone(), change);
+    let touch = new(Box::new(|_| vec![0.0; 3]));
     assert_eq!(touch.forces_at(Position::along(0.1)), [None, None]);
     assert_eq!(touch.summaries(&[Position::along(0.1)]), [None, None]);
     // One that saturates is found where its readings do not.
     let saturating = |contact: Contact| vec![(4.0 * contact.force_n).min(8.0), 0.0, 0.0];
-    let touch = LightestTouch::new(detection, FalseAlarmRate::default(), Box::new(saturating));
+    let touch = new(Box::new(saturating));
     let [half_n, surely_n] = touch.forces_at(Position::along(0.1)).map(Option::unwrap);
     assert!(half_n < surely_n && 4.0 * surely_n < 8.0);
 }

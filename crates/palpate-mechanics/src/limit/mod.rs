@@ -71,6 +71,8 @@ const SILENT: f64 = 1e-9;
 /// A live sensor.
 #[derive(Clone)]
 struct Channel {
+    /// Number of the sensor in the layout, from 0.
+    index: usize,
     kind: SensorKind,
     /// √(σ² + q²/12).
     sd: f64,
@@ -95,11 +97,11 @@ impl<'a> CramerRaoBound<'a> {
     /// # Errors
     /// Those of [`CramerRaoBound::new`], and [`LimitError::Cancelled`].
     pub fn new_watched(surface: &'a dyn Surface, layout: &Layout, watch: Watch) -> Result<Self, LimitError> {
-        let channel = |(sensor, sd): (&Sensor, Option<f64>)| {
-            Some(Channel { kind: sensor.kind, sd: sd?, range: sensor.channel.range })
+        let channel = |(index, (sensor, sd)): (usize, (&Sensor, Option<f64>))| {
+            Some(Channel { index, kind: sensor.kind, sd: sd?, range: sensor.channel.range })
         };
-        let channels: Vec<Channel> =
-            layout.sensors().iter().zip(layout.reading_sds()?).filter_map(channel).collect();
+        let sensors = layout.sensors().iter().zip(layout.reading_sds()?);
+        let channels: Vec<Channel> = sensors.enumerate().filter_map(channel).collect();
         surface.check_solution_watched(watch)?;
         let scales: Vec<f64> =
             channels.iter().map(|channel| surface.full_scale(channel.kind) / channel.sd).collect();
@@ -147,8 +149,8 @@ impl<'a> CramerRaoBound<'a> {
         whitened: impl IntoIterator<Item = Arc<dyn ResponseFunction + 'a>>,
     ) -> Self {
         let responses: Vec<_> = whitened.into_iter().collect();
-        let channel = Channel { kind: SensorKind::Raw, sd: 1.0, range: None };
-        let channels = vec![channel; responses.len()];
+        let channel = |index| Channel { index, kind: SensorKind::Raw, sd: 1.0, range: None };
+        let channels = (0..responses.len()).map(channel).collect();
         let responses = Responses::BySensor(responses);
         let largest = responses.readings(&Grid::over_surface(extent).positions, 1.0);
         let full_scale = largest.iter().map(|readings| norm(readings)).fold(0.0, f64::max);
@@ -227,6 +229,11 @@ impl<'a> CramerRaoBound<'a> {
             }
         }
         each
+    }
+
+    /// Number of each live sensor in the layout, from 0, with the standard deviation of its noise by which readings are whitened.
+    pub fn noise_sds(&self) -> Vec<(usize, f64)> {
+        self.channels.iter().map(|channel| (channel.index, channel.sd)).collect()
     }
 
     /// Length of the whitened reading: how many standard deviations a touch stands out of the noise.

@@ -474,7 +474,9 @@ impl ForceLinearLocator {
             let response_n = self.stored.prior.response_n(force_n);
             values.iter().zip(open).map(|(f, open)| response_n * f / (1.0 + open).sqrt()).collect()
         };
-        LightestTouch::new(detection, self.stored.false_alarm_rate, Box::new(change))
+        let noise_sds = self.noise_of_channels().into_iter().enumerate();
+        let noise_sds = noise_sds.filter_map(|(channel, sd)| Some((channel, sd?))).collect();
+        LightestTouch::new(detection, self.stored.false_alarm_rate, noise_sds, Box::new(change))
     }
 
     /// Standard deviation of each channel's noise and offset together; `None` of those that are not in use.
