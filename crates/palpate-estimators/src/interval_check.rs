@@ -139,8 +139,8 @@ pub(crate) fn widen_by_other_folds(estimates: &mut [HeldOutEstimate], extent: Ex
 /// Ratios of the presses of each place, with the fold of the place.
 struct PlaceRatios {
     groups: Vec<(usize, Vec<f64>)>,
-    /// Places whose presses all are `no_contact`: they have no interval that could be wrong.
-    unclaimed: usize,
+    /// Number of places whose presses are all `no_contact`, so that they have no interval.
+    not_found: usize,
 }
 
 impl PlaceRatios {
@@ -148,24 +148,24 @@ impl PlaceRatios {
     fn new(estimates: &[HeldOutEstimate], ratio: &dyn Fn(&HeldOutEstimate) -> Option<f64>) -> Self {
         let mut sorted: Vec<&HeldOutEstimate> = estimates.iter().collect();
         sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
-        let mut ratios = Self { groups: Vec::new(), unclaimed: 0 };
+        let mut ratios = Self { groups: Vec::new(), not_found: 0 };
         for place in sorted.chunk_by(|a, b| a.truth == b.truth) {
-            let claimed = || place.iter().filter(|one| one.estimate.status != Status::NoContact);
-            let group: Vec<f64> = claimed().filter_map(|one| ratio(one)).collect();
+            let found = || place.iter().filter(|one| one.estimate.status != Status::NoContact);
+            let group: Vec<f64> = found().filter_map(|one| ratio(one)).collect();
             if !group.is_empty() {
                 ratios.groups.push((place[0].fold, group));
             }
-            ratios.unclaimed += usize::from(claimed().next().is_none());
+            ratios.not_found += usize::from(found().next().is_none());
         }
         ratios
     }
 
-    /// The factor of all places but those of a fold; `None` of too few. Places without a claim count as far as the others alone are too few: the largest
-    /// ratio is the factor then.
+    /// The factor of all places but those of a fold; `None` for too few. Where fewer than [`FEWEST_FOR_95`] places have an interval, places that were not
+    /// found complete their number, and the factor is about the largest ratio.
     fn factor_without(&self, fold: Option<usize>) -> Option<f64> {
         let others = self.groups.iter().filter(|(of, _)| Some(*of) != fold);
         let mut groups: Vec<&[f64]> = others.map(|(_, ratios)| ratios.as_slice()).collect();
-        let lacking = FEWEST_FOR_95.saturating_sub(groups.len()).min(self.unclaimed);
+        let lacking = FEWEST_FOR_95.saturating_sub(groups.len()).min(self.not_found);
         groups.extend(std::iter::repeat_n(&[0.0][..], lacking));
         conformal_95_of_groups(&groups).map(|factor| factor.max(1.0))
     }

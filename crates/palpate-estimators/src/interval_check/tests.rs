@@ -96,15 +96,15 @@ fn eighteen_places_bound_nothing() {
 }
 
 #[test]
-fn places_without_a_claim_are_no_reason_to_check_nothing() {
+fn places_that_are_not_found_complete_the_number_for_a_check() {
     let mut held_out = estimates(20, 2, 2.0, 1);
     let hidden = held_out[3].truth;
     for one in held_out.iter_mut().filter(|one| one.truth == hidden || one.truth.x_m > 0.85) {
         one.estimate.status = Status::NoContact;
     }
     let check = IntervalCheck::of_estimates(&held_out, line()).unwrap();
-    let claimed = held_out.iter().filter(|one| one.estimate.status != Status::NoContact);
-    let ratios: Vec<f64> = claimed.filter_map(|one| position_ratio(one, line())).collect();
+    let found = held_out.iter().filter(|one| one.estimate.status != Status::NoContact);
+    let ratios: Vec<f64> = found.filter_map(|one| position_ratio(one, line())).collect();
     let beyond = ratios.iter().filter(|ratio| **ratio > check.position.factor).count();
     assert!(check.places < FEWEST_FOR_95 && beyond <= 1 && ratios.len() == 36, "{check:?}");
 }
