@@ -15,7 +15,7 @@ use palpate_estimators::lightest_touch::{LightestTouch, TouchSummary};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve, LimitWarning};
-use palpate_mechanics::sensing::Sensor;
+use palpate_mechanics::sensing::{Sensor, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 
 /// Errors end where the surface does: limits beyond this many lengths are cut off.
@@ -131,9 +131,9 @@ impl LimitReport<'_> {
             }
             @if let Some(surely) = self.surely() {
                 li {
-                    "Lightest touch that is told from noise in " (stated(100.0 * surely.found)) " % of its readings: median "
+                    "Smallest force that is detected in " (stated(100.0 * surely.found)) " % of its readings (lightest touch): median "
                     b { (number(surely.median_n)) " N" } ", largest " (number(surely.worst.1)) " N at "
-                    (place(surely.worst.0, extent)) " mm; an untouched surface is taken for a touched one in " (self.touch.rate().to_string())
+                    (place(surely.worst.0, extent)) " mm; an untouched surface gives a contact in " (self.touch.rate().to_string())
                     " of its readings."
                 }
             }
@@ -213,7 +213,8 @@ impl LimitReport<'_> {
         };
         let caption = html! {
             "The limit at each contact position, for " (stated(self.known.force_n)) " N: the root of the sum of the least variances \
-             along and across. No unbiased estimator has a smaller one. Dots: the sensors."
+             along and across. No unbiased estimator has a smaller one."
+            @if !map.dots_mm.is_empty() { " Dots: the sensors." }
             @if cut_off { " Limits above the length of the surface have its colour: contacts there cannot be located." }
             @if nowhere { " Grey: the readings do not tell the position." }
         };
@@ -257,7 +258,10 @@ impl LimitReport<'_> {
         let [half, surely] = LightestTouch::FOUND.map(|found| stated(100.0 * found));
         html! {
             p {
-                "Below some force a reading is " code { "no_contact" } ": noise alone could have made it. That bound is set so that an untouched                  surface is taken for a touched one in " (self.touch.rate().to_string()) " of its readings (" code { "false_alarm_rate" } " in the rig). The                  lightest touch is the force that is found all the same, in " (half) " % and in " (surely) " % of its readings, by a                  locator that does not know the force."
+                "Below some force a reading is " code { "no_contact" } ": it can come from noise alone, or from the scatter of the untouched \
+                 rows of a locator. The bound is such that an untouched surface gives a contact in " (self.touch.rate().to_string())
+                " of its readings (" code { "false_alarm_rate" } " in the rig). The smallest detectable force (lightest touch) is detected in "
+                (half) " % and in " (surely) " % of its readings, by a locator that does not know the force."
             }
             @if let Some(TouchSummary { without: without @ 1.., .. }) = self.surely() {
                 p { "At " (counted(without, "position", "positions")) " no force is found." }
@@ -284,7 +288,7 @@ impl LimitReport<'_> {
             false => axis,
         };
         let x = Axis::linear("contact position, mm").from_to(0.0, length_mm);
-        let chart = Chart::new("The lightest touch that is told from noise", x, axis, series);
+        let chart = Chart::new("The smallest force that is detected", x, axis, series);
         let caption = html! {
             "The force that a contact at each position must have to be found, at " (self.touch.rate().to_string()) " of false alarms."
         };
@@ -312,7 +316,11 @@ impl LimitReport<'_> {
         Table::from_rows(self.setup.layout().sensors().iter().zip(1..))
             .short("sensor", |(_, number)| number.to_string())
             .words("measures", |(sensor, _)| sensor.kind.name())
-            .numeric("position, mm", |(sensor, _)| place(sensor.position, self.known.extent))
+            .numeric("position, mm", |(sensor, _)| match sensor.kind {
+                // Raw channels have no place that anybody stated.
+                SensorKind::Raw => "–".to_owned(),
+                _ => place(sensor.position, self.known.extent),
+            })
             .wide("noise", |(sensor, _)| noise_in_words(sensor))
             .caption(html! { "The sensors and their noise, from which the limit follows." })
     }
@@ -343,7 +351,10 @@ fn noise_in_words(sensor: &Sensor) -> String {
     if channel.dead {
         return "dead: left out".to_owned();
     }
-    let in_unit = |value| quantity(value, sensor.kind.dimension());
+    let in_unit = |value| match sensor.kind {
+        SensorKind::Raw => number(value),
+        kind => quantity(value, kind.dimension()),
+    };
     let mut parts = Vec::new();
     if channel.noise_sd > 0.0 {
         parts.push(format!("standard deviation {}", in_unit(channel.noise_sd)));
