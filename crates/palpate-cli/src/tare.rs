@@ -436,7 +436,7 @@ pub fn tare_splits(
         None => {
             let course = Observer::of_rounds(0)
                 .watch(|watch| {
-                    Influence::offset_course(FitTask::new(setup, recording).watch(watch), recording)
+                    Influence::default().offset_course(FitTask::new(setup, recording).watch(watch), recording)
                 })
                 .map_err(|error| Failure::from_error(&error))?;
             if let Some(course) = course {

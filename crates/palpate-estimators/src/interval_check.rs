@@ -1,25 +1,37 @@
 //! Check of 95 % intervals at places that a locator was not fitted to, and their widening.
 //!
 //! An interval is right where the bench is as its method assumes. Presses at held-out places test this: a locator of the same estimator, fitted to the
-//! other folds, locates them. Up to 40 places, each is a fold. The ratio of a press is the least factor by which its interval, lengthened to both sides alike,
-//! contains it (Romano, Patterson and Candès, *NeurIPS*, 2019: conformalized quantile regression); on a plane, the square root of
-//! (e − t)ᵀ·C⁻¹·(e − t) over that of [`ELLIPSE_95`]. Intervals that are lengthened by a factor contain the presses whose ratio is at most this factor.
+//! other folds, locates them. Up to 40 places, each is a fold.
 //!
-//! The factor is the 95 % quantile of the ratios, with the correction for their number by which it covers a press at a further place with a probability of 0.95
-//! (cross-conformal prediction: Vovk, *Annals of Mathematics and Artificial Intelligence* 74, 2015; the jackknife+ and CV+: Barber and others, *Annals of
-//! Statistics* 49, 2021). Presses of one place may share an error, so places are what is counted: see [`conformal_95_of_groups`]. Fewer than
-//! [`FEWEST_FOR_95`] of them bound nothing.
+//! Two numbers widen intervals: a standard deviation τ that is added to each one's own, and a factor. With the half-width h of an interval, the wider one has
+//! factor·√(h² + (1.96·τ)²); an ellipse of the covariance C has factor²·(C + τ²·I). The added standard deviation stands for errors that the method does not
+//! know, such as presses beside their places. Without it a factor that is right where intervals are wide is too small where they are narrow (Papadopoulos, Vovk
+//! and Gammerman, *Journal of Artificial Intelligence Research* 40, 2011, normalize residuals alike). τ is the one with which normal errors of the
+//! widened standard deviations, times any factor, are most likely. It is added where it raises the log-likelihood by more than 1, the price of a parameter
+//! (Akaike, *IEEE Transactions on Automatic Control* 19, 1974), with each place counted once.
+//!
+//! The ratio of a press is the least factor by which its interval contains it, lengthened to both sides alike (Romano, Patterson and Candès, *NeurIPS*, 2019:
+//! conformalized quantile regression); on a plane, the square root of (e − t)ᵀ·C⁻¹·(e − t) over that of [`ELLIPSE_95`]. The factor is the 95 % quantile of
+//! the ratios, with the correction for their number by which it covers a press at a further place with a probability of 0.95 (cross-conformal
+//! prediction: Vovk, *Annals of Mathematics and Artificial Intelligence* 74, 2015; the jackknife+ and CV+: Barber and others, *Annals of Statistics* 49, 2021).
+//! Presses of one place may share an error, so places are what is counted: see [`conformal_95_of_groups`]. Fewer than [`FEWEST_FOR_95`] of them bound nothing.
 //!
 //! Intervals are widened, and never narrowed: the factor of few places scatters, and intervals of a method that is right are right without it.
 
-use crate::estimate_record::ContactRecord;
+mod region;
+mod widening;
+
 use crate::locator_fault::LocatorFault;
 use crate::status::{OUTSIDE_MODEL_RATE, SIGNIFICANCE, SPREAD_RATE};
-use palpate_core::{ContactEstimate, Estimate, Position, Status, Uncertainty};
+use palpate_core::{Estimate, Position, Status};
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::small::Ldl;
-use palpate_numerics::{ELLIPSE_95, FEWEST_FOR_95, binomial_tail, conformal_95_of_groups};
+#[cfg(doc)]
+use palpate_numerics::ELLIPSE_95;
+use palpate_numerics::{FEWEST_FOR_95, binomial_tail, conformal_95_of_groups, root_mean_square};
+use region::Region;
 use serde::{Deserialize, Serialize};
+pub(crate) use widening::EstimateWidening;
+use widening::Widening;
 
 /// Check of a locator's 95 % intervals at held-out places; see [the module](self).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,23 +50,23 @@ pub struct IntervalCheck {
     pub force: Option<Coverage>,
 }
 
-/// Coverage of intervals at held-out places, and the factor that widens them.
+/// Coverage of intervals at held-out places, and what widens them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Coverage {
     /// Share of the presses that the method's intervals contain, in %. Every place has the same weight.
     pub before_percent: f64,
-    /// The same by intervals that are widened by the factor of the other folds, in %.
+    /// The same by intervals that are widened as the other folds say, in %.
     pub after_percent: f64,
+    /// Standard deviation that is added to that of each estimate, in metres or newtons.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub added_sd: f64,
     /// Factor of the half-widths, at least 1.
     pub factor: f64,
 }
 
-/// Factors of the half-widths of intervals, at least 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Widening {
-    position: f64,
-    force: f64,
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// Estimate of a press at a place that its locator was not fitted to.
@@ -70,8 +82,8 @@ pub(crate) struct HeldOutEstimate {
 impl IntervalCheck {
     /// The check by estimates at held-out places; `None` of fewer than [`FEWEST_FOR_95`] places, and of a method without intervals.
     pub(crate) fn of_estimates(estimates: &[HeldOutEstimate], extent: Extent) -> Option<Self> {
-        let ratios = |ratio: &dyn Fn(&HeldOutEstimate) -> Option<f64>| PlaceRatios::new(estimates, ratio);
-        let positions = ratios(&|held_out| position_ratio(held_out, extent));
+        let positions = PlaceRegions::new(estimates, |held_out| Region::of_position(held_out, extent));
+        let forces = PlaceRegions::new(estimates, |held_out| Region::of_force(held_out, extent));
         let places = positions.groups.len();
         let position = positions.coverage()?;
         let outside = estimates.iter().filter(|held_out| held_out.estimate.status == Status::OutsideModel);
@@ -80,7 +92,7 @@ impl IntervalCheck {
             presses: estimates.len(),
             outside_model: outside.count(),
             position,
-            force: ratios(&|held_out| force_ratio(held_out, extent)).coverage(),
+            force: forces.coverage(),
         })
     }
 
@@ -91,10 +103,10 @@ impl IntervalCheck {
         (by_noise < SIGNIFICANCE).then(|| 100.0 * outside_model as f64 / presses as f64)
     }
 
-    /// The factors of its intervals.
-    pub(crate) fn widening(&self) -> Widening {
-        let of = |coverage: Coverage| coverage.factor.min(UNBOUNDED);
-        Widening { position: of(self.position), force: self.force.map_or(1.0, of) }
+    /// What widens the intervals of estimates.
+    pub(crate) fn widening(&self) -> EstimateWidening {
+        let force = self.force.map_or(Widening::NONE, |force| force.widening());
+        EstimateWidening { position: self.position.widening(), force }
     }
 
     /// Checks what a file may have got wrong.
@@ -110,6 +122,13 @@ impl IntervalCheck {
             |factor| factor >= 1.0,
             "finite and at least 1",
         )?;
+        let added = coverages().map(|coverage| coverage.added_sd);
+        LocatorFault::check_numbers(
+            "added standard deviation",
+            added,
+            |sd| sd >= 0.0,
+            "finite and at least 0",
+        )?;
         let outside = [self.outside_model as f64 / self.presses as f64];
         let is_share = |share| (0.0..=1.0).contains(&share);
         LocatorFault::check_numbers("share of presses that are outside_model", outside, is_share, "0 to 1")?;
@@ -119,7 +138,13 @@ impl IntervalCheck {
     }
 }
 
-/// Widens each estimate by the factors of the other folds; without any where these have too few places.
+impl Coverage {
+    fn widening(self) -> Widening {
+        Widening { added_sd: self.added_sd, factor: self.factor.min(UNBOUNDED) }
+    }
+}
+
+/// Widens each estimate as the other folds say; not at all where these have too few places.
 pub(crate) fn widen_by_other_folds(estimates: &mut [HeldOutEstimate], extent: Extent) {
     let last = estimates.iter().map(|held_out| held_out.fold).max();
     let of_others = |fold: usize| {
@@ -127,7 +152,7 @@ pub(crate) fn widen_by_other_folds(estimates: &mut [HeldOutEstimate], extent: Ex
             estimates.iter().filter(|held_out| held_out.fold != fold).copied().collect();
         IntervalCheck::of_estimates(&others, extent).map(|check| check.widening())
     };
-    let widenings: Vec<Option<Widening>> =
+    let widenings: Vec<Option<EstimateWidening>> =
         last.map_or_else(Vec::new, |last| (0..=last).map(of_others).collect());
     for held_out in estimates {
         if let Some(widening) = widenings[held_out.fold] {
@@ -136,148 +161,112 @@ pub(crate) fn widen_by_other_folds(estimates: &mut [HeldOutEstimate], extent: Ex
     }
 }
 
-/// Ratios of the presses of each place, with the fold of the place.
-struct PlaceRatios {
-    groups: Vec<(usize, Vec<f64>)>,
+/// Regions of the presses of each place, with the fold of the place.
+struct PlaceRegions {
+    groups: Vec<(usize, Vec<Region>)>,
     /// Number of places whose presses are all `no_contact`, so that they have no interval.
     not_found: usize,
 }
 
-impl PlaceRatios {
-    /// The ratios of the estimates that have one.
-    fn new(estimates: &[HeldOutEstimate], ratio: &dyn Fn(&HeldOutEstimate) -> Option<f64>) -> Self {
+impl PlaceRegions {
+    /// The regions of the estimates that have one.
+    fn new(estimates: &[HeldOutEstimate], region_of: impl Fn(&HeldOutEstimate) -> Option<Region>) -> Self {
         let mut sorted: Vec<&HeldOutEstimate> = estimates.iter().collect();
         sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
-        let mut ratios = Self { groups: Vec::new(), not_found: 0 };
+        let mut regions = Self { groups: Vec::new(), not_found: 0 };
         for place in sorted.chunk_by(|a, b| a.truth == b.truth) {
             let found = || place.iter().filter(|one| one.estimate.status != Status::NoContact);
-            let group: Vec<f64> = found().filter_map(|one| ratio(one)).collect();
+            let group: Vec<Region> = found().filter_map(|one| region_of(one)).collect();
             if !group.is_empty() {
-                ratios.groups.push((place[0].fold, group));
+                regions.groups.push((place[0].fold, group));
             }
-            ratios.not_found += usize::from(found().next().is_none());
+            regions.not_found += usize::from(found().next().is_none());
         }
-        ratios
-    }
-
-    /// The factor of all places but those of a fold; `None` for too few. Where fewer than [`FEWEST_FOR_95`] places have an interval, places that were not
-    /// found complete their number, and the factor is about the largest ratio.
-    fn factor_without(&self, fold: Option<usize>) -> Option<f64> {
-        let others = self.groups.iter().filter(|(of, _)| Some(*of) != fold);
-        let mut groups: Vec<&[f64]> = others.map(|(_, ratios)| ratios.as_slice()).collect();
-        let lacking = FEWEST_FOR_95.saturating_sub(groups.len()).min(self.not_found);
-        groups.extend(std::iter::repeat_n(&[0.0][..], lacking));
-        conformal_95_of_groups(&groups).map(|factor| factor.max(1.0))
-    }
-
-    /// Share of the presses whose ratio is at most that of their fold, in %; every place counts alike.
-    fn covered_percent(&self, factor_of: impl Fn(usize) -> f64) -> f64 {
-        let of_place = |(fold, ratios): &(usize, Vec<f64>)| {
-            let factor = factor_of(*fold);
-            ratios.iter().filter(|ratio| **ratio <= factor).count() as f64 / ratios.len() as f64
-        };
-        100.0 * self.groups.iter().map(of_place).sum::<f64>() / self.groups.len() as f64
+        regions
     }
 
     fn coverage(&self) -> Option<Coverage> {
-        let factor = self.factor_without(None)?;
+        let Widening { added_sd, factor } = self.widening_without(None)?;
         let folds = self.groups.iter().map(|(fold, _)| fold + 1).max()?;
-        let of_others: Vec<f64> =
-            (0..folds).map(|fold| self.factor_without(Some(fold)).unwrap_or(factor)).collect();
+        let of_all = Widening { added_sd, factor };
+        let of_others: Vec<Widening> =
+            (0..folds).map(|fold| self.widening_without(Some(fold)).unwrap_or(of_all)).collect();
         Some(Coverage {
-            before_percent: self.covered_percent(|_| 1.0),
+            before_percent: self.covered_percent(|_| Widening::NONE),
             after_percent: self.covered_percent(|fold| of_others[fold]),
+            added_sd,
             factor,
         })
     }
+
+    /// What widens the intervals of all places but those of a fold; `None` for too few places.
+    fn widening_without(&self, fold: Option<usize>) -> Option<Widening> {
+        /// Added standard deviations that are tried, in powers of √2 of the root mean square error.
+        const TRIED: std::ops::RangeInclusive<i32> = -10..=6;
+        let others: Vec<&[Region]> = self
+            .groups
+            .iter()
+            .filter(|(of, _)| Some(*of) != fold)
+            .map(|(_, group)| group.as_slice())
+            .collect();
+        let mut best = Widening { added_sd: 0.0, factor: self.factor(&others, 0.0)?.max(1.0) };
+        let mut highest = log_likelihood(&others, 0.0) + PRICE_OF_A_PARAMETER;
+        let errors: Vec<f64> = others.iter().copied().flatten().map(Region::error).collect();
+        for power in TRIED {
+            let added_sd = root_mean_square(&errors) * f64::from(power).exp2().sqrt();
+            let Some(factor) = self.factor(&others, added_sd).filter(|factor| *factor >= 1.0) else {
+                continue;
+            };
+            let likelihood = log_likelihood(&others, added_sd);
+            if likelihood > highest {
+                (best, highest) = (Widening { added_sd, factor }, likelihood);
+            }
+        }
+        Some(best)
+    }
+
+    /// The 95 % quantile of the ratios of some places; `None` for too few. Where fewer than [`FEWEST_FOR_95`] places have an interval, places that were not
+    /// found complete their number, and the factor is about the largest ratio.
+    fn factor(&self, places: &[&[Region]], added_sd: f64) -> Option<f64> {
+        let ratios_of = |group: &&[Region]| group.iter().map(|region| region.ratio(added_sd)).collect();
+        let mut ratios: Vec<Vec<f64>> = places.iter().map(ratios_of).collect();
+        let lacking = FEWEST_FOR_95.saturating_sub(ratios.len()).min(self.not_found);
+        ratios.extend(std::iter::repeat_n(vec![0.0], lacking));
+        conformal_95_of_groups(&ratios.iter().map(Vec::as_slice).collect::<Vec<_>>())
+    }
+
+    /// Share of the presses that widened intervals contain, in %; every place counts alike.
+    fn covered_percent(&self, widening_of: impl Fn(usize) -> Widening) -> f64 {
+        let of_place = |(fold, regions): &(usize, Vec<Region>)| {
+            let Widening { added_sd, factor } = widening_of(*fold);
+            regions.iter().filter(|region| region.ratio(added_sd) <= factor).count() as f64
+                / regions.len() as f64
+        };
+        100.0 * self.groups.iter().map(of_place).sum::<f64>() / self.groups.len() as f64
+    }
+}
+
+/// Price of a parameter in the log-likelihood, by Akaike's criterion.
+const PRICE_OF_A_PARAMETER: f64 = 1.0;
+
+/// Log-likelihood of the errors at some places, each counted once, where they are normal with the standard deviations of the intervals and the added one,
+/// times the most likely factor. A constant is left out; −∞ where an error lies in an interval without a length.
+fn log_likelihood(places: &[&[Region]], added_sd: f64) -> f64 {
+    let (mut log_sizes, mut squares, mut dimensions) = (0.0, 0.0, 0.0);
+    for place in places {
+        let share = 1.0 / place.len() as f64;
+        for region in *place {
+            log_sizes += share * region.log_size(added_sd);
+            squares += share * region.square(added_sd);
+            dimensions += share * region.dimensions();
+        }
+    }
+    let log_likelihood = -log_sizes - 0.5 * dimensions * (squares / dimensions).ln();
+    if log_likelihood.is_finite() { log_likelihood } else { f64::NEG_INFINITY }
 }
 
 /// Factor from which on intervals count as unbounded. A policy: one of a micrometre is then a metre long. Files keep finite numbers.
 pub const UNBOUNDED: f64 = 1e6;
-
-/// Least factor by which an interval contains the truth: within the interval the share of its half-width toward the truth; beyond it the distance from the
-/// nearer end counts in halves of its whole length, so that an interval that ends at its own estimate is widened too.
-fn ratio_of((low, high): (f64, f64), estimate: f64, truth: f64) -> f64 {
-    let beyond = (low - truth).max(truth - high);
-    let (error, half) = if truth >= estimate {
-        (truth - estimate, high - estimate)
-    } else {
-        (estimate - truth, estimate - low)
-    };
-    let ratio = if beyond > 0.0 {
-        1.0 + beyond / (0.5 * (high - low).max(0.0))
-    } else if half > 0.0 {
-        (error / half).min(1.0)
-    } else {
-        0.0
-    };
-    ratio.min(UNBOUNDED)
-}
-
-fn position_ratio(held_out: &HeldOutEstimate, extent: Extent) -> Option<f64> {
-    let ContactEstimate { position, uncertainty, .. } = held_out.estimate.contact;
-    let Uncertainty { covariance: [xx, xy, _, yy, ..], x_95_m, y_95_m, .. } = uncertainty?;
-    let truth = held_out.truth;
-    let along_x = ratio_of(x_95_m, position.x_m, truth.x_m);
-    if let Extent::Line { .. } = extent {
-        return Some(along_x);
-    }
-    let error = [position.x_m - truth.x_m, position.y_m - truth.y_m];
-    let ellipse = Ldl::new(&[[xx, xy], [xy, yy]]).map(|factors| factors.quadratic(error) / ELLIPSE_95);
-    // An ellipse without an area says nothing of the errors across it; its intervals do.
-    let of_intervals = || along_x.max(ratio_of(y_95_m, position.y_m, truth.y_m));
-    let ratio = ellipse.map(f64::sqrt).filter(|ratio| ratio.is_finite()).unwrap_or_else(of_intervals);
-    Some(ratio.min(UNBOUNDED))
-}
-
-fn force_ratio(held_out: &HeldOutEstimate, extent: Extent) -> Option<f64> {
-    let contact = &held_out.estimate.contact;
-    let interval_n = ContactRecord::new(contact, extent).force_interval_95_n()?;
-    Some(ratio_of(interval_n.into(), contact.force_n?, held_out.force_n?))
-}
-
-impl Widening {
-    /// The estimate with wider intervals of all its contacts. They end where the surface does, and a force interval at 0, where they did before.
-    pub fn widened(&self, estimate: Estimate, extent: Extent) -> Estimate {
-        if *self == (Self { position: 1.0, force: 1.0 }) {
-            return estimate;
-        }
-        let mut wider = Estimate { contact: self.widened_contact(estimate.contact, extent), ..estimate };
-        wider.modes.clear();
-        for mode in estimate.modes.as_slice() {
-            let contact = self.widened_contact(mode.contact, extent);
-            wider.modes.push(palpate_core::Mode { contact, ..*mode });
-        }
-        wider.further.clear();
-        for contact in estimate.further.as_slice() {
-            wider.further.push(self.widened_contact(*contact, extent));
-        }
-        wider
-    }
-
-    fn widened_contact(&self, contact: ContactEstimate, extent: Extent) -> ContactEstimate {
-        let Some(uncertainty) = contact.uncertainty else { return contact };
-        let Self { position: p, force: f } = *self;
-        let [xx, xy, xf, yy, yf, ff] = uncertainty.covariance;
-        let uncertainty = Uncertainty {
-            covariance: [p * p * xx, p * p * xy, p * f * xf, p * p * yy, p * f * yf, f * f * ff],
-            x_95_m: widened_interval(uncertainty.x_95_m, p, extent.length_m()),
-            y_95_m: extent
-                .width_m()
-                .map_or(uncertainty.y_95_m, |width_m| widened_interval(uncertainty.y_95_m, p, width_m)),
-            force_95_n: uncertainty
-                .force_95_n
-                .map(|force_95_n| widened_interval(force_95_n, f, f64::INFINITY)),
-        };
-        ContactEstimate { uncertainty: Some(uncertainty), ..contact }
-    }
-}
-
-/// An interval whose length is multiplied by a factor, to both sides alike. It ends at 0 and `size` where it ended within them.
-fn widened_interval((low, high): (f64, f64), factor: f64, size: f64) -> (f64, f64) {
-    let more = (factor - 1.0) * 0.5 * (high - low).max(0.0);
-    ((low - more).max(low.min(0.0)), (high + more).min(high.max(size)))
-}
 
 #[cfg(test)]
 mod tests;

@@ -10,7 +10,10 @@
 //! b = c₂³/c₃², which has its first three moments (Imhof, *Biometrika* 48, 1961). So channels whose residues go together count as fewer. As s² is estimated, the
 //! critical value c of χ²_b becomes that of b·F with b and ν degrees of freedom, about ν·(e^(c/(ν + b/2 − 1)) − 1) (Bartlett, *Journal of the Royal
 //! Statistical Society B* 9, 1947). R is the sample's, whose eigenvalues scatter more than those of the
-//! surface: with few rests of unrelated channels the test is conservative.
+//! surface: with few rests of unrelated channels the test is conservative. Where the deviations have heavier tails than normal ones, the critical value is
+//! at least that of Student's t distribution: see [`tails`].
+
+mod tails;
 
 use crate::locator_fault::LocatorFault;
 use crate::recording::{Recording, Row};
@@ -18,6 +21,7 @@ use crate::status::{FalseAlarmRate, SIGNIFICANCE};
 use palpate_mechanics::sensing::Layout;
 use palpate_numerics::{chi_squared_critical_value, mean, normal_quantile};
 use serde::{Deserialize, Serialize};
+use tails::HeavyTails;
 
 /// Scatter of an untouched surface from one rest to the next; see [the module](self).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -102,7 +106,8 @@ impl Rests {
         Some(Self { deviations: deviations.collect(), freedom: (rests.len() - Self::OF_LINE) as f64 })
     }
 
-    /// True where noise of these standard deviations explains the deviations at the 5 % level: their mean square, in units of the noise, is about normal.
+    /// True where normal noise of these standard deviations explains the deviations at the 5 % level: their mean square, in units of the noise, is about normal,
+    /// and they have no heavy tails.
     pub fn are_noise(&self, noise_sd: &[Option<f64>]) -> bool {
         let channels: Vec<(usize, f64)> =
             noise_sd.iter().enumerate().filter_map(|(channel, sd)| Some((channel, (*sd)?))).collect();
@@ -111,21 +116,36 @@ impl Rests {
         let sum: f64 = self.deviations.iter().map(|(row, share)| share * square(row)).sum();
         let of_all = channels.len() as f64 * self.freedom;
         sum <= of_all + normal_quantile(1.0 - SIGNIFICANCE) * (2.0 * of_all).sqrt()
+            && self.heavy_tails(channels.iter().map(|(channel, _)| *channel)).is_none()
+    }
+
+    /// Tails of some channels' deviations, each in units of its own standard deviation.
+    fn heavy_tails(&self, channels: impl Iterator<Item = usize>) -> Option<HeavyTails> {
+        let standardized: Vec<(f64, f64)> = channels
+            .map(|c| (c, self.product(c, c).sqrt()))
+            .filter(|(_, sd)| *sd > 0.0)
+            .flat_map(|(c, sd)| self.deviations.iter().map(move |(row, share)| (row[c] / sd, *share)))
+            .collect();
+        HeavyTails::of_deviations(&standardized)
+    }
+
+    /// Covariance of two channels.
+    fn product(&self, a: usize, b: usize) -> f64 {
+        self.deviations.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.freedom
     }
 
     /// Their scatter about `centre`, of the channels that are not disabled.
     pub fn scatter(&self, centre: Vec<f64>, layout: &Layout, rate: FalseAlarmRate) -> UntouchedScatter {
         let is_live = |c: usize| !layout.sensors()[c].channel.dead;
-        let product = |a: usize, b: usize| {
-            self.deviations.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.freedom
-        };
         let variances: Vec<f64> =
-            (0..layout.len()).map(|c| if is_live(c) { product(c, c) } else { 0.0 }).collect();
+            (0..layout.len()).map(|c| if is_live(c) { self.product(c, c) } else { 0.0 }).collect();
         let changing: Vec<usize> = (0..layout.len()).filter(|c| variances[*c] > 0.0).collect();
-        let correlation = |a: usize, b: usize| product(a, b) / (variances[a] * variances[b]).sqrt();
+        let correlation = |a: usize, b: usize| self.product(a, b) / (variances[a] * variances[b]).sqrt();
         let correlations: Vec<Vec<f64>> =
             changing.iter().map(|a| changing.iter().map(|b| correlation(*a, *b)).collect()).collect();
-        let bound = critical_value(&correlations, self.freedom, rate);
+        let of_normal = critical_value(&correlations, self.freedom, rate);
+        let tails = self.heavy_tails(changing.iter().copied());
+        let bound = tails.map_or(of_normal, |tails| of_normal.max(tails.bound(changing.len(), rate.share())));
         let sd = variances.iter().map(|variance| (2.0 * variance).sqrt()).collect();
         UntouchedScatter { centre, sd, bound }
     }

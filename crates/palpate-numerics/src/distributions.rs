@@ -179,6 +179,36 @@ pub fn chi_squared_critical_value(tail: f64, freedom: usize) -> f64 {
     bisect((low, high), 60, |value| chi_squared_survival(value, freedom) > tail)
 }
 
+/// ln of the density of Student's t distribution with ν > 0 degrees of freedom, which need not be a whole number.
+pub fn student_ln_density(t: f64, freedom: f64) -> f64 {
+    let constant = libm::lgamma(0.5 * (freedom + 1.0))
+        - libm::lgamma(0.5 * freedom)
+        - 0.5 * (freedom * std::f64::consts::PI).ln();
+    constant - 0.5 * (freedom + 1.0) * (t * t / freedom).ln_1p()
+}
+
+/// Probability that the absolute value of a Student's t variable with 1 to 1,000 degrees of freedom ν exceeds `t` ≥ 0.
+///
+/// With x = π/2 − arctan(t/√ν) it is the integral of sin^(ν−1) from 0 to x over that from 0 to π/2, each by Simpson's rule.
+pub fn student_survival(t: f64, freedom: f64) -> f64 {
+    /// Halves of the intervals: the integrand is a power at 0, and smooth elsewhere.
+    const HALVES: usize = 400;
+    let integral = |to: f64| {
+        let step = to / HALVES as f64;
+        let value = |i: usize| (step * i as f64).sin().powf(freedom - 1.0);
+        let weighted = (1..HALVES).map(|i| if i % 2 == 1 { 4.0 * value(i) } else { 2.0 * value(i) });
+        step / 3.0 * (value(0) + weighted.sum::<f64>() + value(HALVES))
+    };
+    let to = freedom.sqrt().atan2(t);
+    integral(to) / integral(std::f64::consts::FRAC_PI_2)
+}
+
+/// Value that the absolute value of a Student's t variable with 1 to 1,000 degrees of freedom exceeds with a probability between 0 and 1.
+pub fn student_critical_value(tail: f64, freedom: f64) -> f64 {
+    const MOST: f64 = 1e6;
+    bisect((0.0, MOST), 80, |t| student_survival(t, freedom) > tail)
+}
+
 /// Probability of at least `least` of so many independent events, each of probability `share`.
 pub fn binomial_tail(trials: usize, least: usize, share: f64) -> f64 {
     let mut term = (trials as f64 * (-share).ln_1p()).exp();
@@ -193,6 +223,29 @@ pub fn binomial_tail(trials: usize, least: usize, share: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Closed forms for one and two degrees of freedom, and a table for four: P(|t| > 8.610) = 0.001.
+    #[test]
+    fn student_tails_are_those_of_closed_forms_and_tables() {
+        for t in [0.0, 0.3, 2.0, 40.0] {
+            let cauchy = 1.0 - 2.0 / std::f64::consts::PI * f64::atan(t);
+            let of_two = 1.0 - t / (2.0 + t * t).sqrt();
+            assert!((student_survival(t, 1.0) / cauchy - 1.0).abs() < 1e-6, "{t}");
+            assert!((student_survival(t, 2.0) / of_two - 1.0).abs() < 1e-6, "{t}");
+        }
+        assert!((student_critical_value(0.001, 4.0) - 8.610).abs() < 1e-3);
+        assert!((student_critical_value(0.05, 1000.0) - 1.9623).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_density_of_student_is_the_slope_of_its_distribution() {
+        for (t, freedom) in [(0.5, 3.0), (2.0, 4.5), (6.0, 8.0)] {
+            let step = 1e-3;
+            let slope =
+                (student_survival(t - step, freedom) - student_survival(t + step, freedom)) / (4.0 * step);
+            assert!((student_ln_density(t, freedom).exp() / slope - 1.0).abs() < 1e-4, "{t} {freedom}");
+        }
+    }
 
     #[test]
     fn the_survival_of_many_degrees_of_freedom_is_the_whole_sum() {

@@ -37,7 +37,7 @@ pub use cholesky::{Cholesky, NotPositiveDefinite};
 pub use distributions::{
     ELLIPSE_95, NORMAL_95, NORMAL_99, NormalPart, binomial_tail, bisect, chi_squared_critical_value,
     chi_squared_survival, clamped_interval, holding, hull, normal_between, normal_cdf, normal_interval_95,
-    normal_quantile,
+    normal_quantile, student_critical_value, student_ln_density, student_survival,
 };
 pub use eigen::symmetric_eigen;
 pub use elliptic::{Jacobi, carlson_rd, carlson_rf};

@@ -27,7 +27,7 @@ fn with_noise(value: f64, noise: f64) -> String {
 }
 
 /// Decimals by which a value has so many digits; none of 0.
-fn decimals(value: f64, digits: i32) -> usize {
+pub(super) fn decimals(value: f64, digits: i32) -> usize {
     if value == 0.0 {
         return 0;
     }

@@ -1,5 +1,6 @@
 //! Locators in words.
 
+use super::learnt::decimals;
 use super::learnt::learnt;
 use crate::centroid::Weighing;
 use crate::estimator::{Locator, Method, Tried};
@@ -87,26 +88,33 @@ pub fn interval_check(check: Option<&IntervalCheck>) -> Vec<String> {
             "95 % intervals: not checked, which takes presses at {FEWEST_FOR_95} places or more"
         )];
     };
-    let line = |what: &str, Coverage { before_percent, after_percent, factor }: Coverage| {
-        let widened = if factor >= UNBOUNDED {
-            "; some lie where an interval has no length, so that intervals are unbounded".to_owned()
-        } else if factor > 1.0 {
-            format!("; {after_percent:.1} % once widened by the factor {factor:.2}")
-        } else {
-            String::new()
+    let line = |what: &str, per_unit: f64, unit: &str, coverage: Coverage| {
+        let Coverage { before_percent, after_percent, added_sd, factor } = coverage;
+        let added_sd = per_unit * added_sd;
+        let added = format!("a standard deviation of {added_sd:.*} {unit}", decimals(added_sd, 2));
+        let widened = match (added_sd > 0.0, factor > 1.0) {
+            _ if factor >= UNBOUNDED => {
+                "; some lie where an interval has no length, so that intervals are unbounded".to_owned()
+            }
+            (false, false) => String::new(),
+            (false, true) => format!("; {after_percent:.1} % once widened by the factor {factor:.2}"),
+            (true, false) => format!("; {after_percent:.1} % once widened by {added}"),
+            (true, true) => {
+                format!("; {after_percent:.1} % once widened by {added} and the factor {factor:.2}")
+            }
         };
         format!(
             "95 % intervals at {} places held out: {before_percent:.1} % contain the {what}{widened}",
             check.places
         )
     };
-    let position = line("position", check.position);
+    let position = line("position", 1e3, "mm", check.position);
     let outside = check.outside_model_percent().map(|percent| {
         format!(
             "presses held out that the estimator's model does not explain (`outside_model`): {percent:.1} %"
         )
     });
-    let force = check.force.map(|force| line("force", force));
+    let force = check.force.map(|force| line("force", 1.0, "N", force));
     [Some(position), force, outside].into_iter().flatten().collect()
 }
 

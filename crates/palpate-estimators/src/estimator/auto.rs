@@ -216,7 +216,7 @@ pub fn take_off_drift(
 ) -> Result<Option<Vec<f64>>, InfluenceFitError> {
     let mut spans: Option<Vec<f64>> = None;
     for Split { training, judged, offsets, .. } in splits {
-        *offsets = Influence::offset_course(FitTask::new(setup, training).watch(watch), judged)?;
+        *offsets = Influence::default().offset_course(FitTask::new(setup, training).watch(watch), judged)?;
         for found in offsets.iter().map(OffsetCourse::spans) {
             let spans = spans.get_or_insert_with(|| vec![0.0; found.len()]);
             spans.iter_mut().zip(found).for_each(|(most, span)| *most = most.max(span));
@@ -259,7 +259,7 @@ fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -
     let mut splits =
         Split::by_folds(&recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
     let whole = FitTask::new(setup, &recording).watch(limited);
-    let course = Influence::offset_course(whole, &recording);
+    let course = Influence::default().offset_course(whole, &recording);
     let drift = match course
         .and_then(|course| course.map(|_| take_off_drift(setup, &mut splits, limited)).transpose())
     {

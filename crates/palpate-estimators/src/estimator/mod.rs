@@ -137,7 +137,9 @@ macro_rules! estimators {
             }
 
             fn drift_course(&self, task: FitTask, asked: &Recording) -> Option<OffsetCourse> {
-                Influence::offset_course(task, asked).ok().flatten()
+                let by_evidence = Influence::default();
+                let influence = if let Self::Influence(influence) = self { influence } else { &by_evidence };
+                influence.drift_course(task, asked)
             }
 
             /// Fits with a seed, watched. A method that is learnt has a [`ReadingCheck`] beside it.

@@ -93,7 +93,7 @@ impl Fit for Influence {
     }
 
     fn drift_course(&self, task: FitTask, asked: &Recording) -> Option<OffsetCourse> {
-        Self::offset_course(task, asked).ok().flatten()
+        self.offset_course(task, asked).ok().flatten()
     }
 }
 
@@ -117,22 +117,26 @@ impl Influence {
         )
     }
 
-    /// Offsets of the channels at the rows of `asked`, told by the task's presses where these drift, of a surface with a model by its untouched rows;
-    /// `None` of rows without times or forces or with a nuisance coordinate, and where the presses tell no drift or read no multiple of the force.
+    /// Offsets of the channels at the rows of `asked` by the drift that the task's recording shows; `None` where it shows none, or rows have no times.
+    ///
+    /// On a surface without a model the presses show a drift where readings follow the force, by the stated structure or by the evidence. Elsewhere the order
+    /// of presses could pass for a drift, and the untouched rows alone show it.
     ///
     /// # Errors
     /// [`InfluenceFitError`] where influence functions cannot be learnt, or the watch stopped it.
     pub fn offset_course(
+        &self,
         task: FitTask,
         asked: &Recording,
     ) -> Result<Option<OffsetCourse>, InfluenceFitError> {
-        if task.setup.surface().model().is_some() {
-            return Ok(untouched_rows::offset_course(task.recording, asked));
-        }
-        if has_nuisance(task.recording) {
-            return Ok(None);
-        }
-        Ok(force_linear::offset_course(task, asked)?)
+        let by_presses = task.setup.surface().model().is_none()
+            && !has_nuisance(task.recording)
+            && self.structure != Structure::Free;
+        let course = match by_presses {
+            true => force_linear::offset_course(task, self.structure, asked)?,
+            false => None,
+        };
+        Ok(course.or_else(|| untouched_rows::offset_course(task.recording, asked)))
     }
 
     /// Whether the settings suit a surface without mechanics; "corrected" is then the recording alone, as there is nothing to

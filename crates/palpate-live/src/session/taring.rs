@@ -5,8 +5,9 @@ use palpate_core::Estimate;
 use palpate_core::Tare;
 use palpate_estimators::estimator::Locator;
 
-/// Readings that make a baseline when a user tares: their mean has a seventh of the noise of one.
-const READINGS: u32 = 50;
+/// Time and number of the readings that make a baseline when a user tares, at least.
+const BASELINE_S: f64 = Tare::<[f64; 0]>::MOMENT_S;
+const BASELINE_READINGS: u32 = Tare::<[f64; 0]>::SETTLED;
 
 /// The baseline of a session.
 #[derive(Debug)]
@@ -14,8 +15,18 @@ pub struct Taring {
     /// The tare; `None` where the locator has not learnt what its channels read untouched.
     tare: Option<Tare<Vec<f64>>>,
     follows: bool,
-    /// A baseline that is being taken, and the readings it still lacks.
-    taken: Option<(Tare<Vec<f64>>, u32)>,
+    /// Time of the next reading, in seconds.
+    now_s: f64,
+    taken: Option<Taken>,
+}
+
+/// A baseline that is being taken.
+#[derive(Debug)]
+struct Taken {
+    tare: Tare<Vec<f64>>,
+    /// Time of its first reading, in seconds.
+    since_s: Option<f64>,
+    readings: u32,
 }
 
 impl Taring {
@@ -27,11 +38,12 @@ impl Taring {
             Estimation::Track { creep: Some(_), .. } => tare.without_rests(),
             _ => tare,
         });
-        Self { tare, follows, taken: None }
+        Self { tare, follows, now_s: 0.0, taken: None }
     }
 
     /// Notes the time of the next reading, in seconds.
     pub fn note_time(&mut self, time_s: f64) {
+        self.now_s = time_s;
         if let Some(tare) = &mut self.tare {
             tare.note_time(time_s);
         }
@@ -39,7 +51,8 @@ impl Taring {
 
     /// Begins to take a baseline.
     pub fn begin(&mut self) {
-        self.taken = self.tare.as_ref().map(|tare| (tare.restarted(), READINGS));
+        let taken = |tare: &Tare<Vec<f64>>| Taken { tare: tare.restarted(), since_s: None, readings: 0 };
+        self.taken = self.tare.as_ref().map(taken);
     }
 
     /// The estimate of a reading, and whether a baseline is complete with it; `tared` holds the tared reading afterwards. `None` for a reading
@@ -72,15 +85,16 @@ impl Taring {
 
     /// Adds a reading to a baseline that is being taken; true when that is complete, and the one that holds.
     fn take(&mut self, reading: &[f64]) -> bool {
-        let Some((tare, left)) = &mut self.taken else { return false };
+        let Some(Taken { tare, since_s, readings }) = &mut self.taken else { return false };
         if tare.add_untouched(reading).is_err() {
             return false;
         }
-        *left -= 1;
-        if *left > 0 {
+        *readings += 1;
+        let since_s = *since_s.get_or_insert(self.now_s);
+        if *readings < BASELINE_READINGS || self.now_s - since_s < BASELINE_S {
             return false;
         }
-        self.tare = self.taken.take().map(|(tare, _)| tare);
+        self.tare = self.taken.take().map(|taken| taken.tare);
         true
     }
 }

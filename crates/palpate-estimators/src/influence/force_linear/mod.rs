@@ -144,15 +144,18 @@ fn channels_as_one(presses: &Presses) -> f64 {
     1.0 + left_out::weight(presses.len()) * ((presses.len() as f64 / FEWEST).clamp(1.0, MOST) - 1.0)
 }
 
-/// Offsets at the rows of `asked`, told by the presses of a recording; `None` where its rows have no times, tell no drift, or read no
-/// multiple of the force.
-pub(super) fn offset_course(task: FitTask, asked: &Recording) -> Result<Option<OffsetCourse>, MeasuredError> {
+/// Offsets at the rows of `asked` by the presses of a recording; `None` where its rows have no times, show no drift, or do not follow the force.
+pub(super) fn offset_course(
+    task: FitTask,
+    structure: Structure,
+    asked: &Recording,
+) -> Result<Option<OffsetCourse>, MeasuredError> {
     let FitTask { setup, recording, watch, .. } = task;
     let Some((own_s, asked_s)) = recording.times_s().zip(asked.times_s()) else { return Ok(None) };
-    let Some(learnt) = Learnt::new(setup, recording, Structure::Auto, MOST_PRESSES, watch)? else {
+    let Some(learnt) = Learnt::new(setup, recording, structure, MOST_PRESSES, watch)? else {
         return Ok(None);
     };
-    // Elsewhere the order of the presses, of their places or of a nuisance coordinate, would pass for a drift.
+    // The order of presses, of their places or of a nuisance coordinate, would pass for a drift.
     if !learnt.prior.is_separable() {
         return Ok(None);
     }

@@ -3,6 +3,7 @@
 
 use std::sync::LazyLock;
 
+use palpate_numerics::random_order;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 use palpate_core::{ContactEstimate, Status};
@@ -14,7 +15,7 @@ use super::{MeasuredError, MeasuredInfluence, MeasuredLocator, NuisanceRole, Sca
 use crate::evaluation::cross_validate;
 use crate::fit::{Fit, FitTask, Locate};
 use crate::fixtures::{pad, pad_recording, paper, raw_recording, raw_setup, readings, strip_recording};
-use crate::influence::{Influence, InfluenceSource};
+use crate::influence::{Influence, InfluenceSource, Structure};
 use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use crate::simulate::clean_reading;
@@ -317,8 +318,51 @@ fn presses_that_are_no_multiple_of_the_force_tell_no_drift() {
     let recording = squeezes(21).in_order();
     let with_depth = raw_recording(squeezes(21).rows.into_iter().map(named).collect()).in_order();
     for recording in [recording, with_depth] {
-        let course = Influence::offset_course(FitTask::new(&setup, &recording), &recording).unwrap();
+        let course =
+            Influence::default().offset_course(FitTask::new(&setup, &recording), &recording).unwrap();
         assert_eq!(course, None);
+    }
+}
+
+/// Presses of a strip whose readings saturate, with an untouched row after each, while the channels drift by up to a sixth of their range.
+fn saturating_presses_under_drift(seed: u64) -> Recording {
+    const DRIFTS: [f64; 4] = [160.0, -90.0, 40.0, -10.0];
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let presses: Vec<(f64, f64)> = (0..24)
+        .flat_map(|i| [1.0, 2.0, 4.0].map(|force_n| (0.002 + 0.004 * f64::from(i), force_n)))
+        .collect();
+    let order = random_order(presses.len(), seed);
+    let rows = order.iter().enumerate().flat_map(|(i, press)| {
+        let (x_m, force_n) = presses[*press];
+        [(force_n, 0), (0.0, 1)].map(|(force_n, after)| {
+            let time_s = (2 * i + after) as f64 * 5.0;
+            let share = time_s / (10.0 * presses.len() as f64);
+            let reading = DRIFTS.iter().enumerate().map(|(c, drift)| {
+                let far = (x_m - 0.0125 - 0.025 * c as f64) / 0.02;
+                let clean = 250.0 * force_n * (-0.5 * far * far).exp();
+                clean / (1.0 + 0.3 * clean / 1000.0) + drift * share + 2.0 * noise(&mut rng)
+            });
+            let (position, reading) = (Position::along(x_m), reading.collect());
+            Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: Some(time_s), reading }
+        })
+    });
+    raw_recording(rows.collect())
+}
+
+/// Presses held out are tared by the drift that the structure, or else the untouched rows, show: otherwise the check of intervals fails.
+#[test]
+fn every_structure_is_checked_without_the_drift() {
+    let setup = raw_setup(*STRIP, 4, None);
+    let recording = saturating_presses_under_drift(1);
+    for structure in [Structure::ForceLinear, Structure::ForceMonotone, Structure::Free, Structure::Auto] {
+        let influence = Influence { structure, ..Influence::default() };
+        let task = FitTask::new(&setup, &recording);
+        let spans = influence.offset_course(task, &recording).unwrap().unwrap().spans();
+        assert!((spans[0] - 160.0).abs() < 20.0 && spans[3] < 30.0, "{structure:?}: {spans:?}");
+        if structure == Structure::ForceMonotone {
+            let check = influence.fit_task(task).unwrap().interval_check.unwrap();
+            assert!(check.position.before_percent > 80.0, "{check:?}");
+        }
     }
 }
 
