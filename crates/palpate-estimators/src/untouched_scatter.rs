@@ -19,7 +19,7 @@ use crate::locator_fault::LocatorFault;
 use crate::recording::{Recording, Row};
 use crate::status::{FalseAlarmRate, SIGNIFICANCE};
 use palpate_mechanics::sensing::Layout;
-use palpate_numerics::{chi_squared_critical_value, mean, normal_quantile};
+use palpate_numerics::{chi_squared_critical_value, mean, median, normal_quantile};
 use serde::{Deserialize, Serialize};
 use tails::HeavyTails;
 
@@ -44,6 +44,8 @@ pub(crate) struct Rests {
     deviations: Vec<(Vec<f64>, f64)>,
     /// ν.
     freedom: f64,
+    /// Deviations of repeated presses from their means, where these scatter no more than the rests: noise of the same kind, in larger number.
+    noise: Option<Box<Rests>>,
 }
 
 impl Rests {
@@ -52,7 +54,9 @@ impl Rests {
 
     /// The rests of a recording; `None` where it has too few, or its rows have no order in time.
     pub fn of_recording(recording: &Recording) -> Option<Self> {
-        Self::new(recording, &recording.rests())
+        let rests = Self::new(recording, &recording.rests())?;
+        let noise = Self::of_repeats(&recording.touched()).filter(|noise| rests.scatter_as_much_as(noise));
+        Some(Self { noise: noise.map(Box::new), ..rests })
     }
 
     /// The untouched rows of a recording with too few rests, each as a rest of its own: their noise, without the residue of touches; `None` of too few rows.
@@ -79,12 +83,15 @@ impl Rests {
         }
         let deviations = groups.into_iter().flat_map(|group| {
             let mean = recording.mean_reading(group);
+            // The mean has a part of each row, by which rows deviate less from it than from the truth.
+            let share = 1.0 - 1.0 / group.len() as f64;
             let off = move |row: &usize| -> Vec<f64> {
-                rows[*row].reading.iter().zip(&mean).map(|(value, mean)| value - mean).collect()
+                let values = rows[*row].reading.iter().zip(&mean);
+                values.map(|(value, mean)| (value - mean) / share.sqrt()).collect()
             };
-            group.iter().map(move |row| (off(row), 1.0))
+            group.iter().filter(move |_| share > 0.0).map(move |row| (off(row), share))
         });
-        Some(Self { deviations: deviations.collect(), freedom: freedom as f64 })
+        Some(Self { deviations: deviations.collect(), freedom: freedom as f64, noise: None })
     }
 
     fn new(recording: &Recording, rests: &[Vec<usize>]) -> Option<Self> {
@@ -103,7 +110,11 @@ impl Rests {
             let values = recording.rows[row].reading.iter().zip(&lines);
             (values.map(|(value, [level, slope])| value - level - slope * times_s[row]).collect(), share)
         });
-        Some(Self { deviations: deviations.collect(), freedom: (rests.len() - Self::OF_LINE) as f64 })
+        Some(Self {
+            deviations: deviations.collect(),
+            freedom: (rests.len() - Self::OF_LINE) as f64,
+            noise: None,
+        })
     }
 
     /// True where normal noise of these standard deviations explains the deviations at the 5 % level: their mean square, in units of the noise, is about normal,
@@ -116,17 +127,38 @@ impl Rests {
         let sum: f64 = self.deviations.iter().map(|(row, share)| share * square(row)).sum();
         let of_all = channels.len() as f64 * self.freedom;
         sum <= of_all + normal_quantile(1.0 - SIGNIFICANCE) * (2.0 * of_all).sqrt()
-            && self.heavy_tails(channels.iter().map(|(channel, _)| *channel)).is_none()
+            && self.heavy_tails(&channels.iter().map(|(channel, _)| *channel).collect::<Vec<_>>()).is_none()
     }
 
-    /// Tails of some channels' deviations, each in units of its own standard deviation.
-    fn heavy_tails(&self, channels: impl Iterator<Item = usize>) -> Option<HeavyTails> {
-        let standardized: Vec<(f64, f64)> = channels
-            .map(|c| (c, self.product(c, c).sqrt()))
-            .filter(|(_, sd)| *sd > 0.0)
-            .flat_map(|(c, sd)| self.deviations.iter().map(move |(row, share)| (row[c] / sd, *share)))
+    /// True where repeats scatter no more in the mean over the channels, at the 5 % level. The median absolute deviation is compared, which hardly depends on the
+    /// tails; of n normal values it has a relative variance of 1.36/n (Serfling, *Approximation Theorems of Mathematical Statistics*, 1980).
+    fn scatter_as_much_as(&self, repeats: &Self) -> bool {
+        const RELATIVE_VARIANCE: f64 = 1.36;
+        let spread =
+            |rests: &Self, c: usize| median(rests.deviations.iter().map(|(row, _)| row[c].abs()).collect());
+        let channels = self.deviations.first().map_or(0, |(row, _)| row.len());
+        let ratios: Vec<f64> = (0..channels)
+            .filter_map(|c| Some(spread(repeats, c)? / spread(self, c)?))
+            .filter(|ratio| ratio.is_finite())
             .collect();
-        HeavyTails::of_deviations(&standardized)
+        let variance =
+            RELATIVE_VARIANCE * (self.freedom.recip() + repeats.freedom.recip()) / ratios.len() as f64;
+        mean(ratios) <= 1.0 + normal_quantile(1.0 - SIGNIFICANCE) * variance.sqrt()
+    }
+
+    /// Tails of the noise in some channels, which repeated presses show best, and the largest share that it has of a channel's variance; `None` where they are
+    /// those of normal noise.
+    fn heavy_tails(&self, channels: &[usize]) -> Option<(HeavyTails, f64)> {
+        let noise = self.noise.as_deref().unwrap_or(self);
+        let standardized: Vec<(f64, f64)> = channels
+            .iter()
+            .map(|c| (*c, noise.product(*c, *c).sqrt()))
+            .filter(|(_, sd)| *sd > 0.0)
+            .flat_map(|(c, sd)| noise.deviations.iter().map(move |(row, share)| (row[c] / sd, *share)))
+            .collect();
+        let shares = channels.iter().map(|c| noise.product(*c, *c) / self.product(*c, *c));
+        let share = shares.filter(|share| share.is_finite()).fold(0.0, f64::max);
+        Some((HeavyTails::of_deviations(&standardized)?, share))
     }
 
     /// Covariance of two channels.
@@ -144,8 +176,9 @@ impl Rests {
         let correlations: Vec<Vec<f64>> =
             changing.iter().map(|a| changing.iter().map(|b| correlation(*a, *b)).collect()).collect();
         let of_normal = critical_value(&correlations, self.freedom, rate);
-        let tails = self.heavy_tails(changing.iter().copied());
-        let bound = tails.map_or(of_normal, |tails| of_normal.max(tails.bound(changing.len(), rate.share())));
+        let bound = self.heavy_tails(&changing).map_or(of_normal, |(tails, share)| {
+            of_normal.max(tails.bound(changing.len(), share, rate.share()))
+        });
         let sd = variances.iter().map(|variance| (2.0 * variance).sqrt()).collect();
         UntouchedScatter { centre, sd, bound }
     }

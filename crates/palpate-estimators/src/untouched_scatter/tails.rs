@@ -43,14 +43,15 @@ impl HeavyTails {
         deviations.iter().map(of_one).sum()
     }
 
-    /// Bound of Σ d²/2 over some channels, where d is the difference of two deviations, at a rate of false alarms.
+    /// Bound of Σ d²/2 over some channels, at a rate of false alarms. d is the difference of two deviations of variance 1, of which such noise is at most the
+    /// given share.
     ///
     /// The sum of heavy-tailed variables is large where one of them is (Foss, Korshunov and Zachary, *An Introduction to Heavy-Tailed and Subexponential Distributions*,
     /// 2013): one of the two deviations of one channel exceeds x, and the other channels have their mean.
-    pub fn bound(&self, channels: usize, rate: f64) -> f64 {
+    pub fn bound(&self, channels: usize, share: f64, rate: f64) -> f64 {
         let n = channels as f64;
         let x = self.scale * student_critical_value(rate / (2.0 * n), self.freedom);
-        0.5 * x * x + (n - 1.0)
+        0.5 * share * x * x + (n - 1.0)
     }
 }
 
@@ -101,7 +102,7 @@ mod tests {
         const CHANNELS: usize = 6;
         let tails = HeavyTails { freedom: 4.0, scale: 0.5_f64.sqrt() };
         for rate in [0.01, 0.001] {
-            let bound = tails.bound(CHANNELS, rate);
+            let bound = tails.bound(CHANNELS, 1.0, rate);
             let rows = deviations(4.0, 2 * CHANNELS * 100_000, 1);
             let beyond = rows.chunks_exact(2 * CHANNELS).filter(|row| {
                 let pairs = row.chunks_exact(2).map(|pair| tails.scale * (pair[0].0 - pair[1].0));

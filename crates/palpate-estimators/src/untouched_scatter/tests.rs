@@ -171,3 +171,41 @@ fn methods_without_a_rule_of_no_contact_have_one_by_untouched_rows() {
         assert!(untouched >= 497 && touched == 0, "{untouched} {touched}");
     }
 }
+
+/// Noise of four degrees of freedom: a few untouched rows hardly show its tails, and repeated presses do.
+#[test]
+fn heavy_tails_of_repeated_presses_bound_the_rests() {
+    const RECORDINGS: usize = 40;
+    const ASKED: usize = 2000;
+    const RATE: f64 = 0.002;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+    let t = rand_distr::StudentT::new(4.0).unwrap();
+    let mut noise = || -> Vec<f64> { (0..CHANNELS).map(|_| t.sample(&mut rng)).collect() };
+    let (mut beyond, mut are_noise) = (0, 0);
+    for _ in 0..RECORDINGS {
+        let mut rows = Vec::new();
+        for place in 0..24 {
+            for force_n in [0.0, 2.0, 2.0, 2.0, 2.0, 2.0] {
+                let reading = noise().into_iter().map(|noise| 100.0 * force_n + noise).collect();
+                let position = Position::along(0.01 * f64::from(place));
+                rows.push(Row {
+                    position,
+                    force_n: Some(force_n),
+                    nuisances: Vec::new(),
+                    time_s: None,
+                    reading,
+                });
+            }
+        }
+        let rests = Rests::of_recording(&Recording::new(setup().layout(), "rests", rows)).unwrap();
+        are_noise += usize::from(rests.are_noise(&[Some(2f64.sqrt()); CHANNELS]));
+        let scatter =
+            rests.scatter(vec![0.0; CHANNELS], setup().layout(), FalseAlarmRate::new(RATE).unwrap());
+        let mut asked =
+            || noise().into_iter().zip(noise()).map(|(reading, zero)| reading - zero).collect::<Vec<f64>>();
+        beyond += (0..ASKED).filter(|_| !scatter.contains(&asked())).count();
+    }
+    let found = beyond as f64 / (RECORDINGS * ASKED) as f64;
+    // The tail that far out follows from 720 values: its rate is right within a factor of five. By the variance alone it is 1.7 %.
+    assert!((0.2 * RATE..5.0 * RATE).contains(&found) && are_noise <= 4, "{found}, {are_noise}");
+}
