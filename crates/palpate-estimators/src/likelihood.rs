@@ -1,6 +1,7 @@
 //! Likelihood of a reading under contacts, as a filter over time needs it of a locator.
 
 use crate::force_prior::ForceRange;
+use crate::interval_check::IntervalCheck;
 use crate::untouched_drift::UntouchedDrift;
 use crate::untouched_scatter::UntouchedScatter;
 use palpate_core::Estimate;
@@ -83,6 +84,9 @@ pub trait Likelihood: Send + Sync {
 
     /// True for a reading within the residue that touches leave on an untouched surface.
     fn is_residue(&self, reading: &[f64]) -> bool;
+
+    /// Check of the locator's 95 % intervals, which widens those of tracks.
+    fn interval_check(&self) -> Option<&IntervalCheck>;
 
     /// Drift of the channels that the untouched rows of the calibration show.
     fn untouched_drift(&self) -> Option<&UntouchedDrift>;

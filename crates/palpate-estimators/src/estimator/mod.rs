@@ -699,11 +699,15 @@ impl Locator {
         );
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
-                let likelihood = BeamLikelihood::new(beam).with_untouched(untouched);
+                let likelihood = BeamLikelihood::new(beam)
+                    .with_untouched(untouched)
+                    .with_interval_check(self.interval_check);
                 Ok(Tracking { likelihood: Arc::new(likelihood) })
             }
             Method::Influence(InfluenceLocator::Plane(plane)) => {
-                let likelihood = PlateLikelihood::new(plane).with_untouched(untouched);
+                let likelihood = PlateLikelihood::new(plane)
+                    .with_untouched(untouched)
+                    .with_interval_check(self.interval_check);
                 Ok(Tracking { likelihood: Arc::new(likelihood) })
             }
             method => Err(NotTrackable::Kind {

@@ -6,7 +6,7 @@ use palpate_numerics::NORMAL_95;
 
 /// A standard deviation that is added to an interval's own, and the factor of its half-width.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Widening {
+pub(crate) struct Widening {
     pub added_sd: f64,
     pub factor: f64,
 }
@@ -24,13 +24,18 @@ impl Widening {
     fn variance(self, variance: f64) -> f64 {
         self.factor * self.factor * (variance + self.added_sd * self.added_sd)
     }
+
+    /// What is added to a variance.
+    pub fn added_variance(self, variance: f64) -> f64 {
+        self.variance(variance) - variance
+    }
 }
 
 /// What widens the intervals of estimates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EstimateWidening {
-    pub(super) position: Widening,
-    pub(super) force: Widening,
+    pub position: Widening,
+    pub force: Widening,
 }
 
 impl EstimateWidening {

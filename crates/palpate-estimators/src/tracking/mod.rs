@@ -33,6 +33,7 @@ pub use slow::{Creep, Drift};
 pub use tracker::{SmoothTracker, Tracker};
 
 use crate::force_prior::force_interval_95_n;
+use crate::interval_check::EstimateWidening;
 use crate::likelihood::{CalibrationVariance, Likelihood};
 use belief::Moments;
 use palpate_core::{ContactEstimate, Estimate, Uncertainty};
@@ -239,6 +240,27 @@ impl Tracked {
 }
 
 impl Tracked {
+    /// Widens contacts as the check of the locator's intervals does.
+    fn widen_by_check(tracked: &mut [Self], likelihood: &dyn Likelihood) {
+        let Some(check) = likelihood.interval_check() else { return };
+        let EstimateWidening { position, force } = check.widening();
+        let greatest_n = likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1);
+        for one in tracked {
+            let [sd_m, _, sd_n] = one.sd;
+            let (yy, xy) = one.across.map_or((0.0, 0.0), |across| {
+                let more = position.factor * position.factor - 1.0;
+                (position.added_variance(across.sd[0].powi(2)), more * across.covariance_m2)
+            });
+            // A force that is known has no error.
+            let force_n2 = if sd_n > 0.0 { force.added_variance(sd_n * sd_n) } else { 0.0 };
+            one.widen(
+                [position.added_variance(sd_m * sd_m), xy, yy, force_n2],
+                likelihood.extent(),
+                greatest_n,
+            );
+        }
+    }
+
     /// Adds variances of the place, xx, xy and yy, and of the force, on a surface of this extent under contacts of no more than a greatest force.
     fn widen(&mut self, [xx, xy, yy, force]: [f64; 4], extent: Extent, greatest_n: f64) {
         let wider = |at_m: f64, (low_m, high_m): (f64, f64), variance: f64, side_m: f64| {

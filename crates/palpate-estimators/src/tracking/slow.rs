@@ -599,6 +599,10 @@ mod tests {
             false
         }
 
+        fn interval_check(&self) -> Option<&crate::interval_check::IntervalCheck> {
+            None
+        }
+
         fn untouched_drift(&self) -> Option<&UntouchedDrift> {
             None
         }

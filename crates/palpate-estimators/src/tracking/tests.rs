@@ -13,6 +13,7 @@ use crate::estimator::Locator;
 use crate::fit::{Fit, FitTask};
 use crate::fixtures::{Example, along_the_beam, moving_beam, swinging_beam, two_moving_loads};
 use crate::influence::{BeamLikelihood, Influence};
+use crate::interval_check::IntervalCheck;
 use crate::likelihood::{ContactFit, Likelihood, LineLikelihood};
 use crate::recording::Row;
 use crate::simulate::{CleanSensors, clean_reading};
@@ -426,4 +427,32 @@ fn contacts_end_within_the_residue_of_untouched_rows() {
     assert!(touched > all * 95 / 100 && at_rest < all / 100, "{touched} {at_rest} of {all}");
     let [_, by_noise] = touching(&Locator { untouched_scatter: None, ..locator });
     assert!(by_noise > all / 4, "{by_noise} of {all}");
+}
+
+/// What a locator adds to its intervals by its held-out presses, the filter and the smoother add too.
+#[test]
+fn the_check_of_the_locators_intervals_widens_tracks() {
+    let rig = rig();
+    let check: IntervalCheck = serde_json::from_str(
+        r#"{"places": 19, "presses": 19, "outside_model": 0,
+            "position": {"before_percent": 60.0, "after_percent": 95.0, "added_sd": 0.002, "factor": 1.5},
+            "force": {"before_percent": 60.0, "after_percent": 95.0, "factor": 2.0}}"#,
+    )
+    .unwrap();
+    let readings = readings(&rig, along_the_beam(), 2);
+    let tracks = |check: Option<IntervalCheck>| {
+        let likelihood = likelihood(&rig, None).with_interval_check(check);
+        let mut tracker = SmoothTracker::new(Arc::new(likelihood), TrackerConfig::default());
+        for (time_s, _, reading) in readings.iter().take(150) {
+            tracker.follow(*time_s, reading).unwrap();
+        }
+        [tracker.filtered().to_vec(), tracker.smoothed(Watch::NONE).unwrap()]
+            .map(|tracks| tracks[140].contacts[0])
+    };
+    for (own, wider) in tracks(None).into_iter().zip(tracks(Some(check))) {
+        assert_eq!((own.x_m, own.force_n), (wider.x_m, wider.force_n));
+        assert!((wider.sd[0] / (1.5 * own.sd[0].hypot(0.002)) - 1.0).abs() < 1e-9, "{own:?} {wider:?}");
+        assert!((wider.sd[2] / (2.0 * own.sd[2]) - 1.0).abs() < 1e-9, "{own:?} {wider:?}");
+        assert!(wider.x_95_m.0 < own.x_95_m.0 && wider.x_95_m.1 > own.x_95_m.1);
+    }
 }

@@ -140,6 +140,7 @@ impl Tracker {
         }
         self.whitened = whitened;
         self.time_s = Some(time_s);
+        Tracked::widen_by_check(&mut track.contacts, &*likelihood);
         Ok(track)
     }
 
@@ -421,6 +422,7 @@ impl SmoothTracker {
             if let Some(covariance) = self.drift_covariances.get(k) {
                 widen(covariance, likelihood, contacts);
             }
+            Tracked::widen_by_check(contacts, likelihood);
         }
         Ok(smoothed)
     }

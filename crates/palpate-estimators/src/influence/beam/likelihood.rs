@@ -12,6 +12,7 @@ use super::multi_contact::{contact_fit, first_mode};
 use super::table::InfluenceTable;
 use crate::fit::Locate;
 use crate::force_prior::ForceRange;
+use crate::interval_check::IntervalCheck;
 use crate::likelihood::{
     CalibrationVariance, ContactFit, Geometry, Likelihood, LineLikelihood, Linearisation, UntouchedSurface,
 };
@@ -29,6 +30,7 @@ pub struct BeamLikelihood {
     /// g of the channels in use.
     first_mode: Vec<f64>,
     untouched: UntouchedSurface,
+    interval_check: Option<IntervalCheck>,
 }
 
 impl BeamLikelihood {
@@ -36,13 +38,24 @@ impl BeamLikelihood {
     pub fn new(locator: &BeamLocator) -> Self {
         let table = &locator.search().table;
         let first_mode = (0..table.sensors).map(|s| share_of_first_mode(table, s)).collect();
-        Self { locator: locator.clone(), first_mode, untouched: UntouchedSurface::default() }
+        Self {
+            locator: locator.clone(),
+            first_mode,
+            untouched: UntouchedSurface::default(),
+            interval_check: None,
+        }
     }
 
     /// The likelihood with the scatter and the drift of the untouched surface.
     #[must_use]
     pub(crate) fn with_untouched(self, untouched: UntouchedSurface) -> Self {
         Self { untouched, ..self }
+    }
+
+    /// The likelihood with the check of the locator's intervals.
+    #[must_use]
+    pub(crate) fn with_interval_check(self, interval_check: Option<IntervalCheck>) -> Self {
+        Self { interval_check, ..self }
     }
 
     /// f, f′ and v of the channels in use.
@@ -175,6 +188,10 @@ impl Likelihood for BeamLikelihood {
 
     fn is_residue(&self, reading: &[f64]) -> bool {
         self.untouched.contains(reading)
+    }
+
+    fn interval_check(&self) -> Option<&IntervalCheck> {
+        self.interval_check.as_ref()
     }
 
     fn untouched_drift(&self) -> Option<&UntouchedDrift> {

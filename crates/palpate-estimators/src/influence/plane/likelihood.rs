@@ -7,6 +7,7 @@ use super::search::Search;
 use crate::fit::Locate;
 use crate::force_prior::ForceRange;
 use crate::influence::config::ForceBelief;
+use crate::interval_check::IntervalCheck;
 use crate::likelihood::{
     CalibrationVariance, ContactFit, Geometry, Likelihood, Linearisation, PlaneLikelihood, UntouchedSurface,
 };
@@ -23,6 +24,7 @@ pub struct PlateLikelihood {
     /// The locator's, without what is believed of an unknown force: that is told once, and not with every reading.
     search: Search,
     untouched: UntouchedSurface,
+    interval_check: Option<IntervalCheck>,
 }
 
 impl PlateLikelihood {
@@ -33,6 +35,7 @@ impl PlateLikelihood {
             locator: locator.clone(),
             search: locator.search_with(force),
             untouched: UntouchedSurface::default(),
+            interval_check: None,
         }
     }
 
@@ -40,6 +43,12 @@ impl PlateLikelihood {
     #[must_use]
     pub(crate) fn with_untouched(self, untouched: UntouchedSurface) -> Self {
         Self { untouched, ..self }
+    }
+
+    /// The likelihood with the check of the locator's intervals.
+    #[must_use]
+    pub(crate) fn with_interval_check(self, interval_check: Option<IntervalCheck>) -> Self {
+        Self { interval_check, ..self }
     }
 }
 
@@ -111,6 +120,10 @@ impl Likelihood for PlateLikelihood {
 
     fn is_residue(&self, reading: &[f64]) -> bool {
         self.untouched.contains(reading)
+    }
+
+    fn interval_check(&self) -> Option<&IntervalCheck> {
+        self.interval_check.as_ref()
     }
 
     fn untouched_drift(&self) -> Option<&UntouchedDrift> {
