@@ -415,6 +415,21 @@ def test_regions_hold_as_many_contacts_as_they_say(bench, where):
     assert np.max(np.abs(np.asarray(y) - np.asarray(x))) < 100 * 1.95 / np.sqrt(400) + (0 if where == "line" else 15)
 
 
+@pytest.mark.parametrize("where", ["line", "plane"])
+def test_untouched_readings_have_no_region(bench, where):
+    setup = bench.unknown if where == "line" else bench.plane
+    locator = pp.Influence(source="mechanics").fit(
+        setup.simulate(pp.even(10), force="3 N") if where == "line" else bench.plane_presses
+    )
+    touches = setup.simulate(pp.even(5) if where == "line" else pp.grid(3, 3), force="3 N")
+    readings = np.concatenate([touches.readings, np.zeros((4, touches.readings.shape[1]))])
+    estimates = locator.locate(readings)
+    contacts = int(np.sum(estimates.status != "no_contact"))
+    assert contacts <= len(touches) < len(estimates)
+    regions = [one for one in plot.contacts(setup, estimates).collections if one.get_label() == "95 % region"]
+    assert [len(one.get_paths()) for one in regions] == [contacts]
+
+
 def test_tracks_are_held_beside_the_contact_that_they_are_of(bench):
     ax = plot.track_errors(bench.two_tracked, truth=bench.two)
     first, second = (line.get_ydata() for line in ax.get_lines()[1:3])

@@ -77,7 +77,8 @@ def contacts(setup: Setup | Locator, estimates: Estimates, *, truth: Recording |
 def _over(canvas: Canvas, estimates: Estimates, truth: Recording | None) -> Axes:
     """Contacts over a plane."""
     x, y = 1e3 * estimates.x, 1e3 * (estimates.y if estimates.y is not None else estimates.x)
-    _ellipses(canvas, x, y, 1e6 * estimates.covariance[:, :2, :2])
+    seen = estimates.status != "no_contact"
+    _ellipses(canvas, x[seen], y[seen], 1e6 * estimates.covariance[seen][:, :2, :2])
     if truth is not None:
         _truth(canvas, *(1e3 * truth.positions[truth.touches].T))
     _by_status(canvas, x, y, estimates)
@@ -89,13 +90,14 @@ def _with_force(canvas: Canvas, estimates: Estimates, truth: Recording | None) -
     """Contacts on a line, with their forces."""
     x, force = 1e3 * estimates.x, estimates.force
     to_mm_and_n = np.array([[1e6, 1e3], [1e3, 1.0]])
-    _ellipses(canvas, x, force, estimates.covariance[:, ::2, ::2] * to_mm_and_n)
+    seen = estimates.status != "no_contact"
+    _ellipses(canvas, x[seen], force[seen], estimates.covariance[seen][:, ::2, ::2] * to_mm_and_n)
     if truth is not None:
         known = truth.touches & np.isfinite(truth.force)
         _truth(canvas, 1e3 * truth.x[known], truth.force[known])
     _by_status(canvas, x, force, estimates)
     # Beside an end a region may reach far beyond any contact.
-    strongest = np.nanmax(np.concatenate([force[estimates.status != "no_contact"], [0.0]]))
+    strongest = np.nanmax(np.concatenate([force[seen], [0.0]]))
     canvas.ax.set_ylim(0, min(canvas.ax.get_ylim()[1], 3 * strongest) or None)
     canvas.labels("position, mm", "force, N")
     canvas.legend()
