@@ -11,7 +11,7 @@
 //! critical value c of χ²_b becomes that of b·F with b and ν degrees of freedom, about ν·(e^(c/(ν + b/2 − 1)) − 1) (Bartlett, *Journal of the Royal
 //! Statistical Society B* 9, 1947). R is the sample's, whose eigenvalues scatter more than those of the
 //! surface: with few rests of unrelated channels the test is conservative. Where the deviations have heavier tails than normal ones, the critical value is
-//! at least that of Student's t distribution: see [`tails`].
+//! at least that of Student's t distribution (`tails.rs`).
 
 mod tails;
 
