@@ -78,8 +78,8 @@ def plane(xs, ys):
 
 calibration_and_use(
     strip,
-    np.repeat(np.linspace(0.015, 0.285, 19), 3),
-    np.tile([1.0, 2.0, 5.0], 19),
+    np.repeat(np.linspace(0.015, 0.285, 19), 2),
+    np.tile([2.0, 5.0], 19),
     60,
     "Steel strip of 300 mm with six strain gauges",
     "strip",

@@ -22,6 +22,7 @@ mod outputs;
 mod plane;
 mod positions;
 mod profile;
+mod readme;
 mod recording_check;
 mod recordings;
 mod report_page;
