@@ -1,4 +1,4 @@
-"""Influence functions: what sensors read per newton, as presses told it."""
+"""Influence functions: what sensors read per newton, learnt from presses."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ pub enum Readings<'py> {
 /// one; of a data frame the columns of the channels.
 ///
 /// # Errors
-/// `ValueError` with shapes and bounds for another shape, and for what is no array of numbers.
+/// `ValueError` with shapes and bounds for another shape, and for an object that is not an array of numbers.
 pub fn readings<'py>(value: &Bound<'py, PyAny>, channels: &[String]) -> PyResult<Readings<'py>> {
     let readings = readings_or_none(value, channels)?;
     match &readings {
@@ -35,7 +35,7 @@ pub fn readings<'py>(value: &Bound<'py, PyAny>, channels: &[String]) -> PyResult
     }
 }
 
-/// The same, of which there may be none.
+/// Like it, and there may be no readings.
 ///
 /// # Errors
 /// As of [`readings`], but for the number of rows.
@@ -80,7 +80,7 @@ fn check_channels(shape: &[usize], found: usize, channels: &[String]) -> PyResul
 /// The numbers of a column of `rows` rows.
 ///
 /// # Errors
-/// `ValueError` for another length, and for what is no array of numbers.
+/// `ValueError` for another length, and for an object that is not an array of numbers.
 pub fn column(value: &Bound<'_, PyAny>, name: &str, rows: usize) -> PyResult<Vec<f64>> {
     let numbers = numbers(value, name)?;
     if numbers.len() != rows {
@@ -92,7 +92,7 @@ pub fn column(value: &Bound<'_, PyAny>, name: &str, rows: usize) -> PyResult<Vec
 /// The numbers of an array of one dimension, of any length; each may be a text with a unit.
 ///
 /// # Errors
-/// `ValueError` for what is no array of numbers.
+/// `ValueError` for an object that is not an array of numbers.
 pub fn numbers(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
     let array = value.py().import("palpate._arrays")?.call_method1("column", (value, name))?;
     Ok(array.cast::<PyArray1<f64>>()?.readonly().as_slice()?.to_vec())

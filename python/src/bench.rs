@@ -37,7 +37,7 @@ use crate::work;
 /// force : float or str, optional
 ///     Force of the contacts in newtons or with a unit, where it is known and one for all.
 /// greatest_force : float or str, optional
-///     The greatest that an unknown force can be, on a surface with a model; ten times that of the presses where nothing is said.
+///     The greatest that an unknown force can be, on a surface with a model; by default ten times that of the presses.
 /// force_range : pair of float or str, optional
 ///     Least and greatest force of contacts of unknown force: 1 in 200 is lighter, none is harder. Without it a decade either side of the presses, where
 ///     readings are proportional to the force.
@@ -76,7 +76,7 @@ impl Setup {
         Ok(Self(Arc::new(sections::setup(&text.extract::<String>()?)?)))
     }
 
-    /// The setup that the sections of a rig say; `Rig` reads a whole one.
+    /// The setup of a rig's sections; `Rig` reads a whole one.
     ///
     /// Parameters
     /// ----------
@@ -168,14 +168,14 @@ impl Setup {
         noise.to_pyarray(py)
     }
 
-    /// The same setup touched by contacts of another force, in newtons or with a unit; None for an unknown one.
+    /// This setup with contacts of another force, in newtons or with a unit; None for an unknown one.
     #[pyo3(signature = (force))]
     fn with_force(&self, force: Option<Bound<'_, PyAny>>) -> PyResult<Self> {
         let force_n = force.map(|force| force_n(&force, "force")).transpose()?;
         Ok(Self(Arc::new((*self.0).clone().with_force(force_n).map_err(refused)?)))
     }
 
-    /// The same setup with this noise of every sensor that measures in its unit.
+    /// This setup with this noise of every sensor that measures in its unit.
     ///
     /// Parameters
     /// ----------
@@ -186,7 +186,7 @@ impl Setup {
         Ok(Self(Arc::new((*self.0).clone().with_noise(noise).map_err(refused)?)))
     }
 
-    /// The same setup with the imperfections of a real bench, which its simulations have; None for the faults of the sensors alone.
+    /// This setup with the imperfections of a real bench, which its simulations have; None for the faults of the sensors alone.
     ///
     /// Parameters
     /// ----------
@@ -230,9 +230,9 @@ impl Setup {
     /// training : Training
     ///     Where to press, as `even(10)` makes it.
     /// force : float or str, optional
-    ///     Force of the presses in newtons or with a unit; the training's or the setup's where nothing is said.
+    ///     Force of the presses in newtons or with a unit; by default the training's or the setup's.
     /// repeats : int, optional
-    ///     Presses at each position; the training's where nothing is said.
+    ///     Presses at each position; by default the training's.
     /// seed : int
     ///     Seed of gains, offsets and noise; the same seed gives the same recording.
     ///
@@ -272,7 +272,7 @@ impl Setup {
     /// positions : array_like
     ///     In metres or with units: of the shape (contacts), or (contacts, 2) on a plane.
     /// force : float, str or array_like, optional
-    ///     Force of the contacts, or of each, in newtons or with a unit; the setup's where nothing is said.
+    ///     Force of the contacts, or of each, in newtons or with a unit; by default the setup's.
     /// repeats : int
     ///     Presses by each contact.
     /// seed : int
@@ -311,7 +311,7 @@ impl Setup {
     /// positions : array_like
     ///     In metres or with units: of the shape (contacts), or (contacts, 2) on a plane.
     /// force : float, str or array_like
-    ///     Force of the contacts, or of each; of 1 N where nothing is said: then the readings are the influence functions.
+    ///     Force of the contacts, or of each; by default 1 N: then the readings are the influence functions.
     ///
     /// Returns
     /// -------
@@ -351,7 +351,7 @@ impl Setup {
     /// readings : array_like
     ///     In SI units: one reading of the shape (channels), or many of the shape (readings, channels).
     /// loads : UniformLoad or sequence of UniformLoad, optional
-    ///     True loads, to be held beside the profile.
+    ///     True loads, to compare with the profile.
     /// progress : bool or callable, optional
     ///     As of `Estimator.fit`.
     ///
@@ -375,7 +375,7 @@ impl Setup {
     /// position : float or str
     ///     Position of the contact, in metres or with a unit.
     /// force : float or str, optional
-    ///     Force of the contact in newtons or with a unit; the setup's where nothing is said.
+    ///     Force of the contact in newtons or with a unit; by default the setup's.
     /// points : int
     ///     Points along the line, its ends included.
     ///
@@ -438,7 +438,7 @@ impl Setup {
         Ok(Recording::new(self.0.clone(), recording.map_err(|error| of_csv(&error))?))
     }
 
-    /// A recording from a data frame: one of `Recording.to_frame`, or one whose columns are those of a CSV file, by their roles in `columns` and
+    /// A recording from a data frame: one of `Recording.to_frame`, or one with the columns of a CSV file, by their roles in `columns` and
     /// with units in their names.
     ///
     /// Parameters
@@ -474,7 +474,7 @@ impl Setup {
     /// y : array_like, optional
     ///     Position across a plane, in metres: of the shape (rows).
     /// force : float, str or array_like, optional
-    ///     Force of each contact in newtons, 0 where nothing touches; the setup's where nothing is said.
+    ///     Force of each contact in newtons, 0 for an untouched row; by default the setup's.
     /// nuisance : array_like, optional
     ///     Coordinates that shape the readings and are unknown in use: of the shape (rows) or (rows, coordinates).
     /// time : array_like, optional
@@ -593,7 +593,7 @@ impl Setup {
         let forces_n = self.row_forces(force, count)?;
         let each = forces_n
             .into_iter()
-            .map(|force_n| force_n.ok_or_else(|| refused("`force` is needed: the setup does not know it")));
+            .map(|force_n| force_n.ok_or_else(|| refused("`force` is needed: the setup has none")));
         each.map(|force_n| {
             let force_n = force_n?;
             if force_n > 0.0 && force_n.is_finite() {
@@ -655,7 +655,7 @@ impl Recording {
 
 #[pymethods]
 impl Recording {
-    /// The setup whose sensors recorded it.
+    /// The setup that recorded it.
     #[getter]
     fn setup(&self) -> Setup {
         Setup(self.setup.clone())
@@ -674,7 +674,7 @@ impl Recording {
         values.to_pyarray(py).reshape([self.inner.rows.len(), self.inner.channels.len()])
     }
 
-    /// Position of each contact along the surface, in metres: of the shape (rows). That of a row without contact means nothing.
+    /// Position of each contact along the surface, in metres: of the shape (rows). A row without contact has a position without a meaning.
     #[getter]
     fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.column(py, |row| row.position.x_m)
@@ -694,7 +694,7 @@ impl Recording {
         positions_array(py, &each, self.setup.surface().extent())
     }
 
-    /// Force of each contact in newtons, 0 where nothing touches and NaN where nobody measured it: of the shape (rows).
+    /// Force of each contact in newtons, 0 for an untouched row, and NaN for a force that was not measured: of the shape (rows).
     #[getter]
     fn force<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.column(py, |row| row.force_n.unwrap_or(f64::NAN))
@@ -870,7 +870,7 @@ fn unpacked(((x_m, y_m), force_n, nuisances, time_s, reading): PackedRow) -> Row
 }
 
 impl Recording {
-    /// The recording as CSV; its first line says where it is from.
+    /// The recording as CSV; its first line gives its source.
     fn csv(&self) -> PyResult<Vec<u8>> {
         let version = env!("CARGO_PKG_VERSION");
         let seed = self.inner.provenance.seed.map_or_else(String::new, |seed| format!(", seed {seed}"));

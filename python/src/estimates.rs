@@ -59,7 +59,7 @@ impl Estimate {
         self.contact().force_n
     }
 
-    /// Ends of the 95 % interval along the surface, in metres; None where the method cannot tell.
+    /// Ends of the 95 % interval along the surface, in metres; None for a method without it.
     #[getter]
     fn x_95(&self) -> Option<(f64, f64)> {
         self.contact().uncertainty.map(|uncertainty| uncertainty.x_95_m)
@@ -77,7 +77,7 @@ impl Estimate {
         ContactRecord::new(self.contact(), self.extent).force_interval_95_n().map(<(f64, f64)>::from)
     }
 
-    /// Covariance of (x, y, force), in m², m·N and N²: of the shape (3, 3); None where the method cannot tell. What is not estimated has
+    /// Covariance of (x, y, force), in m², m·N and N²: of the shape (3, 3); None for a method without it. What is not estimated has
     /// zeros.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
@@ -249,7 +249,7 @@ fn whole(on_line: [f64; 3]) -> [f64; 6] {
 /// force : ndarray of float64
 ///     Forces in newtons, NaN where neither known nor estimated: of the shape (readings).
 /// x_95, y_95, force_95 : ndarray of float64
-///     Ends of the 95 % intervals: of the shape (readings, 2); NaN where the method cannot tell, and of a force that is known.
+///     Ends of the 95 % intervals: of the shape (readings, 2); NaN for a method without them, and of a force that is known.
 /// status : ndarray of str
 ///     "located", "no_contact", "ambiguous", "outside_model" or "outside_surface": of the shape (readings).
 #[pyclass(frozen, module = "palpate")]
@@ -342,7 +342,7 @@ impl Estimates {
         self.force.clone_ref(py)
     }
 
-    /// Ends of the 95 % intervals along the surface, in metres, NaN where the method cannot tell: of the shape (readings, 2).
+    /// Ends of the 95 % intervals along the surface, in metres, NaN for a method without them: of the shape (readings, 2).
     #[getter]
     fn x_95(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
         self.x_95.clone_ref(py)
@@ -375,7 +375,7 @@ impl Estimates {
         Ok(PyArray1::from_vec(py, ends.into_flattened()).reshape([forces.len(), 2])?.unbind())
     }
 
-    /// Covariances of (x, y, force), in m², m·N and N²: of the shape (readings, 3, 3). What is not estimated has zeros; NaN where the method cannot tell.
+    /// Covariances of (x, y, force), in m², m·N and N²: of the shape (readings, 3, 3). What is not estimated has zeros; NaN for a method without them.
     #[getter]
     fn covariance(&self, py: Python<'_>) -> PyResult<Py<PyArray3<f64>>> {
         let entries = self.covariance.bind(py).readonly();

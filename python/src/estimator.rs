@@ -25,7 +25,7 @@ use crate::work;
 pub struct Estimator {
     pub setup: Arc<setup::Setup>,
     pub inner: estimator::Estimator,
-    /// The section that says it, where there is one.
+    /// The estimator's section of a rig, where there is one.
     text: Option<String>,
 }
 
@@ -79,7 +79,7 @@ impl Estimator {
     /// recording : Recording
     ///     Readings with their contacts.
     /// seed : int
-    ///     Seed of whatever the method draws at random.
+    ///     Seed of the method's random numbers.
     /// progress : bool or callable, optional
     ///     A progress bar where somebody sees it (the default), `False` for none, `True` for one anywhere, or a function of
     ///     (stage, done, total).
@@ -139,7 +139,7 @@ impl Estimator {
         Ok(Locator::new(locator, choice))
     }
 
-    /// Fit the method once for every seed: the locators of the method alone, without the check that says what their estimates are worth.
+    /// Fit the method once for every seed: the locators of the method alone, without the check of their estimates.
     ///
     /// Networks are trained side by side, as in a study.
     ///
@@ -148,9 +148,9 @@ impl Estimator {
     /// recording : Recording
     ///     Readings with their contacts.
     /// seeds : sequence of int
-    ///     Seeds of whatever the method draws at random.
+    ///     Seeds of the method's random numbers.
     /// threads : int, optional
-    ///     Threads that fit, on which the locators do not depend; as many as the machine has where nothing is said.
+    ///     Threads that fit, on which the locators do not depend; by default as many as the machine has.
     /// progress : bool or callable, optional
     ///     As of `fit`, by seeds that are done.
     ///

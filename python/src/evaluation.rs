@@ -1,4 +1,4 @@
-//! Evaluations: where contacts were, and where a locator says that they were.
+//! Evaluations: true contacts beside the estimates of a locator.
 
 use std::sync::Arc;
 
@@ -118,7 +118,7 @@ impl Evaluation {
         self.field(py, "y")
     }
 
-    /// Forces in newtons, NaN where nobody measured them: of the shape (contacts).
+    /// Forces in newtons, NaN for forces that were not measured: of the shape (contacts).
     #[getter]
     fn force<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.field(py, "force")
@@ -142,25 +142,25 @@ impl Evaluation {
         self.field(py, "error")
     }
 
-    /// 1 where the locator's 95 % region holds the contact, 0 where it does not, NaN where it has none: of the shape (contacts).
+    /// 1 where the locator's 95 % region contains the contact, 0 where it does not, NaN where it has none: of the shape (contacts).
     #[getter]
     fn covered<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.field(py, "covered")
     }
 
-    /// Share of the 95 % regions that hold their contact; None where the locator has none.
+    /// Share of the 95 % regions that contain their contact; None where the locator has none.
     #[getter]
     fn coverage(&self) -> Option<f64> {
         self.inner.coverage_percent().map(|percent| percent / 100.0)
     }
 
-    /// Mean interval score of the 95 % intervals, in metres (Gneiting and Raftery 2007, eq. 43); small where narrow intervals hold their contacts.
+    /// Mean interval score of the 95 % intervals, in metres (Gneiting and Raftery 2007, eq. 43); small where narrow intervals contain their contacts.
     #[getter]
     fn interval_score(&self) -> Option<f64> {
         self.inner.interval_score_m()
     }
 
-    /// Share of the contacts whose estimate has each status, by the status; None where statuses were not kept.
+    /// Share of the contacts for each status of their estimates; None where statuses were not kept.
     ///
     /// Returns
     /// -------
@@ -210,7 +210,7 @@ impl Evaluation {
     /// Parameters
     /// ----------
     /// portion : tuple, optional
-    ///     Start and end of the portion of the surface to be judged, along its length, in metres or with units; all of it where nothing is said.
+    ///     Start and end of the portion of the surface to be judged, along its length, in metres or with units; by default all of it.
     /// percent : bool
     ///     In % of the length instead of metres: the founding paper's percentage error.
     ///
@@ -258,12 +258,12 @@ impl Evaluation {
         Ok(fields.into_dict())
     }
 
-    /// Share of the contacts whose error is within a tolerance; with contacts evenly over the surface the effective length, or area.
+    /// Share of the contacts with an error within a tolerance; with contacts evenly over the surface the effective length, or area.
     ///
     /// Parameters
     /// ----------
     /// tolerance : float or str
-    ///     In metres or with a unit; 2 mm where nothing is said.
+    ///     In metres or with a unit; 2 mm by default.
     #[pyo3(signature = (tolerance=None))]
     fn effective_length(&self, tolerance: Option<Bound<'_, PyAny>>) -> PyResult<f64> {
         let tolerance_m = tolerance.map_or(Ok(2e-3), |tolerance| length_m(&tolerance, "tolerance"))?;

@@ -1,6 +1,6 @@
 //! The Python package of palpate: the facade's types as classes, readings as arrays.
 //!
-//! Each file holds one concept. What is written in Python (`python/palpate`) is what needs no speed: sections of a rig as data classes, the
+//! Each file has one concept. What is written in Python (`python/palpate`) is what needs no speed: sections of a rig as data classes, the
 //! showing of progress, figures, the estimators of scikit-learn.
 #![forbid(unsafe_code)]
 #![expect(clippy::needless_pass_by_value, reason = "PyO3 extracts arguments by value")]

@@ -92,7 +92,7 @@ pub fn simulate_loads<'py>(
         (None, _) => Vec::new(),
     };
     if loads.is_empty() {
-        return Err(refused("there is no load to simulate; give at least one `UniformLoad`"));
+        return Err(refused("no load to simulate was given; give at least one `UniformLoad`"));
     }
     if repeats == 0 {
         return Err(refused("`repeats` is 0; it must be at least 1"));
@@ -101,14 +101,14 @@ pub fn simulate_loads<'py>(
     Fields::of_rows(py, &readings)
 }
 
-/// Loads by the sections that say them.
+/// Loads of the sections of a rig.
 fn uniform_loads(text: &str, setup: &setup::Setup) -> PyResult<Vec<UniformLoad>> {
     let sections = RigSections::from_toml(text);
     let loads = sections.and_then(|sections| sections.loads(setup.surface()));
     loads.map_err(|error| of_rig(&error, "load", text))
 }
 
-/// The cause for which there is no profile.
+/// Reason for a missing profile.
 enum Refused {
     Sensors(LoadSensorsError),
     /// A reading, by its index, and what is wrong with it.

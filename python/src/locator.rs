@@ -24,7 +24,7 @@ use crate::methods;
 use crate::tare;
 use crate::work;
 
-/// A locator: a fitted method with its setup, so that nothing it needs is outside it.
+/// A locator: a fitted method with its setup, complete in itself.
 ///
 /// `fit` of an estimator makes one, and `Locator.load` reads one from its file.
 #[pyclass(frozen, module = "palpate")]
@@ -104,7 +104,7 @@ impl Locator {
     /// Raises
     /// ------
     /// PalpateError
-    ///     Where calibration does not tell what the surface reads untouched.
+    ///     For a calibration without the untouched reading.
     #[pyo3(signature = (readings, *, untouched=None))]
     fn tare<'py>(
         &self,
@@ -114,12 +114,12 @@ impl Locator {
         tare::tare(&self.inner, &self.channels, readings, untouched)
     }
 
-    /// Judge the locator: locate the contacts of a recording, and hold the estimates beside where they were.
+    /// Judge the locator: locate the contacts of a recording, and compare the estimates with their true positions.
     ///
     /// Parameters
     /// ----------
     /// recording : Recording, optional
-    ///     A recording of the same sensors; where nothing is said the surface is simulated, pressed all over.
+    ///     A recording of the same sensors; by default the surface is simulated, pressed all over.
     /// seed : int
     ///     Seed of the simulation.
     /// tare : "auto", int or array_like, optional
@@ -156,7 +156,7 @@ impl Locator {
             Some(recording) => {
                 let digests = &recording.inner.provenance.digests;
                 if !digests.is_empty() && *digests == self.inner.provenance.recording.digests {
-                    let message = c"the locator was fitted to this very recording; at positions that it has not seen it is worse: cross_validate tells how much";
+                    let message = c"the locator was fitted to this very recording; at positions that it has not seen it is worse: cross_validate gives its errors there";
                     PyErr::warn(py, &py.get_type::<PyUserWarning>(), message, 1)?;
                 }
                 match tare {
@@ -276,7 +276,7 @@ impl Locator {
     /// readings : array_like
     ///     In SI units: one reading of the shape (channels), or many of the shape (readings, channels).
     /// loads : UniformLoad or sequence of UniformLoad, optional
-    ///     True loads, to be held beside the profile.
+    ///     True loads, to compare with the profile.
     /// progress : bool or callable, optional
     ///     As of `Estimator.fit`.
     ///
@@ -299,7 +299,7 @@ impl Locator {
         self.inner.kind()
     }
 
-    /// The setup whose readings it locates.
+    /// The setup of its readings.
     #[getter]
     fn setup(&self) -> Setup {
         Setup(self.setup.clone())
@@ -354,7 +354,7 @@ impl Locator {
     /// Raises
     /// ------
     /// PalpateError
-    ///     For a method without any, such as a network, and for readings that are no multiple of the force.
+    ///     For a method without any, such as a network, and for readings that are not a multiple of the force.
     fn influence_functions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let learnt = self.inner.influences_at_nodes().ok_or_else(|| {
             refused(format!(
@@ -394,7 +394,7 @@ impl Locator {
         let name = path.display().to_string();
         let text = String::from_utf8(bytes).map_err(|error| {
             let at = error.utf8_error().valid_up_to();
-            refused(format!("{name} is not UTF-8 text: byte {} is no character", at + 1))
+            refused(format!("{name} is not UTF-8 text: byte {} is not a character", at + 1))
         })?;
         let locator = py.detach(|| estimator::Locator::from_json(&text));
         Ok(Self::new(locator.map_err(|error| of_locator(&error, &name, &text))?, None))

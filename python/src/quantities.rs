@@ -78,12 +78,12 @@ pub fn share(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
 /// Returns
 /// -------
 /// tuple of (float, str)
-///     Its value in SI units, and what it is: "a length".
+///     The value in SI units, and the name of the quantity: "a length".
 ///
 /// Raises
 /// ------
 /// PalpateError
-///     For a text that is no quantity, or a unit that is not known.
+///     For a text that is not a quantity, or an unknown unit.
 #[pyfunction]
 pub fn parse_quantity(text: &str) -> PyResult<(f64, &'static str)> {
     let quantity: Quantity = text.parse().map_err(refused)?;

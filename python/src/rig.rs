@@ -1,4 +1,4 @@
-//! Rigs: one TOML file that says what is on the bench.
+//! Rigs: one TOML file that describes the bench.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ impl Rig {
 
 #[pymethods]
 impl Rig {
-    /// The rig that a text in TOML says.
+    /// The rig of a text in TOML.
     ///
     /// Raises
     /// ------

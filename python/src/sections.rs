@@ -1,4 +1,4 @@
-//! Sections of a rig that are held apart: a setup's, an estimator's.
+//! Sections of a rig that are kept apart: a setup's, an estimator's.
 
 use palpate::design::sensors::SensorDesign;
 use palpate::estimators::estimator::Estimator;
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::errors::{of_rig, refused};
 
-/// The setup that a rig's sections say.
+/// The setup of a rig's sections.
 ///
 /// # Errors
 /// `FileError`, with the place.
@@ -28,7 +28,7 @@ pub fn with_imperfections(text: &str, setup: &Setup) -> PyResult<Setup> {
     setup.map_err(|error| of_rig(&error, "imperfections", text))
 }
 
-/// The estimator that a section says, for a setup.
+/// The estimator of a section, for a setup.
 ///
 /// # Errors
 /// `FileError`, with the place.
@@ -39,7 +39,7 @@ pub fn estimator(text: &str, setup: &Setup) -> PyResult<Estimator> {
     estimator.ok_or_else(|| refused("the text has no section [estimator]"))
 }
 
-/// The sensor design that a section says, for a setup.
+/// The sensor design of a section, for a setup.
 ///
 /// # Errors
 /// `FileError`, with the place.

@@ -35,7 +35,7 @@ pub fn paper_study() -> &'static str {
     paper::STUDY_TOML
 }
 
-/// Name, arms, seeds by default, digest and precision of the study that a text in TOML says.
+/// Name, arms, seeds by default, digest and precision of the study of a text in TOML.
 #[pyfunction]
 pub fn read_study<'py>(py: Python<'py>, source: &str, text: &str) -> PyResult<Bound<'py, PyDict>> {
     let study = rig::Study::from_toml(text).map_err(|error| of_rig(&error, source, text))?;

@@ -49,7 +49,7 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Share of untouched readings that may be taken for a contact, by its settings.
+    /// Share of untouched readings that may be mistaken for a contact, by its settings.
     pub fn false_alarm_rate(&self) -> FalseAlarmRate {
         let set = match self {
             Self::Setup(_) => None,

@@ -1,4 +1,4 @@
-//! Surfaces as they are drawn: what holds them, and their shape under a contact.
+//! Surfaces as they are drawn: their supports, and their shape under a contact.
 
 use palpate::mechanics::contact::{Contact, OffSurface, Position};
 use palpate::mechanics::sensing::SensorKind;
@@ -15,7 +15,7 @@ use crate::errors::refused;
 pub fn bent_line(surface: &SurfaceSpec, contact: Contact, points: usize) -> PyResult<Vec<[f64; 2]>> {
     let model = surface.model().ok_or_else(|| refused("a measured surface has no model"))?;
     if let Extent::Plane { .. } = model.extent() {
-        return Err(refused("a plane has no bent line; `response` tells what its sensors read"));
+        return Err(refused("a plane has no bent line; `response` gives the readings of its sensors"));
     }
     if points < 2 {
         return Err(refused(format!("`points` is {points}; it must be at least 2")));
@@ -56,7 +56,7 @@ pub fn support_kinds(surface: &SurfaceSpec) -> Vec<&'static str> {
     }
 }
 
-/// Each edge of a plate with what holds it; `None` of another surface.
+/// Each edge of a plate with its support; `None` of another surface.
 pub fn edges(surface: &SurfaceSpec) -> Option<[(&'static str, &'static str); 4]> {
     let SurfaceSpec::Plate(plate) = surface else { return None };
     let edges = plate.spec().edges;

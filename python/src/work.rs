@@ -46,7 +46,7 @@ where
     run_with(py, progress, rounds, work)?.map_err(|error| of_work(&error))
 }
 
-/// The same, without a show of progress: of work that is mostly short.
+/// Like it, without a show of progress, for work that is mostly short.
 pub fn run_quietly<T, E>(py: Python<'_>, work: impl FnOnce(Watch<'_>) -> Result<T, E> + Send) -> PyResult<T>
 where
     T: Send,
@@ -110,7 +110,7 @@ pub fn run_with<T: Send>(
     })
 }
 
-/// Waits for the work a little, and says whether it has ended: then the channel is closed.
+/// Waits for the work a little, and returns whether it has ended: then the channel is closed.
 fn wait(finished: &mpsc::Receiver<()>) -> bool {
     finished.recv_timeout(LOOK) == Err(mpsc::RecvTimeoutError::Disconnected)
 }
@@ -127,7 +127,7 @@ struct Shown<'py> {
 
 impl<'py> Shown<'py> {
     fn new(wanted: Option<&Bound<'py, PyAny>>, rounds: Option<u64>) -> Self {
-        // A function wants to be told from the beginning.
+        // A function is called from the beginning.
         let next =
             if wanted.is_some_and(|wanted| wanted.is_callable()) { Duration::ZERO } else { SHOW_AFTER };
         Self { wanted: wanted.cloned(), rounds, begun: Instant::now(), next, by: None }

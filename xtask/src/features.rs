@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
-/// Features whose dependencies take minutes to compile: `cargo xtask wire` checks them, `cargo xtask test` leaves them out.
+/// Features with dependencies that take minutes to compile: `cargo xtask wire` checks them, `cargo xtask test` leaves them out.
 const SLOW: [&str; 2] = ["foxglove", "ros"];
 
 /// Every crate with the features that are off by default but the slow ones, as arguments of cargo.

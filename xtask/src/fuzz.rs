@@ -31,7 +31,7 @@ pub fn list(root: &Path) -> Result<bool> {
     Ok(true)
 }
 
-/// Builds a target and fuzzes for a while; true when nothing was found. What crashes it is kept in `fuzz/artifacts`.
+/// Builds a target and fuzzes for a while; true without a finding. What crashes it is kept in `fuzz/artifacts`.
 pub fn run(root: &Path, target: &str, seconds: u32) -> Result<bool> {
     let known = targets(root)?;
     if !known.iter().any(|name| name == target) {

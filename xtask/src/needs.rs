@@ -1,4 +1,4 @@
-//! Prerequisites of the tests beyond Rust: how each is found and installed, and which tests do without it.
+//! Prerequisites of the tests beyond Rust: how to find and install each, and which tests run without it.
 
 use std::env;
 use std::ffi::OsString;
@@ -14,9 +14,9 @@ use crate::run;
 pub struct Need {
     /// Name for people.
     pub name: &'static str,
-    /// An environment variable that says where it is, and so that it need not be installed.
+    /// An environment variable with its place, for a program that is installed elsewhere.
     variable: Option<&'static str>,
-    /// Whether it is where it usually is, or where the variable says.
+    /// Whether it is at its usual place, or at that of the variable.
     found: fn(&Path, Option<&Path>) -> bool,
     /// Debian packages that bring it, which are installed when this runs as root on Debian.
     packages: &'static [&'static str],
@@ -29,7 +29,7 @@ pub struct Need {
 pub enum Without {
     /// These tests are skipped, until a person does what `remedy` says.
     Skips {
-        /// The files that hold the tests.
+        /// The files with the tests.
         tests: &'static [&'static str],
         /// Remedy for people.
         remedy: &'static str,

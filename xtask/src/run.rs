@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, Result};
 
-/// Result of a command whose output was kept.
+/// Result of a command, with its output.
 pub struct Kept {
     /// Whether it exited with 0.
     pub succeeded: bool,
@@ -20,7 +20,7 @@ pub fn joined<T>(thread: JoinHandle<T>) -> T {
     thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
-/// Runs a command with nothing on its standard input; true when it exits with 0.
+/// Runs a command with an empty standard input; true when it exits with 0.
 pub fn shown(command: &mut Command) -> Result<bool> {
     let status = command.stdin(Stdio::null()).status().with_context(|| cannot_start(command))?;
     Ok(status.success())
@@ -53,7 +53,7 @@ pub fn kept(command: &mut Command) -> Result<Kept> {
     Ok(Kept { succeeded: output.status.success(), lines })
 }
 
-/// True when the program can be started and exits with 0, whatever it prints.
+/// True when the program can be started and exits with 0.
 pub fn answers(program: &str, arguments: &[&str]) -> bool {
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());

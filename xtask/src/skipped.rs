@@ -25,7 +25,7 @@ pub enum Skips {
 /// The file of one run.
 #[derive(Clone)]
 pub struct Skipped {
-    /// Its path.
+    /// The path.
     pub file: PathBuf,
 }
 

@@ -35,7 +35,7 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     let everything = [workspace.as_str(), &with, &features];
     let tested = [&everything[..], &TARGETS].concat();
     let prerequisites = step("prerequisites", || prerequisites(root, skips, &mut missing))?;
-    // Python's environment and the dashboard are made while the compiler waits for one crate or another; the server holds the dashboard.
+    // Python's environment and the dashboard are made while the compiler waits for one crate or another; the server contains the dashboard.
     let environment = python::make_environment(root);
     let dashboard = dashboard::begin_build(root);
     let mut steps = vec![

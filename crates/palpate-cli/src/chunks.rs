@@ -1,4 +1,4 @@
-//! Bytes of a file or of stdin as they come. A signal ends the wait for them.
+//! Bytes of a file or of stdin as they arrive. A signal ends the wait for them.
 
 use crate::failure::{Complaint, Failure};
 use crate::progress;
@@ -9,23 +9,23 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
-/// Bytes of a source, read by a thread of its own, as a read that waits cannot be called off.
+/// Bytes of a source. A separate thread reads them, as a blocking read cannot be cancelled.
 pub struct Chunks {
     /// Name of the source: the file, or "stdin".
     pub name: String,
-    /// Messages of the thread that reads: an empty one once the source is open, then chunks until it ends.
+    /// Messages of the reading thread: an empty one after the source is opened, then chunks until the end.
     chunks: Receiver<io::Result<Vec<u8>>>,
 }
 
-/// Most bytes of a chunk.
+/// Largest size of a chunk, in bytes.
 const CHUNK: usize = 1 << 16;
-/// Chunks that are read ahead.
+/// Number of chunks that are read ahead.
 const AHEAD: usize = 4;
-/// Time between two looks whether a signal came.
+/// Interval between two checks for a signal.
 const LOOK: Duration = Duration::from_millis(50);
 
 impl Chunks {
-    /// Those of a file; `-` is stdin.
+    /// Opens a file; `-` is stdin.
     pub fn open(path: &Path) -> Result<Self, Failure> {
         if path != Path::new("-") {
             return Self::of_file(path);
@@ -36,7 +36,7 @@ impl Chunks {
         Self::read(None, "stdin".to_owned())
     }
 
-    /// Those of a file, whatever its name.
+    /// Opens a file, also one with the name `-`.
     pub fn of_file(path: &Path) -> Result<Self, Failure> {
         Self::read(Some(path.to_owned()), path.display().to_string())
     }
@@ -53,7 +53,7 @@ impl Chunks {
     /// The next bytes, at least one; `None` after the last.
     ///
     /// # Errors
-    /// A complaint where the source cannot be read, and [`Failure::Interrupted`] once a signal came.
+    /// A complaint if the source cannot be read, and [`Failure::Interrupted`] after a signal.
     pub fn next(&mut self) -> Result<Option<Vec<u8>>, Failure> {
         loop {
             if progress::interrupted() {
@@ -68,14 +68,15 @@ impl Chunks {
         }
     }
 
-    /// All bytes of a text up to its end. No text but UTF-16 with a byte-order mark has a zero byte, and a device that never ends has.
+    /// All bytes of a text up to its end. A zero byte is an error except in UTF-16 with a byte-order mark: a device without an end
+    /// has zero bytes.
     pub fn read_to_end(mut self) -> Result<Vec<u8>, Failure> {
         let mut bytes = Vec::new();
         while let Some(chunk) = self.next()? {
             let begins: &[u8] = if bytes.is_empty() { &chunk } else { &bytes };
             let is_utf16 = begins.starts_with(b"\xff\xfe") || begins.starts_with(b"\xfe\xff");
             if let Some(at) = chunk.iter().position(|byte| *byte == 0).filter(|_| !is_utf16) {
-                let complaint = format!("{} is no text: byte {} is 0", self.name, bytes.len() + at + 1);
+                let complaint = format!("{} is not text: byte {} is 0", self.name, bytes.len() + at + 1);
                 return Err(Complaint::new(complaint).help("save it as UTF-8").into());
             }
             bytes.extend(chunk);
@@ -84,7 +85,7 @@ impl Chunks {
     }
 }
 
-/// Sends an empty chunk once the source is open, and then all that it holds; of stdin where there is no path.
+/// Sends an empty chunk after the source is opened, then all of its bytes; without a path, those of stdin.
 fn send_all(path: Option<PathBuf>, to: &SyncSender<io::Result<Vec<u8>>>) {
     let source: io::Result<Box<dyn Read>> = match path {
         None => Ok(Box::new(io::stdin().lock())),
@@ -94,7 +95,7 @@ fn send_all(path: Option<PathBuf>, to: &SyncSender<io::Result<Vec<u8>>>) {
         Ok(source) => source,
         Err(error) => return drop(to.send(Err(error))),
     };
-    // Whoever listened may have left, which ends the reading.
+    // The reading ends if the receiver is gone.
     let mut listens = to.send(Ok(Vec::new())).is_ok();
     let mut buffer = vec![0; CHUNK];
     while listens {

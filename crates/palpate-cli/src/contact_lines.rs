@@ -1,19 +1,19 @@
-//! Lines about contacts for people: where one begins, changes and ends.
+//! Text lines about contacts: their beginnings, changes and ends.
 
 use palpate_estimators::estimator::{Track, Tracked};
 use palpate_mechanics::units::format_count;
 
-/// Shortest time between two lines about changes of a contact: people read no faster.
+/// Shortest time between two lines about changes of a contact, for readability.
 const BETWEEN_CHANGES_S: f64 = 1.0;
 
 /// Lines about the contacts of tracks.
 ///
-/// A contact has a line at its beginning and at its end. Between them it has one where its position or force leaves the 95 % interval of
-/// the line before, at most once in [`BETWEEN_CHANGES_S`].
+/// A contact has a line at its beginning and at its end. Between them it has one each time its position or force leaves the 95 %
+/// interval of the last line, at most once in [`BETWEEN_CHANGES_S`].
 #[derive(Default)]
 pub struct ContactLines {
     contacts: [Option<Line>; 2],
-    /// Contacts that have begun.
+    /// Number of contacts so far.
     begun: u64,
     readings: u64,
 }
@@ -29,7 +29,7 @@ struct Line {
 }
 
 impl ContactLines {
-    /// The lines about what changes with a track, each with its end.
+    /// The lines about changes in a track, each with its line end.
     pub fn lines(&mut self, track: &Track) -> String {
         self.readings += 1;
         let time_s = track.time_s;
@@ -72,7 +72,7 @@ impl ContactLines {
     }
 }
 
-/// True where position or force is outside the 95 % interval of another time.
+/// True if position or force is outside the 95 % interval of the earlier track.
 fn has_changed(before: &Tracked, now: &Tracked) -> bool {
     let is_outside = |value: f64, (low, high): (f64, f64)| value < low || value > high;
     let has_moved_across =
@@ -96,16 +96,16 @@ fn describe_contact(contact: &Tracked) -> String {
     }
 }
 
-/// A value with its interval, whose last digit is the first of the interval's half width.
+/// A value with its interval, rounded to the first digit of the interval's half width.
 fn with_interval(value: f64, (low, high): (f64, f64), unit: &str) -> String {
     let digit = (0.5 * (high - low)).log10().floor();
     let number = |value: f64| format_to_digit(value, digit);
     format!("{} {unit} ({} to {})", number(value), number(low), number(high))
 }
 
-/// Most decimals of a number, where its interval has no width.
+/// Largest number of decimals, for an interval without width.
 const MOST_DECIMALS: f64 = 4.0;
-/// Numbers from which on powers of ten are shorter to read.
+/// Numbers from this on are printed with powers of ten.
 const LARGE: f64 = 1e7;
 
 /// A number rounded to a multiple of 10^`digit`.
@@ -113,7 +113,7 @@ fn format_to_digit(value: f64, digit: f64) -> String {
     if !value.is_finite() || value.abs() >= LARGE {
         return format!("{value:.1e}");
     }
-    // An interval without width, or without bounds, does not say how many digits are certain.
+    // An interval without width or with infinite bounds does not determine the number of digits.
     let digit = if digit.is_finite() { digit.max(-MOST_DECIMALS) } else { -MOST_DECIMALS };
     let step = 10.0_f64.powf(digit);
     let rounded = (value / step).round() * step;

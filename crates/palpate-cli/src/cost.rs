@@ -1,4 +1,4 @@
-//! The cost of long work, told before it is begun, and refused where it exceeds the limit.
+//! The cost of long work, announced before its start; work above the limit is refused.
 
 use crate::failure::{Complaint, Failure};
 use crate::progress::duration;
@@ -15,14 +15,14 @@ pub struct MemoryOption {
     memory_limit: Option<MemoryLimit>,
 }
 
-/// A fit that takes longer, or more memory, is announced.
+/// A fit with more time or memory than this is announced.
 const NOTICEABLE: FitCost = FitCost { memory_bytes: 500e6, seconds: 5.0 };
 
-/// The same of other work, in seconds, which is short as a rule.
+/// Other work with more time than this, in seconds, is announced; it is usually short.
 const NOTICEABLE_WORK_S: f64 = 3.0;
 
 impl MemoryOption {
-    /// Announces a fit of estimated cost that takes long, and refuses one that takes more memory than it may.
+    /// Announces a fit with a long estimated time, and refuses one above the memory limit.
     pub fn check(
         &self,
         estimator: &Estimator,
@@ -41,13 +41,13 @@ impl MemoryOption {
         Ok(())
     }
 
-    /// Reason why an estimator may not be fitted; `None` where it may.
+    /// Reason why an estimator may not be fitted; `None` if it may.
     pub fn refusal(&self, estimator: &Estimator, cost: FitCost) -> Option<String> {
         let exceeded = self.memory_limit?.check_fit(estimator, cost).err()?;
         Some(exceeded.to_string())
     }
 
-    /// Announces other work where it is noticeable, and refuses what needs more memory than it may.
+    /// Announces other work if it is long, and refuses work above the memory limit.
     pub fn check_work(
         &self,
         what: &str,

@@ -5,25 +5,25 @@ use palpate_estimators::estimator::{Locator, Status};
 use palpate_estimators::recording::csv_row;
 use palpate_mechanics::surface::Extent;
 
-/// Columns of estimates, behind those of their readings. Cells of what a locator does not estimate are empty.
+/// Columns of estimates, after those of their readings. Cells are empty for values that a locator does not estimate.
 #[derive(Clone, Copy)]
 pub struct EstimateColumns {
     extent: Extent,
-    /// Largest number of contacts of an estimate.
+    /// Largest number of contacts in an estimate.
     contacts: usize,
     guesses: Guesses,
 }
 
-/// Rows that have the best guess of a contact.
+/// Rows that contain the best estimate of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guesses {
-    /// Those that are neither `no_contact` nor `outside_model`, so that averages over a column are of contacts.
+    /// Rows that are neither `no_contact` nor `outside_model`, so that averages over a column are of contacts.
     OfContacts,
     OfAll,
 }
 
 impl Guesses {
-    /// The rows by the option `--all`.
+    /// The rows for the option `--all`.
     pub fn by_option(all: bool) -> Self {
         if all { Self::OfAll } else { Self::OfContacts }
     }
@@ -36,7 +36,7 @@ impl EstimateColumns {
         Self { extent, contacts: locator.most_contacts(), guesses }
     }
 
-    /// Line of the headings; `first` are those of the readings.
+    /// Header line; `first` are the headings of the readings.
     pub fn heading(self, first: &str) -> String {
         let contact = match self.extent {
             Extent::Line { .. } => "position_mm,force_n,low_mm,high_mm,force_low_n,force_high_n",

@@ -15,22 +15,22 @@ use std::process::ExitCode;
 /// Outcome of a command that did not simply succeed.
 #[derive(Debug)]
 pub enum Failure {
-    /// Exit code 1: it ran, but a stated goal was missed.
+    /// Exit code 1: the command ran, but a stated goal was missed.
     GoalMissed(String),
-    /// Exit code 2: bad input; nothing was written.
+    /// Exit code 2: bad input; no file was written.
     BadInput(Box<Complaint>),
-    /// Exit code 3: it finished, but data was lost; the places were reported as they came.
+    /// Exit code 3: the command finished, but data was lost; the places were reported as they occurred.
     DataLost(String),
     /// Exit code 128 and the signal: 130 after Ctrl-C, 143 after SIGTERM.
     Interrupted(String),
-    /// Whoever read our output stopped reading, which is their right.
+    /// The reader of our output has closed it, which is allowed.
     NobodyReads,
 }
 
 impl Failure {
-    /// A signal before anything was written.
+    /// A signal before any output.
     pub fn stopped() -> Self {
-        Self::Interrupted("stopped; nothing was written".to_owned())
+        Self::Interrupted("stopped; no file was written".to_owned())
     }
 
     /// Failure of long work that ended early: it was stopped, or its input is bad.
@@ -38,7 +38,7 @@ impl Failure {
         if Cancelled::caused(error) { Self::stopped() } else { Complaint::new(error).into() }
     }
 
-    /// The same of work about whose input `complaint` says more.
+    /// Failure of long work that ended early, with a `complaint` that gives details about bad input.
     pub fn of_work<E>(error: E, complaint: impl FnOnce(E) -> Complaint) -> Self
     where
         E: std::error::Error + 'static,
@@ -46,7 +46,7 @@ impl Failure {
         if Cancelled::caused(&error) { Self::stopped() } else { complaint(error).into() }
     }
 
-    /// Prints the message on stderr, and gives the exit code.
+    /// Prints the message on stderr, and returns the exit code.
     pub fn report(self) -> ExitCode {
         let (message, code) = match self {
             Self::BadInput(complaint) => {
@@ -71,7 +71,7 @@ pub struct Complaint {
     excerpt: Option<Excerpt>,
 }
 
-/// A line of a file with the part that is meant.
+/// A line of a file with the relevant part.
 #[derive(Debug)]
 struct Excerpt {
     file: String,
@@ -87,7 +87,7 @@ impl Complaint {
         Self { message: message.to_string(), help: None, excerpt: None }
     }
 
-    /// A complaint about a file, of which no place is known.
+    /// A complaint about a file at an unknown place.
     pub fn about(path: &Path, problem: impl fmt::Display) -> Self {
         Self::new(format!("{}: {problem}", path.display()))
     }
@@ -109,9 +109,9 @@ impl Complaint {
         self.at_line(file, line + 1, &text[line_start..line_end], span)
     }
 
-    /// Adds the place: bytes `span` of line number `line` (from 1), which reads `text`.
+    /// Adds the place: bytes `span` of line number `line` (from 1), which has the content `text`.
     pub fn at_line(mut self, file: &str, line: usize, text: &str, span: Range<usize>) -> Self {
-        // A very long line, as networks.csv has them, would drown the message.
+        // A very long line, as in networks.csv, would make the message unreadable.
         const MOST: usize = 400;
         let begin = floor_char(text, span.start.saturating_sub(MOST / 2));
         let text = &text[begin..floor_char(text, begin + MOST)];

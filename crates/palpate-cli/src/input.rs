@@ -1,4 +1,4 @@
-//! Input of a command: palpate's files, with complaints that point at the place, and quantities.
+//! Input of a command: palpate's files, with complaints that show the place, and quantities.
 
 use crate::chunks::Chunks;
 use crate::failure::{Complaint, Failure};
@@ -12,52 +12,52 @@ use palpate_rig::{Rig, RigError};
 use palpate_studies::Study;
 use std::path::{Path, PathBuf};
 
-/// The text of a file.
+/// Reads the text of a file.
 pub fn read_text(path: &Path) -> Result<String, Failure> {
     let bytes = read_bytes(path)?;
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
-        Complaint::new(format!("{} is not UTF-8 text: byte {} is no character", path.display(), at + 1))
+        Complaint::new(format!("{} is not UTF-8 text: byte {} is not a character", path.display(), at + 1))
             .into()
     })
 }
 
-/// The bytes of a file.
+/// Reads the bytes of a file.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Failure> {
     Chunks::of_file(path)?.read_to_end()
 }
 
-/// A rig, from its file.
+/// Reads a rig from its file.
 pub fn read_rig(path: &Path) -> Result<Rig, Failure> {
     parse_rig(path, &read_text(path)?)
 }
 
-/// A rig, from its file's text.
+/// Parses a rig from its file's text.
 pub fn parse_rig(path: &Path, text: &str) -> Result<Rig, Failure> {
     Rig::from_toml(text).map_err(|error| rig_complaint(error, path, text))
 }
 
-/// A study, from its file's text.
+/// Parses a study from its file's text.
 pub fn parse_study(name: &str, text: &str) -> Result<Study, Failure> {
     Study::from_toml(text).map_err(|error| rig_complaint(error, Path::new(name), text))
 }
 
-/// A locator, from its file.
+/// Reads a locator from its file.
 pub fn read_locator(path: &Path) -> Result<Locator, Failure> {
     parse_locator(path, &read_text(path)?)
 }
 
-/// A locator, from its file's text.
+/// Parses a locator from its file's text.
 pub fn parse_locator(path: &Path, text: &str) -> Result<Locator, Failure> {
     Locator::from_json(text).map_err(|error| locator_complaint(&error, path, text).into())
 }
 
-/// True for a file whose name ends in `.toml`: a rig or a study.
+/// True for a file name that ends in `.toml`: a rig or a study.
 pub fn is_toml(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
 
-/// A rig or a locator, either of which knows its bench.
+/// A rig or a locator. Both contain a bench.
 pub enum RigOrLocator {
     Rig(Box<Rig>),
     Locator(Box<Locator>),
@@ -92,12 +92,12 @@ pub struct RecordingFiles {
 }
 
 impl RecordingFiles {
-    /// The files that are named.
+    /// The files in these options.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         [&self.data, &self.contacts].into_iter().flatten().map(PathBuf::as_path)
     }
 
-    /// The recording of this bench, with its dialect and its warnings said on stderr; `None` where no file is named.
+    /// Reads the recording of this bench, and writes its dialect and its warnings to stderr; `None` without a file.
     pub fn read(&self, setup: &Setup) -> Result<Option<Recording>, Failure> {
         let Some(data) = &self.data else { return Ok(None) };
         let Some(contacts) = &self.contacts else { return read_recording(setup, data).map(Some) };
@@ -109,18 +109,18 @@ impl RecordingFiles {
     }
 }
 
-/// A recording of a bench in one file, with its dialect and its warnings said on stderr.
+/// Reads a recording of a bench from one file, and writes its dialect and its warnings to stderr.
 pub fn read_recording(setup: &Setup, path: &Path) -> Result<Recording, Failure> {
     read_recording_as(setup, path, &setup.recording_columns())
 }
 
-/// The same of a file with these columns.
+/// Reads a recording with these columns from one file, and writes its dialect and its warnings to stderr.
 pub fn read_recording_as(setup: &Setup, path: &Path, columns: &Columns) -> Result<Recording, Failure> {
     let (bytes, name) = (read_bytes(path)?, path.display().to_string());
     with_warnings(setup, recording::read(&name, bytes.as_slice(), &setup.schema(columns)), &name)
 }
 
-/// The recording, after its dialect, its warnings and its mismatches with the setup were written to stderr.
+/// The recording, after its dialect, its warnings and its mismatches with the setup are written to stderr.
 fn with_warnings(
     setup: &Setup,
     recording: Result<Recording, CsvError>,
@@ -134,22 +134,23 @@ fn with_warnings(
     Ok(recording)
 }
 
-/// Says on stderr how the files of a recording write their tables, where that is not plainly.
+/// Writes to stderr how the files of a recording format their tables, if the format differs from the standard one.
 pub fn say_dialects(recording: &Recording) {
     recording.provenance.dialects.iter().for_each(|dialect| remark!("{}: {dialect}", dialect.source));
 }
 
-/// A length in metres, from a command line argument.
+/// A length in metres, from a command-line argument.
 pub fn length(text: &str) -> Result<f64, String> {
     greater_than_0(text, Quantity::parse_as(text, Dimension::Length), |length_m| *length_m)
 }
 
-/// A force in newtons, from a command line argument.
+/// A force in newtons, from a command-line argument.
 pub fn force(text: &str) -> Result<f64, String> {
     greater_than_0(text, Quantity::parse_as(text, Dimension::Force), |force_n| *force_n)
 }
 
-/// A frequency in hertz, from a command line argument: one whose period is a time that numbers tell apart, and any number of which have an end.
+/// A frequency in hertz, from a command-line argument. The range gives a period that floating-point times resolve, and finite
+/// multiples of it.
 pub fn frequency(text: &str) -> Result<f64, String> {
     let frequency_hz =
         greater_than_0(text, Quantity::parse_as(text, Dimension::Frequency), |frequency_hz| *frequency_hz)?;
@@ -160,7 +161,7 @@ pub fn frequency(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A quantity greater than 0 in whatever unit, from a command line argument.
+/// A quantity greater than 0 in any unit, from a command-line argument.
 pub fn quantity(text: &str) -> Result<Quantity, String> {
     greater_than_0(text, text.parse::<Quantity>(), |quantity| quantity.value)
 }
@@ -183,7 +184,7 @@ fn rig_complaint(error: RigError, path: &Path, text: &str) -> Failure {
         Some(help) => complaint.help(help),
         None => complaint,
     };
-    // What is not there at all is said of the first line.
+    // An error about a missing item is shown at the first line.
     complaint.at_span(&path.display().to_string(), text, error.span.unwrap_or(0..0)).into()
 }
 
@@ -198,7 +199,7 @@ fn locator_complaint(error: &LocatorFileError, path: &Path, text: &str) -> Compl
 /// The complaint about a recording.
 pub fn csv_complaint(error: &CsvError) -> Complaint {
     match &error.place {
-        // The caret's heading says the place.
+        // The heading above the excerpt states the place.
         Some(place) => Complaint::new(&error.problem).at_line(
             &error.source_name,
             place.line,

@@ -2,8 +2,8 @@
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// A JSON object of these keys and values. `"key"?: value` leaves the key out of a `None`; `..fields` takes in another's keys,
-/// and of a `None` no key.
+/// A JSON object of these keys and values. `"key"?: value` omits the key of a `None`; `..fields` includes the keys of another
+/// object, and no key for a `None`.
 macro_rules! object {
     ($($fields:tt)*) => { $crate::json::Object($crate::json::fields!($($fields)*)) };
 }
@@ -28,9 +28,9 @@ pub trait Fields {
 
 /// An object, from its fields.
 pub struct Object<F>(pub F);
-/// A key with its value, unless there is none; and the fields after it.
+/// A key with its optional value, and the fields after it.
 pub struct Field<V, R>(pub &'static str, pub Option<V>, pub R);
-/// Fields, and those after them.
+/// Fields, and the fields after them.
 pub struct Joined<F, R>(pub F, pub R);
 /// No field.
 pub struct End;

@@ -1,4 +1,4 @@
-//! Readings of a file, or of stdin, as they come.
+//! Readings of a file, or of stdin, as they arrive.
 
 use crate::chunks::Chunks;
 use crate::failure::{Complaint, Failure};
@@ -14,37 +14,37 @@ use palpate_mechanics::units::format_count;
 use std::error::Error;
 use std::path::Path;
 
-/// Lines of a source, as they come; those that give nothing are said and counted.
+/// Lines of a source, as they arrive; invalid lines are reported and counted.
 pub struct Lines {
     /// Number of lines read so far.
     pub count: u64,
     source: Chunks,
     decoder: TextDecoder,
-    /// The last chunk, and how much of it has been taken.
+    /// The last chunk, and the number of its bytes that have been taken.
     chunk: (Vec<u8>, usize),
     line: Vec<u8>,
-    /// True where a CR has ended the last line: an LF behind it belongs to the same end.
+    /// True if a CR has ended the last line: a following LF belongs to the same line end.
     after_cr: bool,
-    /// Lines that gave values.
+    /// Lines with values.
     parsed: u64,
-    /// Lines that gave nothing.
+    /// Invalid lines.
     lost: u64,
     records: Records,
 }
 
-/// Records of lines that give nothing.
+/// Records of invalid lines.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Records {
-    /// None on stdout: the lines of those that give something have numbers.
+    /// No record on stdout: valid lines have their line numbers.
     None,
     /// A JSON object on stdout.
     Json,
 }
 
-/// Most lines about skipped lines on stderr: nobody reads hundreds that say one thing.
+/// Largest number of messages about skipped lines on stderr, as hundreds of similar messages are useless.
 const MOST_SKIPS: u64 = 20;
 
-/// Most bytes of a line.
+/// Largest number of bytes in a line.
 pub const MOST_BYTES: usize = 1 << 20;
 
 /// A line longer than [`MOST_BYTES`].
@@ -74,10 +74,10 @@ impl Lines {
         &self.source.name
     }
 
-    /// The next line, with its end, which is LF, CR or CRLF; `None` after the last.
+    /// The next line, with its line end, which is LF, CR or CRLF; `None` after the last.
     ///
     /// # Errors
-    /// A complaint where the source cannot be read, and [`Failure::Interrupted`] once a signal came.
+    /// A complaint if the source cannot be read, and [`Failure::Interrupted`] after a signal.
     pub fn next(&mut self) -> Result<Option<Result<&[u8], TooLong>>, Failure> {
         self.line.clear();
         let mut length = 0;
@@ -98,7 +98,7 @@ impl Lines {
             let part = &rest[..end.unwrap_or(rest.len())];
             length += part.len();
             *taken += part.len();
-            // Of a line that is too long, nothing more is kept.
+            // The rest of a line that is too long is discarded.
             if length <= MOST_BYTES {
                 self.line.extend_from_slice(part);
             }
@@ -114,10 +114,10 @@ impl Lines {
         Ok(Some(if length <= MOST_BYTES { Ok(&self.line) } else { Err(TooLong) }))
     }
 
-    /// Counts the line as one that gave nothing, and says why.
+    /// Counts an invalid line, and reports the reason.
     pub fn lose(&mut self, error: &(dyn Error + 'static)) -> Result<(), Failure> {
         self.lost += 1;
-        // An error of a parser names source and line itself.
+        // An error of a parser contains source and line.
         let (column, reason, words) = match error.downcast_ref::<CsvError>() {
             Some(CsvError { place, problem, .. }) => {
                 (place.as_ref().and_then(|place| place.column), problem.to_string(), error.to_string())
@@ -135,16 +135,16 @@ impl Lines {
         output::say_json_line(&object! { "line": self.count, "column"?: column, "skipped": reason })
     }
 
-    /// True while every line has given something.
+    /// True while every line has been valid.
     pub fn is_whole(&self) -> bool {
         self.lost == 0
     }
 
-    /// The failure that some lines gave no such `answer`, or that no line held a reading.
+    /// Failure if some lines gave no `answer`, or if no line contains a reading.
     pub fn finish(&self, answer: &str) -> Result<(), Failure> {
         match self.lost {
             0 if self.parsed == 0 => {
-                Err(Failure::DataLost(format!("{} holds a header and no reading", self.name())))
+                Err(Failure::DataLost(format!("{} has a header and no reading", self.name())))
             }
             0 => Ok(()),
             lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no {answer}", self.count))),
@@ -152,7 +152,7 @@ impl Lines {
     }
 }
 
-/// The same failure; of an interruption, one that names the last line that was read.
+/// Adds the number of the last line to an interruption; other failures stay as they are.
 fn stopped_after(failure: Failure, line: u64) -> Failure {
     match failure {
         Failure::Interrupted(_) => Failure::Interrupted(format!("stopped after line {line}")),
@@ -160,12 +160,12 @@ fn stopped_after(failure: Failure, line: u64) -> Failure {
     }
 }
 
-/// The dialect of a stream as it was last said on stderr.
+/// The dialect of a stream in the last message on stderr.
 #[derive(Default)]
 struct DialectNote(String);
 
 impl DialectNote {
-    /// Says on stderr what is new of the dialect.
+    /// Writes the dialect to stderr if it has changed.
     fn say(&mut self, dialect: &Dialect) {
         let words = dialect.to_string();
         if words != self.0 {
@@ -175,7 +175,7 @@ impl DialectNote {
     }
 }
 
-/// Values of lines, by a parser; lines that hold none are said and counted.
+/// Values of lines, by a parser; invalid lines are reported and counted.
 pub struct Parsing<P> {
     pub parser: P,
     header: Header,
@@ -188,7 +188,7 @@ impl<P: LineParser> Parsing<P> {
         Self { parser, header, note: DialectNote::default() }
     }
 
-    /// The values of the next line, `Some(None)` of one that gives nothing; `None` after the last line.
+    /// The values of the next line, `Some(None)` for a line without values; `None` after the last line.
     pub fn next(&mut self, lines: &mut Lines) -> Result<Option<Option<P::Parsed>>, Failure> {
         let Some(line) = lines.next()? else {
             let unfound = self.parser.progress().unfound();
@@ -203,7 +203,7 @@ impl<P: LineParser> Parsing<P> {
                 return Ok(Some(parsed));
             }
             Ok(Err(error)) => {
-                // A stream without a header may have been joined in the middle of its first line.
+                // The first line of a stream without a header may be incomplete, as the stream may have begun earlier.
                 let may_be_torn = self.header == Header::Absent && lines.is_whole();
                 if self.parser.progress().awaits_columns() && !may_be_torn {
                     return Err(input::csv_complaint(&error).into());
@@ -223,14 +223,14 @@ impl<P: LineParser> Parsing<P> {
     }
 }
 
-/// The readings of a file, one a line.
+/// The readings of a file, one per line.
 pub struct Readings {
     pub lines: Lines,
     parsing: Parsing<ReadingParser>,
 }
 
 impl Readings {
-    /// The readings of a bench in lines. Without a header, columns are the channels in their order.
+    /// The readings of a bench in lines. Without a header, the columns are the channels in their order.
     pub fn new(lines: Lines, setup: &Setup, no_header: bool) -> Self {
         let mut columns: Columns = setup.recording_columns();
         if no_header {
@@ -254,7 +254,7 @@ impl Readings {
         Ok(None)
     }
 
-    /// Time of the last reading in seconds, where the source has times.
+    /// Time of the last reading in seconds, if the source has times.
     pub fn time_s(&self) -> Option<f64> {
         self.parsing.parser.time_s()
     }

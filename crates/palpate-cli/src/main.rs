@@ -1,4 +1,4 @@
-//! The `palpate` command: arguments, files, progress, messages. What it says is computed by the library.
+//! The `palpate` command: arguments, files, progress, messages. The library computes the results.
 //!
 //! ```console
 //! $ palpate fit examples/paper.toml -o locator.json
@@ -6,7 +6,7 @@
 //! $ palpate evaluate locator.json --data presses.csv --out report
 //! ```
 #![forbid(unsafe_code)]
-// These macros panic where nobody listens; `remark` and `output` have others.
+// These macros panic if the output is closed; `remark` and `output` have replacements.
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
 mod chunks;

@@ -7,7 +7,7 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
-/// Says where the report of a folder is, where there is one; `before` stands before it.
+/// Prints the path of the report in a folder, if there is one, with `before` in front of it.
 pub fn say_report(before: &str, folder: Option<&Path>) -> Result<(), Failure> {
     match folder {
         Some(folder) => say(format!("{before}Report: {}", folder.join("report.html").display())),
@@ -35,17 +35,17 @@ pub fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
     serde_json::to_string_pretty(value).map_err(|error| Complaint::new(error).into())
 }
 
-/// Writes to stdout or whatever stands for it; a reader that has gone is no error of ours.
+/// Writes to stdout or its replacement; a closed reader is not an error of ours.
 pub fn print(out: &mut impl Write, bytes: &[u8]) -> Result<(), Failure> {
     out.write_all(bytes).map_err(|error| unprinted(&error))
 }
 
-/// Hands on what was printed: a reader at the other end of a pipe wants each answer now.
+/// Flushes the output: the reader of a pipe gets each result at once.
 pub fn flush(out: &mut impl Write) -> Result<(), Failure> {
     out.flush().map_err(|error| unprinted(&error))
 }
 
-/// The failure of a write to stdout: its reader has gone, which is no error of ours, or it is full.
+/// The failure of a write to stdout: its reader has closed it, which is not an error of ours, or it is full.
 pub fn unprinted(error: &std::io::Error) -> Failure {
     match error.kind() {
         ErrorKind::BrokenPipe => Failure::NobodyReads,
@@ -53,7 +53,7 @@ pub fn unprinted(error: &std::io::Error) -> Failure {
     }
 }
 
-/// A table for people, made column by column; the columns after the first are aligned to the right.
+/// A text table, made column by column; the columns after the first are aligned to the right.
 pub struct Table<R> {
     rows: Vec<R>,
     heading: Vec<String>,
@@ -66,14 +66,14 @@ impl<R> Table<R> {
         Self { cells: vec![Vec::new(); rows.len()], heading: Vec::new(), rows }
     }
 
-    /// Adds a column with its cell of each row.
+    /// Adds a column with its cell for each row.
     pub fn column(mut self, heading: impl Into<String>, cell: impl Fn(&R) -> String) -> Self {
         self.heading.push(heading.into());
         self.cells.iter_mut().zip(&self.rows).for_each(|(cells, row)| cells.push(cell(row)));
         self
     }
 
-    /// Adds a row that is of another kind than the others.
+    /// Adds a row of another kind.
     pub fn row(mut self, cells: Vec<String>) -> Self {
         self.cells.push(cells);
         self
@@ -92,7 +92,7 @@ impl<R> Display for Table<R> {
     }
 }
 
-/// Three decimals, or a whole number where there are many digits before them; a dash for none.
+/// Three decimals, or a whole number if it has many digits before the point; a dash for `None`.
 pub fn figure(value: Option<f64>) -> String {
     match value {
         None => "–".to_owned(),

@@ -1,4 +1,4 @@
-//! Long work as people see it: on a terminal a bar with rate and time left, in a pipe nothing; and Ctrl-C, which stops it.
+//! Progress of long work: a bar with rate and remaining time on a terminal, no output in a pipe; and Ctrl-C, which stops the work.
 
 use crate::remark::remark;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -8,37 +8,37 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Number of the signal that came; 0 for none. Signal handlers write it.
+/// Number of the received signal; 0 for none. Signal handlers write it.
 static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
-/// Work that has not ended by itself so long after a signal is ended with the process.
+/// The process ends this long after a signal if the work has not ended by itself.
 const PATIENCE: Duration = Duration::from_millis(700);
-/// True for a command that finishes its work after a signal.
+/// True if the command finishes its work after a signal.
 static FINISHES: AtomicBool = AtomicBool::new(false);
 /// SIGINT, which Ctrl-C sends.
 const INTERRUPT: usize = 2;
 
-/// Makes Ctrl-C (and SIGTERM, or a closed terminal) ask long work to stop. What has not ended soon is ended with the process: everything that palpate
-/// writes is whole at any time. See [`finish_after_signal`] for work that must not be cut off.
+/// Makes Ctrl-C (and SIGTERM, or a closed terminal) ask long work to stop. The process ends soon after, even if the work has not
+/// ended: all files that palpate writes are complete at any time. See [`finish_after_signal`] for work that must not be cut off.
 pub fn install_signal_handler() {
     if let Err(error) = begin_to_listen() {
         remark!("Ctrl-C will end palpate at once: {error}");
     }
 }
 
-/// Signals that ask a process to end. A real handler takes them: signals that are only blocked reach the threads of serial ports, where `ppoll`
-/// opens them.
+/// Signals that ask a process to end. They need a real handler: signals that are only blocked reach the threads of serial ports,
+/// where `ppoll` opens them.
 #[cfg(unix)]
 fn ends() -> Vec<i32> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
     let mut ends = vec![SIGINT, SIGTERM, SIGQUIT];
-    // `nohup` has it ignored.
+    // `nohup` makes the process ignore it.
     if !ignores(SIGHUP) {
         ends.push(SIGHUP);
     }
     ends
 }
 
-/// True where the process was started with a signal ignored, as Linux says in hexadecimal.
+/// True if the process was started with a signal ignored, as Linux reports in hexadecimal.
 #[cfg(unix)]
 fn ignores(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -80,7 +80,7 @@ fn begin_to_listen() -> Result<(), Box<dyn Error>> {
     })?)
 }
 
-/// Sets a flag as soon as a signal asks the process to end, or to be suspended: a machine must not go on unwatched.
+/// Sets a flag at once if a signal asks the process to end or to be suspended: a machine must not continue unwatched.
 #[cfg(unix)]
 pub fn set_at_signal(flag: &Arc<AtomicBool>) -> std::io::Result<()> {
     for signal in ends().into_iter().chain([signal_hook::consts::SIGTSTP]) {
@@ -89,7 +89,7 @@ pub fn set_at_signal(flag: &Arc<AtomicBool>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Does nothing where there are no signals: the flag is set by whoever asks [`interrupted`].
+/// Has no effect without signals: a caller of [`interrupted`] sets the flag.
 #[cfg(not(unix))]
 pub fn set_at_signal(_: &Arc<AtomicBool>) -> std::io::Result<()> {
     Ok(())
@@ -100,18 +100,18 @@ pub fn finish_after_signal() {
     FINISHES.store(true, Ordering::Relaxed);
 }
 
-/// Ends the process where the work does not.
+/// Ends the process if the work does not end.
 fn end() {
     remark!("palpate: stopped");
     std::process::exit(interrupted_code().into());
 }
 
-/// True once Ctrl-C was pressed, or the process was asked to end.
+/// True after Ctrl-C or a request that the process ends.
 pub fn interrupted() -> bool {
     SIGNAL.load(Ordering::Relaxed) != 0
 }
 
-/// Exit code of a command that was interrupted: 128 and the signal, as shells have it.
+/// Exit code of an interrupted command: 128 and the signal, as in shells.
 pub fn interrupted_code() -> u8 {
     let signal = match SIGNAL.load(Ordering::Relaxed) {
         0 => INTERRUPT,
@@ -120,11 +120,11 @@ pub fn interrupted_code() -> u8 {
     128 + signal as u8
 }
 
-/// A bar on stderr, and the time so far where nobody knows how long work will be.
+/// Template of a bar on stderr; and of one with the elapsed time, for work of unknown length.
 const OF_LENGTH: &str = "{msg} {wide_bar} {pos}/{len}  {prefix}";
 const OF_ANY_LENGTH: &str = "{msg} {spinner} {prefix} {elapsed} so far";
 
-/// A bar of `length` steps on stderr, of which 0 says that nobody knows.
+/// A bar of `length` steps on stderr; 0 for an unknown length.
 pub fn bar(length: u64, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(length);
     set_template(&bar, if length == 0 { OF_ANY_LENGTH } else { OF_LENGTH });
@@ -139,7 +139,7 @@ fn set_template(bar: &ProgressBar, template: &str) {
     }
 }
 
-/// Observer of long work: shows a bar on a terminal, and stops the work at Ctrl-C.
+/// Observer of long work: shows a bar on a terminal, and stops the work after Ctrl-C.
 pub struct Observer {
     bar: ProgressBar,
     state: Mutex<State>,
@@ -151,11 +151,11 @@ struct State {
     start: Instant,
 }
 
-/// Steps of the bar of a whole stage.
+/// Steps of the bar in a whole stage.
 const STAGE_STEPS: f64 = 1000.0;
 
 impl Observer {
-    /// Observer of an iteration of at most so many rounds, of which 0 says that nobody knows.
+    /// Observer of an iteration of at most `most` rounds; 0 for an unknown number.
     pub fn of_rounds(most: u64) -> Self {
         Self::new(bar(most, "fitting"))
     }
@@ -169,12 +169,12 @@ impl Observer {
         Self { bar, state: Mutex::new(State { rounds: 0, stage: "", start: Instant::now() }) }
     }
 
-    /// Does some work under its eyes.
+    /// Does some work with this observer.
     pub fn watch<T>(&self, work: impl FnOnce(Watch) -> T) -> T {
         work(Watch::new(&|progress| self.observe(progress)))
     }
 
-    /// Shows progress; false once somebody pressed Ctrl-C.
+    /// Shows progress; false after Ctrl-C.
     fn observe(&self, progress: Progress) -> bool {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         match progress {
@@ -186,10 +186,10 @@ impl Observer {
     }
 
     fn round(&self, state: &mut State) {
-        // Often enough for the eye, seldom enough to cost nothing.
+        // Often enough for the eye, and rare enough to take no time.
         const EVERY: u64 = 64;
         state.rounds += 1;
-        // Rounds within a stage do not move its bar.
+        // Rounds within a stage do not advance its bar.
         if !state.stage.is_empty() || !state.rounds.is_multiple_of(EVERY) {
             return;
         }
@@ -223,7 +223,7 @@ impl Observer {
         }
     }
 
-    /// Begins the bar anew with every stage.
+    /// Restarts the bar with every stage.
     fn begin(&self, state: &mut State, name: &'static str, length: u64) {
         if state.stage != name {
             state.stage = name;

@@ -1,4 +1,4 @@
-//! Options of a live session, the same for every verb that has one.
+//! Options of a live session, common to all verbs that have one.
 
 use crate::failure::{Complaint, Failure};
 use crate::input;
@@ -43,7 +43,7 @@ impl SessionOptions {
         SessionConfig { estimation, ..SessionConfig::default() }
     }
 
-    /// A session of a locator, which came from a file at `path`.
+    /// A session of a locator from the file at `path`.
     pub fn session<'a>(&self, locator: &'a Locator, path: &Path) -> Result<Session<'a>, Failure> {
         Session::new(locator, &self.config()).map_err(|error| {
             Complaint::about(path, error)
@@ -52,7 +52,7 @@ impl SessionOptions {
         })
     }
 
-    /// Checks that they go with the source of the readings.
+    /// Checks that the options fit the source of the readings.
     pub fn check_source(&self, from: &SourceUrl) -> Result<(), Failure> {
         pipeline::check_pace(&self.config().estimation, from)
             .map_err(|error| Complaint::new(format!("--from {from}: {error}")).into())

@@ -1,6 +1,6 @@
-//! CSV tables beside a report: what its figures are drawn from, for whoever draws their own.
+//! CSV tables beside a report: the data of its figures, for the reader's own plots.
 //!
-//! The first line is a comment that names version, inputs and seed; columns have their units in their names.
+//! The first line is a comment that states version, inputs and seed; column names contain their units.
 
 use crate::failure::Failure;
 use crate::target::TargetFolder;
@@ -19,7 +19,7 @@ pub struct CsvTable {
 }
 
 impl CsvTable {
-    /// A table that begins with `comment` and these columns.
+    /// A table with the comment line `comment` and these columns.
     pub fn new(comment: &str, columns: impl IntoIterator<Item = impl AsRef<str>>) -> Self {
         let comment = comment.replace(['\r', '\n'], " ");
         Self { text: format!("# palpate {}, {comment}\n{}", env!("CARGO_PKG_VERSION"), csv_row(columns)) }
@@ -30,13 +30,13 @@ impl CsvTable {
         self.text += &csv_row(cells);
     }
 
-    /// Writes it into a folder.
+    /// Writes the table into a folder.
     pub fn write(&self, folder: &TargetFolder, name: &str) -> Result<(), Failure> {
         folder.write(name, self.text.as_bytes())
     }
 }
 
-/// A number with nine digits, none of them zeros at the end; an empty cell for one that is not there.
+/// A number with nine digits, without trailing zeros; an empty cell for `None`.
 pub fn cell(value: Option<f64>) -> String {
     let nine = |value: f64| -> f64 { format!("{value:.8e}").parse().unwrap_or(value) };
     value.filter(|value| value.is_finite()).map_or_else(String::new, |value| nine(value).to_string())
@@ -81,13 +81,13 @@ pub fn error_cells(evaluation: &Evaluation) -> Vec<String> {
     cells
 }
 
-/// Share of the answers with each status in %, by its name; `None` where statuses were not kept.
+/// Share of the answers with each status in %, by its name; `None` if statuses were not kept.
 pub fn status_percents(evaluation: &Evaluation) -> Option<BTreeMap<&'static str, f64>> {
     let percents = evaluation.status_percents()?;
     Some(percents.into_iter().map(|(status, percent)| (status.name(), percent)).collect())
 }
 
-/// Errors of estimated forces as JSON has them.
+/// Errors of estimated forces, in JSON.
 #[derive(serde::Serialize)]
 pub struct ForceErrors {
     count: usize,
@@ -98,7 +98,7 @@ pub struct ForceErrors {
     coverage_95: f64,
 }
 
-/// The errors of estimated forces; `None` where there are none.
+/// The errors of estimated forces; `None` if there are none.
 pub fn force_errors(evaluation: &Evaluation) -> Option<ForceErrors> {
     evaluation.force_summary().map(|forces| ForceErrors {
         count: forces.count,

@@ -1,4 +1,4 @@
-//! `--tare`: readings of a surface whose offsets have moved since its calibration.
+//! `--tare`: readings of a surface with offsets that have moved since its calibration.
 
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RecordingFiles};
@@ -26,7 +26,7 @@ pub struct TareOption {
 }
 
 impl TareOption {
-    /// The file that is named.
+    /// The file in the option.
     pub fn path(&self) -> Option<&Path> {
         match &self.tare {
             Some(Source::File(path)) => Some(path),
@@ -34,7 +34,8 @@ impl TareOption {
         }
     }
 
-    /// The tare of readings in use: `last` by default where the calibration has `zero = "last"` and untouched readings can be found.
+    /// The tare of readings in use: by default `last` if the calibration has `zero = "last"` and untouched readings can be
+    /// detected.
     pub fn in_use(&self, locator: &Locator) -> Self {
         let is_last = locator.setup.recording_columns().zero == Zero::Last;
         let default = || Source::Last { first: Start::NONE };
@@ -42,7 +43,7 @@ impl TareOption {
         Self { tare: self.tare.clone().or(by_locator) }
     }
 
-    /// Words behind a description of readings that are judged.
+    /// Words that follow a description of the evaluated readings.
     pub fn in_words(&self) -> &'static str {
         if self.tare.is_some() { ", tared" } else { "" }
     }
@@ -56,7 +57,7 @@ impl TareOption {
         Ok(())
     }
 
-    /// Refuses a tare of readings that are simulated, unless the bench has imperfections.
+    /// Refuses a tare of simulated readings, unless the bench has imperfections.
     pub fn check_drifts(&self, files: &RecordingFiles, setup: &Setup) -> Result<(), Failure> {
         if self.tare.is_some() && files.data.is_none() && setup.imperfections().is_none() {
             let complaint = Complaint::new("--tare: simulated readings do not drift");
@@ -69,18 +70,18 @@ impl TareOption {
 /// The untouched readings.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
-    /// The first ones.
+    /// The first readings.
     First(Start),
-    /// All of a file.
+    /// All readings of a file.
     File(PathBuf),
-    /// The first ones, and those that the locator's own rule finds behind them.
+    /// The first readings, and later ones that the locator's own rule detects as untouched.
     Auto {
-        /// Readings from the beginning that are known to be untouched.
+        /// Readings at the beginning that are known to be untouched.
         first: Start,
     },
-    /// The first ones, and then the latest one that the locator's own rule finds.
+    /// The first readings, and then the latest one that the locator's own rule detects as untouched.
     Last {
-        /// Readings from the beginning that are known to be untouched.
+        /// Readings at the beginning that are known to be untouched.
         first: Start,
     },
 }
@@ -88,9 +89,9 @@ pub enum Source {
 /// Beginning of a stream of readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
-    /// So many readings.
+    /// A number of readings.
     Readings(u64),
-    /// Those of the first so many seconds.
+    /// The readings within this time from the start, in seconds.
     Seconds(f64),
 }
 
@@ -126,7 +127,7 @@ impl FromStr for Start {
 }
 
 impl Source {
-    /// Readings from the beginning that are known to be untouched.
+    /// Readings at the beginning that are known to be untouched.
     fn first(&self) -> Start {
         match self {
             Self::First(first) | Self::Auto { first } | Self::Last { first } => *first,
@@ -134,7 +135,7 @@ impl Source {
         }
     }
 
-    /// The word of a baseline that is followed.
+    /// The word of the option for a baseline that is updated.
     fn followed(&self) -> Option<&'static str> {
         match self {
             Self::Auto { .. } => Some("auto"),
@@ -171,24 +172,24 @@ impl FromStr for Source {
     }
 }
 
-/// Use of a reading by the tare.
+/// Use of a reading for the tare.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Taken {
-    /// One of those that make the baseline: it is not located.
+    /// A reading of the baseline: it is not located.
     Baseline,
-    /// One that has been tared.
+    /// A tared reading.
     Tared,
-    /// One that has been tared, with its estimate by the tare that follows the baseline.
+    /// A tared reading, with its estimate by the tare that updates the baseline.
     Located(Box<Estimate>),
 }
 
 /// A reading that the tare cannot use.
 #[derive(Debug, thiserror::Error)]
 pub enum TakeError {
-    /// A reading of other channels or values.
+    /// A reading with other channels or invalid values.
     #[error(transparent)]
     Tare(#[from] TareError),
-    /// A reading without a time among the first seconds.
+    /// A reading without a time, when the baseline is given in seconds.
     #[error(
         "the reading has no time, and --tare takes those of the first {0} s: name the column as `time` in [recording], or give a number of readings"
     )]
@@ -200,27 +201,27 @@ pub struct Taring<'a> {
     locator: &'a Locator,
     source: Source,
     tare: Tare<Vec<f64>>,
-    /// True until the readings known to be untouched are over.
+    /// True until the end of the readings that are known to be untouched.
     is_beginning: bool,
     /// Time of the first reading.
     begun_s: Option<f64>,
-    /// Readings of the beginning.
+    /// Number of readings at the beginning.
     first: u64,
-    /// Readings that have made the baseline, or, where it is followed, untouched readings that were found.
+    /// Number of readings in the baseline; if it is updated, number of detected untouched readings.
     count: u64,
-    /// Readings that are `outside_model` by a baseline that is followed.
+    /// Number of readings that are `outside_model` with an updated baseline.
     unexplained: u64,
-    /// The first of the baseline's readings, to see whether they are untouched ones.
+    /// The first readings of the baseline, to check that they are untouched.
     kept: Vec<Vec<f64>>,
     tared: Vec<f64>,
 }
 
-/// Readings that are looked at again, at most, and the share of them that may look touched.
+/// Largest number of baseline readings that are checked, and the largest share of them that may appear touched.
 const MOST_KEPT: usize = 1000;
 const MOST_TOUCHED: f64 = 0.05;
 
 impl<'a> Taring<'a> {
-    /// The tare that was asked for; `None` where none was. A FILE is read at once.
+    /// The requested tare; `None` without one. A FILE is read at once.
     pub fn new(option: &TareOption, locator: &'a Locator, no_header: bool) -> Result<Option<Self>, Failure> {
         let Some(source) = option.tare.clone() else { return Ok(None) };
         let tare = locator.tare().map_err(|error| {
@@ -246,12 +247,12 @@ impl<'a> Taring<'a> {
             Source::First(_) => {}
             Source::Auto { .. } | Source::Last { .. } if locator.false_alarm_rate().is_none() => {
                 let complaint = format!(
-                    "--tare {}: a locator of kind `{}` does not tell untouched readings from contacts",
+                    "--tare {}: a locator of kind `{}` does not distinguish untouched readings from contacts",
                     source.followed().unwrap_or_default(),
                     locator.kind()
                 );
                 return Err(Complaint::new(complaint)
-                    .help("--tare N takes the first N readings for untouched, --tare FILE those of a file")
+                    .help("--tare N averages the first N readings as untouched, --tare FILE those of a file")
                     .into());
             }
             Source::Auto { .. } => {}
@@ -271,14 +272,14 @@ impl<'a> Taring<'a> {
             return Err(complaint.help("mend the lines above, or take them out").into());
         }
         if self.count == 0 {
-            let complaint = Complaint::about(path, "it holds no untouched reading");
+            let complaint = Complaint::about(path, "it has no untouched reading");
             return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
         }
         self.look_again();
         Ok(())
     }
 
-    /// Takes a reading of a time in seconds, which is the tared one afterwards.
+    /// Takes a reading with its time in seconds, and replaces it by the tared one.
     pub fn take(&mut self, reading: &mut [f64], time_s: Option<f64>) -> Result<Taken, TakeError> {
         if let Some(time_s) = time_s {
             self.tare.note_time(time_s);
@@ -336,7 +337,7 @@ impl<'a> Taring<'a> {
         Ok(())
     }
 
-    /// Says what the baseline is, and warns where its readings do not look untouched beside their mean.
+    /// Reports the baseline, and warns if its readings do not look untouched relative to their mean.
     fn look_again(&mut self) {
         self.say();
         if self.locator.false_alarm_rate().is_none() {
@@ -357,7 +358,7 @@ impl<'a> Taring<'a> {
         }
     }
 
-    /// Says how far the channels have moved.
+    /// Reports how far the channels have moved.
     fn say(&self) {
         let moved = self.tare.baseline().iter().zip(self.tare.learnt()).map(|(today, learnt)| today - learnt);
         let most = moved.enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
@@ -374,7 +375,7 @@ impl<'a> Taring<'a> {
         remark!("palpate: tare from {from}; {} has moved most, by {moved}", sensor.name);
     }
 
-    /// Says what was followed, and warns where too few readings were untouched for a baseline.
+    /// Reports an updated baseline, and warns if too few readings were untouched.
     fn say_followed(&self, followed: &str, source: &str) {
         if self.count > 0 {
             self.say();
@@ -396,15 +397,15 @@ impl<'a> Taring<'a> {
         }
     }
 
-    /// The end of the readings of `source`.
+    /// Ends the readings of `source`.
     ///
     /// # Errors
-    /// A failure where there were fewer readings than make the baseline.
+    /// A failure if there were fewer readings than the baseline needs.
     pub fn finish(&self, source: &str) -> Result<(), Failure> {
         if self.is_beginning {
             let needed = self.source.first();
             let complaint = format!(
-                "--tare {needed}: {source} holds {} readings; the first {needed} are to be the untouched ones",
+                "--tare {needed}: {source} has {} readings; the first {needed} are to be the untouched ones",
                 self.count
             );
             return Err(Complaint::new(complaint).help("give fewer, or record longer").into());
@@ -416,8 +417,8 @@ impl<'a> Taring<'a> {
     }
 }
 
-/// Brings readings that are held out to what the locators of their folds learn that the channels read untouched, by the drift that
-/// the other presses tell; where no tare was asked for, a warning says how far the channels drift.
+/// Corrects held-out readings for the drift of the offsets that the training presses of their folds show. Without a requested tare,
+/// a warning reports how far the channels drift.
 pub fn tare_splits(
     option: &TareOption,
     setup: &Setup,
@@ -429,7 +430,7 @@ pub fn tare_splits(
         Some(_) => {
             let complaint = "--tare takes `auto` alone here; N, a time, a FILE and `last` are for a locator: a rig is judged by folds of one recording";
             return Err(Complaint::new(complaint)
-                .help("--tare auto takes off the drift that the presses tell")
+                .help("--tare auto subtracts the drift that the presses show")
                 .into());
         }
         None if recording.rows.len() > MOST_LOOKED_AT => return Ok(()),
@@ -454,17 +455,17 @@ pub fn tare_splits(
         .map_err(|error| Failure::from_error(&error))?;
     match spans {
         Some(spans) => say_drift(setup, &spans),
-        None => remark!("palpate: the presses tell no drift; readings are judged as they are"),
+        None => remark!("palpate: the presses show no drift; readings are judged as they are"),
     }
     Ok(())
 }
 
-/// Says how far the channels drift where readings are judged without it.
+/// Reports how far the channels drift, if held-out readings are corrected for it.
 pub fn say_drift(setup: &Setup, spans: &[f64]) {
     remark!("palpate: {}; it is taken off held-out readings", moved_most(setup, spans));
 }
 
-/// Rows from which on nobody waits for a warning.
+/// Largest number of rows for which a warning is computed.
 const MOST_LOOKED_AT: usize = 300;
 
 fn moved_most(setup: &Setup, spans: &[f64]) -> String {
@@ -475,7 +476,7 @@ fn moved_most(setup: &Setup, spans: &[f64]) -> String {
     format!("the channels drift in the course of the recording, {} by {moved}", sensor.name)
 }
 
-/// A recording whose readings are tared as those of `palpate locate` are; the readings that make a baseline are left out.
+/// A recording with readings tared as in `palpate locate`; the readings of the baseline are omitted.
 pub fn tared_recording(
     option: &TareOption,
     locator: &Locator,

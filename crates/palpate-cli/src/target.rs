@@ -1,4 +1,4 @@
-//! Files and folders that a command may write: what must not be lost is refused with a reason, and what is written appears whole.
+//! Files and folders that a command may write: overwriting of data is refused with a reason, and files appear complete.
 
 use crate::failure::{Complaint, Failure};
 use palpate_live::whole_file::{self, folder_of};
@@ -7,25 +7,25 @@ use std::fs::{self, Metadata};
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// Results of a study, which is finished once they are there.
+/// Results of a study; the study is finished once the file exists.
 pub const RESULTS_JSON: &str = "results.json";
-/// Fits of a study, which keep its networks.
+/// Fits of a study, with its networks.
 pub const NETWORKS_CSV: &str = "networks.csv";
-/// What a study's fits located that are no networks.
+/// Located contacts of a study's fits other than networks.
 pub const EVALUATIONS_CSV: &str = "evaluations.csv";
-/// Facts of a study's shard, which is finished once they are there.
+/// Facts of a study's shard; the shard is finished once the file exists.
 pub const SHARD_JSON: &str = "shard.json";
 /// Page of a report.
 pub const REPORT_HTML: &str = "report.html";
-/// Files of which each says that a folder is a study's.
+/// Files that mark a folder as a study's.
 pub const OF_A_STUDY: [&str; 4] = [RESULTS_JSON, SHARD_JSON, NETWORKS_CSV, EVALUATIONS_CSV];
 
-/// The files that a command reads and those that its own words go to, none of which it may write over.
+/// The files that a command reads, and those that its own output goes to. The command must not overwrite them.
 #[derive(Clone, Debug)]
 pub struct Inputs(Vec<(&'static str, Identity)>);
 
 impl Inputs {
-    /// The files of these names; `-` is stdin. A name without a file is left to whoever reads it.
+    /// The files at these paths; `-` is stdin. A path without a file is left to its reader.
     pub fn new<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Self {
         let read =
             paths.into_iter().filter_map(Identity::look_up).map(|file| ("this command reads it", file));
@@ -45,7 +45,7 @@ impl Inputs {
     }
 }
 
-/// Identity of a file, by whatever name: the path without links, and the inode, which hard links share.
+/// Identity of a file under any name: the path without links, and the inode, which hard links share.
 #[derive(Clone, Debug)]
 struct Identity {
     path: PathBuf,
@@ -53,7 +53,7 @@ struct Identity {
 }
 
 impl Identity {
-    /// That of a regular file; `None` of anything else.
+    /// Identity of a regular file; `None` for anything else.
     fn look_up(path: &Path) -> Option<Self> {
         let there = fs::metadata(path).ok().filter(Metadata::is_file)?;
         Some(Self { path: fs::canonicalize(path).ok()?, inode: inode(&there) })
@@ -83,13 +83,13 @@ pub struct Target {
 }
 
 impl Target {
-    /// Complains at once, before any work, where the file must not be written or could not be.
+    /// Complains at once, before any work, if the file must not or cannot be written.
     pub fn new(path: &Path, inputs: &Inputs) -> Result<Self, Failure> {
         let target = Self { path: path.to_owned(), inputs: inputs.clone() };
         let place = target.place()?;
         if let Some(name) = result_beside(&place) {
             let complaint = format!(
-                "cannot write {}: it is a result of the study whose {name} is beside it",
+                "cannot write {}: it is a result of the study with the {name} beside it",
                 path.display()
             );
             return Err(Complaint::new(complaint).help("name another file").into());
@@ -102,18 +102,18 @@ impl Target {
         &self.path
     }
 
-    /// Writes the file under a temporary name and renames it, so that nobody ever sees half of it. A link stays, and what it
-    /// leads to is written; a file that is replaced keeps its mode.
+    /// Writes the file under a temporary name and renames it, so that it is never seen incomplete. A link stays, and its target is
+    /// written; a replaced file keeps its mode.
     pub fn write(&self, bytes: &[u8]) -> Result<(), Failure> {
         self.place()?;
         whole_file::write(&self.path, bytes).map_err(|error| cannot("write", &self.path, &error))
     }
 
-    /// The file with all links followed, which may be written.
+    /// The file to write, with all links followed.
     fn place(&self) -> Result<PathBuf, Failure> {
         let refused = |why: &str| Complaint::new(format!("cannot write {}: {why}", self.path.display()));
         if self.path == Path::new("-") {
-            let complaint = refused("stdout is for what the command says");
+            let complaint = refused("stdout is for the output of the command");
             return Err(complaint.help("name a file; one that is called so is `./-`").into());
         }
         if self.path.file_name().is_none() && !self.path.is_dir() {
@@ -136,18 +136,18 @@ impl Target {
         let folder = folder_of(&place);
         match folder.is_dir() {
             true => Ok(place),
-            false => Err(refused(&format!("there is no folder {}", folder.display())).into()),
+            false => Err(refused(&format!("there is not a folder {}", folder.display())).into()),
         }
     }
 }
 
-/// Another file of the study that a file is a result of, if it is there and is one.
+/// Another file of the study to which the file at `place` belongs, if both exist.
 fn result_beside(place: &Path) -> Option<&'static str> {
     let name = place.file_name()?.to_str().filter(|name| is_of_a_report(name) && place.exists())?;
     OF_A_STUDY.into_iter().find(|other| *other != name && place.with_file_name(other).exists())
 }
 
-/// The reason why an entry of a folder must not be replaced by a file, whatever the command; `None` for a regular file.
+/// The reason why no command may replace an entry of a folder by a file; `None` for a regular file.
 fn reason_against(there: &Metadata) -> Option<&'static str> {
     match there.file_type() {
         kind if kind.is_dir() => Some("it is a folder"),
@@ -169,7 +169,7 @@ fn what_it_is(there: &Metadata) -> &'static str {
 
 #[cfg(not(unix))]
 fn what_it_is(_: &Metadata) -> &'static str {
-    "it is no regular file"
+    "it is not a regular file"
 }
 
 /// A folder that takes a report, with all files that belong to it.
@@ -180,7 +180,7 @@ pub struct TargetFolder {
 }
 
 impl TargetFolder {
-    /// A folder for the report of a command; one that holds the results of a study is left alone.
+    /// A folder for the report of a command; a folder with the results of a study is refused.
     pub fn for_report(path: &Path, inputs: &Inputs) -> Result<Self, Failure> {
         let folder = Self::for_study(path, inputs)?;
         match OF_A_STUDY.into_iter().find(|name| path.join(name).exists()) {
@@ -203,7 +203,7 @@ impl TargetFolder {
             path.ancestors().find(|above| above.exists()).filter(|above| !above.as_os_str().is_empty());
         let nearest = nearest.unwrap_or(Path::new("."));
         if !nearest.is_dir() {
-            return Err(refused(&Error::other(format!("{} is no folder", nearest.display()))));
+            return Err(refused(&Error::other(format!("{} is not a folder", nearest.display()))));
         }
         check_takes_files(nearest).map_err(|error| refused(&error))?;
         if path.is_dir() {
@@ -220,12 +220,12 @@ impl TargetFolder {
         &self.path
     }
 
-    /// Makes the folder, with those above it, where it is not there yet.
+    /// Makes the folder and its parents if they are missing.
     pub fn make(&self) -> Result<(), Failure> {
         fs::create_dir_all(&self.path).map_err(|error| cannot("make the folder", &self.path, &error))
     }
 
-    /// Takes a file away, where it is there.
+    /// Removes a file if it exists.
     pub fn remove(&self, name: &str) -> Result<(), Failure> {
         let path = self.path.join(name);
         match fs::remove_file(&path) {
@@ -252,14 +252,14 @@ impl TargetFolder {
     }
 }
 
-/// True for names that files of a report have.
+/// True for names of a report's files.
 fn is_of_a_report(name: &str) -> bool {
     let tables = ["errors.csv", "trials.csv", "limit.csv"];
     let is_figure = name.starts_with("figure-") && [".svg", ".png"].iter().any(|end| name.ends_with(end));
     is_figure || name == REPORT_HTML || OF_A_STUDY.contains(&name) || tables.contains(&name)
 }
 
-/// An error where a folder does not take a file: it is better known before an hour of work than after it.
+/// An error if a folder does not accept files: it is better reported before an hour of work than after it.
 fn check_takes_files(folder: &Path) -> std::io::Result<()> {
     whole_file::temporary(folder).map(drop)
 }

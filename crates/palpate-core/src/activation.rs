@@ -40,20 +40,20 @@ impl Activation {
 
 /// Constants of the logistic function σ: σ(z) = 1 / (1 + 2^n·2^r), where −z·log₂ e = n + r, n is whole and |r| ≤ ½.
 ///
-/// 2^r is the quotient (E + r·O) / (E − r·O), with E and O polynomials in r². That costs no division, since σ is one anyway:
-/// σ = (E − r·O) / ((E − r·O) + 2^n·(E + r·O)). What rounding z·log₂ e loses grows with |z|, but σ′ falls faster, so that r needs no
+/// 2^r is the quotient (E + r·O) / (E − r·O), with E and O polynomials in r². It costs no extra division, since σ is a quotient anyway:
+/// σ = (E − r·O) / ((E − r·O) + 2^n·(E + r·O)). The rounding error of z·log₂ e grows with |z|, but σ′ falls faster. Therefore r needs no
 /// second part.
 #[derive(Clone, Copy, Debug)]
 pub struct Logistic;
 
 impl Logistic {
-    /// z is held within ±END, where 2^n·E is a normal number and σ is 0 or 1 to 10⁻³⁰⁰.
+    /// z is clamped to ±END, where 2^n·E is a normal number and σ is 0 or 1 to 10⁻³⁰⁰.
     pub const END: f64 = 691.0;
     /// E's coefficients, lowest first: with O's the minimax quotient, of relative error 1.3·10⁻¹⁷ as they are rounded here.
     pub const EVEN: [f64; 3] = [189_140.054_010_213_3, 10_096.716_587_306_339, 43.300_524_562_927_92];
     /// O's coefficients, lowest first, before the third, which is 1.
     pub const ODD: [f64; 2] = [65_550.947_584_067_56, 874.742_790_038_898_7];
-    /// Adding then subtracting it rounds to a whole number, whose low bits then lie lowest in the sum.
+    /// Adding and then subtracting it rounds to a whole number. The low bits of this number are the lowest bits of the sum.
     const ROUNDER: f64 = 6_755_399_441_055_744.0;
 }
 

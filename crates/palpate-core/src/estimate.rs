@@ -23,7 +23,7 @@ pub struct ContactEstimate {
     pub position: Position,
     /// Force in newtons, positive downward, where it is known or estimated.
     pub force_n: Option<f64>,
-    /// Uncertainty of position and force, where the method can tell.
+    /// Uncertainty of position and force, where the method estimates it.
     pub uncertainty: Option<Uncertainty>,
 }
 
@@ -46,16 +46,16 @@ impl ContactEstimate {
 /// The uncertainty of one estimated contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Uncertainty {
-    /// Covariance of (x, y, force), in m², m·N and N², upper triangle: xx, xy, xf, yy, yf, ff. What is not estimated
-    /// has zeros.
+    /// Covariance of (x, y, force), in m², m·N and N², upper triangle: xx, xy, xf, yy, yf, ff. Entries of quantities that are not estimated
+    /// are 0.
     pub covariance: [f64; 6],
     /// Lower and upper end of the 95 % interval along x, in metres.
     pub x_95_m: (f64, f64),
     /// Lower and upper end of the 95 % interval across, in metres; both 0 on a one-dimensional surface.
     pub y_95_m: (f64, f64),
-    /// Lower and upper end of the 95 % interval of the force, in newtons, where force and place trade off: beside an end or an edge a
-    /// harder contact nearer to it reads like a softer one farther away, and the force's standard deviation does not describe what is known
-    /// of it. `None` elsewhere.
+    /// Lower and upper end of the 95 % interval of the force, in newtons, where force and place trade off; `None` elsewhere. Beside an end
+    /// or an edge a harder contact nearer to it reads like a softer one farther away. The standard deviation does not describe the
+    /// uncertainty of the force there.
     pub force_95_n: Option<(f64, f64)>,
 }
 
@@ -66,7 +66,7 @@ impl Uncertainty {
     }
 }
 
-/// One place that explains a reading, and how probable it is.
+/// One place that explains a reading, with its probability.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mode {
     /// The contact there.
@@ -78,15 +78,15 @@ pub struct Mode {
 /// Largest size of a channel's reading that a contact may explain; its third power and products of that are numbers.
 pub const LARGEST_READING: f64 = 1e60;
 
-/// Status of an estimate: how far it is to be believed.
+/// Status of an estimate: its reliability.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// A position on the surface.
     Located,
-    /// Nothing touches: the reading is noise. The position means nothing.
+    /// The surface is untouched: the reading is noise, and the position has no meaning.
     NoContact,
     /// Several places explain the reading: the estimate is the most probable one, and its modes are the others. Or hardly any place is
-    /// excluded: the 95 % interval is the surface, and there are no modes.
+    /// excluded: the 95 % interval is the whole surface, and the list of modes is empty.
     Ambiguous,
     /// No contact explains the reading within the noise: more contacts than assumed, a damaged sensor, drift.
     OutsideModel,
@@ -95,7 +95,7 @@ pub enum Status {
 }
 
 impl Estimate {
-    /// An estimate that is a position and nothing more.
+    /// An estimate of the position alone.
     pub const fn of_position(position: Position, status: Status) -> Self {
         Self::of_contact(ContactEstimate { position, force_n: None, uncertainty: None }, status)
     }
@@ -105,8 +105,8 @@ impl Estimate {
         Self { contact, status, modes: BoundedList::none(NO_MODE), further: BoundedList::none(NO_CONTACT) }
     }
 
-    /// True when all positions, forces, intervals and probabilities are finite and no covariance is NaN. An infinite covariance is allowed: it
-    /// stands for no knowledge at all.
+    /// True when all positions, forces, intervals and probabilities are finite and no covariance is NaN. An infinite covariance is allowed for an
+    /// undetermined quantity.
     pub fn is_in_numbers(&self) -> bool {
         let of_mode = |mode: &Mode| mode.contact.is_in_numbers() && mode.probability.is_finite();
         self.contact.is_in_numbers()
@@ -153,12 +153,12 @@ pub struct BoundedList<T, const N: usize> {
 }
 
 impl<T: Copy, const N: usize> BoundedList<T, N> {
-    /// An empty list; `filler` stands where nothing is.
+    /// An empty list; `filler` fills the unused slots.
     pub const fn none(filler: T) -> Self {
         Self { items: [filler; N], len: 0 }
     }
 
-    /// Adds an item, and says whether there was room.
+    /// Adds an item; false if the list is full.
     pub fn push(&mut self, item: T) -> bool {
         let Some(slot) = self.items.get_mut(self.len) else { return false };
         *slot = item;
@@ -166,7 +166,7 @@ impl<T: Copy, const N: usize> BoundedList<T, N> {
         true
     }
 
-    /// Takes all items out.
+    /// Removes all items.
     pub const fn clear(&mut self) {
         self.len = 0;
     }

@@ -1,9 +1,9 @@
-//! The forward pass of a fully connected network: the one for a chip, which reads the weights row by row where they lie, and the one that
-//! faster passes are tested against.
+//! Forward pass of a fully connected network. It suits a microcontroller, because it reads the weights row by row in place. Tests compare
+//! faster passes with it.
 
 use crate::Activation;
 
-/// A trained network, borrowed from wherever its numbers lie.
+/// A trained network that borrows its weights.
 #[derive(Clone, Copy, Debug)]
 pub struct Network<'a> {
     /// Nodes of every layer, inputs first and outputs last.
@@ -14,21 +14,21 @@ pub struct Network<'a> {
     pub hidden_activation: Activation,
     /// Activation of the output layer.
     pub output_activation: Activation,
-    /// Layer by layer, node by node: one weight an input, then the bias.
+    /// Layer by layer, node by node: one weight per input, then the bias.
     pub weights: &'a [f64],
 }
 
-/// A buffer does not fit the network.
+/// A buffer with another length than the network requires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BufferMismatch {
-    /// Length that the network asks for.
+    /// Length that the network requires.
     pub needed: usize,
     /// Length of the buffer.
     pub found: usize,
 }
 
 impl Network<'_> {
-    /// Number of weights that `sizes` asks for.
+    /// Number of weights that `sizes` requires.
     pub fn weight_count(&self) -> usize {
         self.sizes.windows(2).map(|pair| pair[1] * (pair[0] + usize::from(self.biases))).sum()
     }
@@ -41,7 +41,7 @@ impl Network<'_> {
     /// a = f(W x + b), layer by layer, from scaled inputs to outputs.
     ///
     /// # Errors
-    /// [`BufferMismatch`] when `inputs`, `outputs`, `scratch` or the weights have another length than the network asks for
+    /// [`BufferMismatch`] when `inputs`, `outputs`, `scratch` or the weights have another length than the network requires
     /// (`scratch` may be longer).
     pub fn forward_into(
         &self,
@@ -77,7 +77,7 @@ impl Network<'_> {
     }
 }
 
-/// Σ w·x in four sums, of which none waits for another.
+/// Σ w·x in four independent sums.
 fn dot(weights: &[f64], inputs: &[f64]) -> f64 {
     let ((weights, last_weights), (inputs, last_inputs)) =
         (weights.as_chunks::<4>(), inputs.as_chunks::<4>());

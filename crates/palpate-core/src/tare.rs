@@ -1,7 +1,7 @@
-//! Tare: what a surface reads untouched today, brought to what it read untouched at its calibration.
+//! Tare: replaces today's untouched reading of a surface with its untouched reading at calibration.
 //!
 //! Offsets of raw channels move between calibration and use, with the temperature or when a plug is pulled and put back. With r the
-//! reading, b its baseline (what the channel reads untouched today) and o what calibration learnt that it reads untouched, the tared
+//! reading, b its baseline (the untouched reading of the channel today) and o its untouched reading at calibration, the tared
 //! reading is r − b + o.
 
 mod rest;
@@ -9,7 +9,7 @@ mod rest;
 use crate::{Estimate, LARGEST_READING, Status};
 use rest::{Course, RestLength, RestWatch};
 
-/// Baseline of the channels of a surface, kept in arrays, vectors or slices `B` of the caller's.
+/// Baseline of the channels of a surface, kept in arrays, vectors or slices `B` of the caller.
 ///
 /// The baseline is the mean of readings that are known to be untouched ([`Tare::add_untouched`]), or it is followed
 /// ([`Tare::follow`]).
@@ -27,26 +27,25 @@ use rest::{Course, RestLength, RestWatch};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tare<B> {
-    /// Untouched reading of each channel, as calibration learnt it.
+    /// Untouched reading of each channel at calibration.
     learnt: B,
     time_constant: u32,
     /// Time of the reading before and mean interval between readings, in seconds, of readings that have times.
     clock: Option<Clock>,
     zero: Zero,
-    /// Mean of the untouched readings of the last moment, and the time of the first of them, where [`Zero::Last`] will take it.
+    /// Mean of the untouched readings of the current moment, and the time of the first of them, for [`Zero::Last`].
     moment: Option<(Baseline<B>, f64)>,
     current: Baseline<B>,
-    /// True for a baseline that is known to be that of the untouched surface.
+    /// True once the baseline is known to be that of the untouched surface.
     is_confirmed: bool,
-    /// Another baseline: the one that readings fit which nothing explains by an unconfirmed baseline, or the one that was left for the current.
+    /// Alternative baseline: either of readings that are `outside_model` by the unconfirmed current one, or the one that the current one replaced.
     other: Option<Baseline<B>>,
-    /// Readings in a row that are `outside_model` by the other baseline too.
+    /// Consecutive readings that are `outside_model` by the alternative baseline too.
     strange: u32,
-    /// Readings in a row that look let go.
+    /// Consecutive readings that indicate the end of a touch.
     let_go: u32,
-    /// Readings in a row that are untouched by what calibration learnt, and `outside_model` by the baseline.
+    /// Consecutive readings that are untouched by the offsets of the calibration, and `outside_model` by the baseline.
     as_learnt: u32,
-    /// Watch for the rest after a touch.
     rest: RestWatch<B>,
     /// Whether the rest after a touch becomes the baseline.
     takes_rests: bool,
@@ -57,9 +56,9 @@ pub struct Tare<B> {
 /// Untouched readings that make a followed baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Zero {
-    /// Those of a time constant.
+    /// Untouched readings over a time constant.
     Followed,
-    /// The latest one.
+    /// Latest untouched reading.
     Last,
 }
 
@@ -83,25 +82,25 @@ struct CalibrationDrift<B> {
     reach: B,
 }
 
-/// A baseline, and what is known for it.
+/// A baseline with its drift and counts of readings.
 #[derive(Clone, Debug, PartialEq)]
 struct Baseline<B> {
     values: B,
-    /// Drift of each channel, a reading.
+    /// Drift of each channel per reading.
     drift: B,
-    /// Readings since the last untouched one, over which the drift was carried on.
+    /// Readings since the last untouched one, over which the drift was extrapolated.
     carried: u32,
-    /// Readings since the baseline was put to a rest.
+    /// Readings since the baseline was set to a rest.
     since_rest: u32,
-    /// Readings that it is the mean of, at most the time constant; 0 while it is what calibration learnt.
+    /// Number of averaged readings, at most the time constant; 0 while the baseline is that of the calibration.
     weight: u32,
-    /// Readings in a row that are a contact by it; kept once they are a touch.
+    /// Consecutive readings that are a contact by this baseline; kept once they are a touch.
     touched: u32,
-    /// Readings in a row that are untouched by it.
+    /// Consecutive readings that are untouched by this baseline.
     untouched: u32,
 }
 
-/// A reading that does not go with a tare.
+/// A reading that does not fit a tare.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TareError {
     /// Another number of channels.
@@ -111,9 +110,9 @@ pub enum TareError {
         /// Channels of the reading.
         found: usize,
     },
-    /// A value that is no number.
+    /// A value that is not finite.
     NotFinite {
-        /// Which channel, from 1.
+        /// Number of the channel, from 1.
         channel: usize,
         /// Value.
         value: f64,
@@ -136,7 +135,7 @@ impl core::fmt::Display for TareError {
 impl core::error::Error for TareError {}
 
 impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
-    /// Readings from which on a followed baseline is believed: their mean has a fifth of the noise of one.
+    /// Fewest readings for a settled baseline: their mean has about a fifth of the noise of one reading.
     pub const SETTLED: u32 = 20;
     /// Time over which a followed baseline forgets, in seconds, where readings have times ([`Tare::note_time`]).
     pub const TIME_CONSTANT_S: f64 = 10.0;
@@ -146,37 +145,36 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// Readings over which a followed baseline forgets where readings have no times: [`Tare::TIME_CONSTANT_S`] at 100 readings a second.
     pub const TIME_CONSTANT: u32 = 1000;
 
-    /// Readings in a row by which a surface is known to have been let go: three of a thousand readings of noise alone are outside the model.
+    /// Consecutive readings that establish the end of a touch: three of a thousand readings of noise alone are outside the model.
     pub const LET_GO: u32 = 5;
 
-    /// A tare whose baseline is `learnt`, what calibration learnt that each channel reads untouched.
+    /// Tare with the baseline `learnt`, the untouched reading of each channel at calibration.
     ///
     /// # Errors
-    /// [`TareError::NotFinite`] for a value that is no number.
+    /// [`TareError::NotFinite`] for a value that is not finite.
     pub fn new(learnt: B) -> Result<Self, TareError> {
         check(learnt.as_ref(), learnt.as_ref().len())?;
         Ok(Self::of_learnt(learnt))
     }
 
-    /// The same, whose followed baseline forgets over so many readings; at least [`Tare::SETTLED`].
+    /// Sets the time constant of a followed baseline, in readings; at least [`Tare::SETTLED`].
     #[must_use]
     pub fn with_time_constant(self, readings: u32) -> Self {
         Self { time_constant: readings.max(Self::SETTLED), ..self }
     }
 
-    /// A tare whose followed baseline is the latest untouched reading, for calibrations whose presses are less the untouched reading before
-    /// each. Of readings with times it is the mean over the last [`Tare::MOMENT_S`].
+    /// Uses the latest untouched reading as the followed baseline. Suits calibrations that subtract from each press the untouched reading before
+    /// it. For readings with times the baseline is the mean over the last [`Tare::MOMENT_S`].
     #[must_use]
     pub fn with_last_zero(self) -> Self {
         Self { zero: Zero::Last, ..self }
     }
 
     /// Notes the time of the next reading in seconds, by any clock. A followed baseline then forgets over [`Tare::TIME_CONSTANT_S`] at the mean
-    /// rate of the readings, but over no fewer than [`Tare::SETTLED`] readings. A time that is not later than the one before starts the clock
-    /// anew.
+    /// rate of the readings, but over no fewer than [`Tare::SETTLED`] readings. A time that is not later than the one before restarts the clock.
     ///
-    /// The rest after a touch lasts seconds too. Counts that remain readings are those that the noise of single readings asks for:
-    /// [`Tare::SETTLED`] and [`Tare::LET_GO`].
+    /// The length of the rest after a touch is then in seconds too. [`Tare::SETTLED`] and [`Tare::LET_GO`] remain counts of readings, because they
+    /// depend on the noise of single readings.
     pub fn note_time(&mut self, time_s: f64) {
         let new = Clock { last_s: time_s, step_s: f64::INFINITY, interval_s: 0.0, intervals: 0 };
         let Some(mut clock) = self.clock.filter(|clock| time_s > clock.last_s) else {
@@ -192,14 +190,15 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         self.time_constant = ((Self::TIME_CONSTANT_S / clock.interval_s) as u32).max(Self::SETTLED);
     }
 
-    /// A tare that leaves the residue of a touch in the tared readings, for a caller that takes creep off by itself.
+    /// Leaves the residue of a touch in the tared readings, for a caller that removes creep by itself.
     #[must_use]
     pub fn without_rests(self) -> Self {
         Self { takes_rests: false, ..self }
     }
 
-    /// The same, of a calibration in whose course the untouched reading drifted. `last` is its last untouched reading, and `reach` the change of each
-    /// channel that counts as more drift. The first readings after it are untouched where they are within this reach.
+    /// Sets the drift of the untouched reading in the course of the calibration. `last` is the last untouched reading of the calibration, and `reach`
+    /// the largest change of each channel that counts as more drift. The first readings after the calibration are untouched where they are within
+    /// `reach`.
     ///
     /// # Errors
     /// [`TareError`] for another number of channels, or a value of `last` that is not finite.
@@ -232,7 +231,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         }
     }
 
-    /// A tare of the same calibration and settings that begins anew.
+    /// Tare of this calibration and these settings in its initial state.
     #[must_use]
     pub fn restarted(&self) -> Self {
         let Self { time_constant, clock, zero, takes_rests, .. } = *self;
@@ -245,17 +244,18 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         self.current.values.as_ref()
     }
 
-    /// Untouched reading of each channel, as calibration learnt it.
+    /// Untouched reading of each channel at calibration.
     pub fn learnt(&self) -> &[f64] {
         self.learnt.as_ref()
     }
 
-    /// False while a followed baseline may be that of a touch: what calibration learnt does not fit, and no contact has yet come and gone by it.
+    /// False while a followed baseline may be that of a touch: the offsets of the calibration do not fit, and no contact has yet begun and ended by
+    /// the baseline.
     pub fn is_confirmed(&self) -> bool {
         self.is_confirmed
     }
 
-    /// Adds a reading that is known to be untouched to the mean that is the baseline; the first takes the place of what calibration learnt.
+    /// Adds a reading that is known to be untouched to the mean that is the baseline; the first one replaces the offsets of the calibration.
     ///
     /// # Errors
     /// [`TareError`] for another number of channels or a value that is not finite.
@@ -267,10 +267,10 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         Ok(())
     }
 
-    /// Writes the reading less the baseline, and what calibration learnt added, over `tared`.
+    /// Writes the tared reading, r − b + o, into `tared`.
     ///
     /// # Errors
-    /// [`TareError`] where reading or `tared` have another number of channels, or for a value that is not finite, also of the tared reading.
+    /// [`TareError`] where reading or `tared` have another number of channels, or for a value that is not finite, also in the tared reading.
     pub fn apply(&self, reading: &[f64], tared: &mut [f64]) -> Result<(), TareError> {
         let needed = self.learnt.as_ref().len();
         check(reading, needed)?;
@@ -278,32 +278,33 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             return Err(TareError::Channels { needed, found: tared.len() });
         }
         self.current.take_off(reading, self.learnt(), tared);
-        // Immense readings may be finite, and their difference not.
+        // The difference of finite readings can overflow.
         check(tared, needed)
     }
 
-    /// Locates a tared reading, and follows the drift of the baseline while nothing touches. `tared` holds the tared reading afterwards.
+    /// Locates a tared reading, and follows the drift of the baseline while the surface is untouched. `tared` contains the tared reading afterwards.
     ///
-    /// The status that `locate` gives says what a reading is to the baseline:
-    /// - `no_contact`: the baseline moves towards it, by a straight line through such readings of the last [`Tare::TIME_CONSTANT_S`], whose slope is
-    ///   the drift; [`Tare::with_last_zero`] takes the reading itself;
-    /// - a contact, whether held for a second or an hour: the baseline is not moved by it. It drifts on as before for as many readings as the drift was
-    ///   learnt from. The first reading is the new baseline where more of the calibration's drift explains it ([`Tare::with_drift`]);
-    /// - after a touch, readings that stay and are `no_contact`, or small beside the touch: hysteresis, creep or drift have left them, and their mean is the new
-    ///   baseline;
-    /// - `outside_model`, which no contact explains: while the baseline is not yet the mean of [`Tare::SETTLED`] readings the surface has
-    ///   moved since its calibration, and the reading is the new baseline, unless a value of it is beyond ±[`LARGEST_READING`]. Later the
-    ///   baseline stays, as a palm is no contact of the model either, but for three cases, each of [`Tare::LET_GO`] readings in a row:
-    ///   - the opposite of the readings is a contact: the surface was touched when it was tared and has been let go, and the reading
+    /// The status from `locate` determines the effect of the reading on the baseline:
+    /// - `no_contact`: the baseline follows a straight line through such readings of the last [`Tare::TIME_CONSTANT_S`]. The slope of the line is
+    ///   the drift. [`Tare::with_last_zero`] takes the reading itself;
+    /// - a contact of any duration: the reading does not move the baseline. The baseline drifts on for as many readings as the drift was
+    ///   estimated from. The first reading is the new baseline where more of the calibration's drift explains it ([`Tare::with_drift`]);
+    /// - after a touch, steady readings that are `no_contact`, or small compared with the touch: they are the residue of hysteresis, creep or drift, and
+    ///   their mean is the new baseline;
+    /// - `outside_model`, not explained by a contact: while the baseline is not yet the mean of [`Tare::SETTLED`] readings, the surface has
+    ///   moved since its calibration. The reading is then the new baseline, unless a value of it is beyond ±[`LARGEST_READING`]. Later the
+    ///   baseline stays, because a palm is not a contact of the model either. There are three exceptions, each after [`Tare::LET_GO`] consecutive
+    ///   readings:
+    ///   - the opposite of the readings is a contact: the surface was touched when it was tared and has been released, and the reading
     ///     is the new baseline;
-    ///   - by what calibration learnt nothing touches: that is the baseline again;
-    ///   - the baseline is not confirmed, and by another one, which such readings are the mean of, a contact has come and gone: that is the
-    ///     baseline. The one that was left is kept, and comes back when a contact has come and gone by it.
+    ///   - the surface is untouched by the offsets of the calibration: they are the baseline again;
+    ///   - the baseline is not confirmed, and a contact has begun and ended by an alternative baseline, the mean of such readings: the alternative
+    ///     becomes the baseline. The replaced baseline is kept, and returns when a contact has begun and ended by it.
     ///
-    /// A baseline is confirmed where calibration learnt the same, where readings known to be untouched made it, or once a contact has come and gone
-    /// by it. So a board that is touched while it starts is right from the moment it is let go; where it has moved and what touched it is no contact
-    /// (a palm, another force than the known one), it is right from the end of the first touch that is one. Contacts lighter than
-    /// those that are distinguished from noise go into the baseline.
+    /// A baseline is confirmed if the offsets of the calibration fit, or if it is the mean of readings known to be untouched. It is also confirmed once
+    /// a contact has begun and ended by it. If a board is touched while it starts, its baseline is correct from the moment of release. There is one
+    /// exception: the offsets have also moved, and the touch is not a contact of the model (a palm, another force than the known one). The baseline is
+    /// then correct from the end of the first valid contact. Contacts below the detection threshold go into the baseline.
     ///
     /// # Errors
     /// [`TareError`] as for [`Tare::apply`].
@@ -354,7 +355,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             other.untouched = 0;
         }
         if status == Status::NoContact && self.current.weight == 0 {
-            // The surface has not moved: what calibration learnt counts as a settled baseline.
+            // The offsets have not moved: those of the calibration count as a settled baseline.
             self.current.weight = Self::SETTLED;
             self.is_confirmed = true;
         }
@@ -382,8 +383,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         self.rest.add(reading, self.current.values.as_ref(), status, self.time_constant, length)
     }
 
-    /// Takes the mean of the untouched readings of a moment of [`Tare::MOMENT_S`] for the baseline once it is over; a reading that is as long after the one
-    /// before it, or has no time, is a moment by itself. A touch ends the moment, so that its slow beginning is not taken.
+    /// Sets the baseline to the mean of the untouched readings of a moment of [`Tare::MOMENT_S`] once it is over. A reading without a time, or one
+    /// that follows after at least this time, is a moment by itself. A touch discards the moment, to keep its slow beginning out of the baseline.
     fn take_last(&mut self, reading: &[f64]) {
         if self.current.weight < Self::SETTLED {
             self.current.average(reading, Self::SETTLED);
@@ -402,7 +403,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         }
     }
 
-    /// Compares other baselines by a reading that is `outside_model` by a settled one, `tared` by it.
+    /// Tests other baselines with a reading that is `outside_model` by the settled one; `tared` is the reading tared by the settled one.
     fn doubt(&mut self, reading: &[f64], tared: &[f64], locate: &mut impl FnMut(&[f64]) -> Estimate) {
         let mut scratch = self.learnt.clone();
         let mut status_of = |values: &[f64]| {
@@ -421,7 +422,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             self.as_learnt = 0;
             return;
         }
-        // A touch that begins may look like it too, but does not stay.
+        // The beginning of a touch can look like a release too, but its readings are not steady.
         if self.let_go >= LET_GO && self.rest.stays() {
             self.begin_at(reading);
             return;
@@ -433,7 +434,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         self.weigh_other(reading, status);
     }
 
-    /// Holds a reading that is `outside_model` by the baseline, and of a status by the other one, against both.
+    /// Chooses between the current and the alternative baseline with a reading. It is `outside_model` by the current one, and has `status` by the other.
     fn weigh_other(&mut self, reading: &[f64], status: Status) {
         if let Some(other) = &mut self.other {
             self.strange = next_in_row(self.strange, status == Status::OutsideModel);
@@ -457,7 +458,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         }
     }
 
-    /// Takes a reading for the baseline, which nothing confirms yet.
+    /// Sets the baseline to a reading, unconfirmed.
     fn begin_at(&mut self, reading: &[f64]) {
         if !self.is_possible(reading) {
             return;
@@ -487,12 +488,12 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     }
 }
 
-/// [`Tare::LET_GO`], whatever the baselines are kept in.
+/// [`Tare::LET_GO`], which is independent of the container.
 const LET_GO: u32 = Tare::<[f64; 0]>::LET_GO;
 
-/// Readings from which on the drift of a baseline is learnt: a level with a drift is then known by 4/50 of the variance of a reading.
+/// Fewest readings for an estimate of the drift: a level with a drift then has 4/50 of the variance of a reading.
 const DRIFT_FROM: u32 = 50;
-/// Readings from which on a drift is carried on while something touches: over as many readings again its error is a quarter of the noise, √(12/200).
+/// Fewest readings for an extrapolation of the drift during a contact: over as many readings again its error is a quarter of the noise, √(12/200).
 const DRIFT_KNOWN: u32 = 200;
 
 impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
@@ -502,7 +503,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         Self { values, drift, carried: 0, since_rest: u32::MAX, weight, touched: 0, untouched: 0 }
     }
 
-    /// Moves the baseline by its drift for the time of a reading; without untouched readings over no more than the drift was learnt from.
+    /// Moves the baseline by its drift for the time of a reading. Without untouched readings it does so for at most as many readings as the drift was
+    /// estimated from.
     fn carry_drift_on(&mut self) {
         let is_known = self.weight >= DRIFT_KNOWN && self.carried < self.weight;
         if is_known || (self.weight > 0 && self.carried == 0) {
@@ -512,13 +514,13 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         }
     }
 
-    /// Puts the baseline to the mean of so many readings at rest. It drifts on as before.
+    /// Sets the baseline to the mean of `readings` readings at rest, and keeps its drift.
     fn put_to(&mut self, rest: &[f64], readings: u32) {
         self.values.as_mut().copy_from_slice(rest);
         (self.since_rest, self.carried) = (readings, 0);
     }
 
-    /// Writes the reading less the baseline, and what calibration learnt added, over `tared`.
+    /// Writes the tared reading, r − b + o, into `tared`.
     fn take_off(&self, reading: &[f64], learnt: &[f64], tared: &mut [f64]) {
         let baselines = self.values.as_ref().iter().zip(learnt);
         for ((tared, value), (baseline, learnt)) in tared.iter_mut().zip(reading).zip(baselines) {
@@ -526,7 +528,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         }
     }
 
-    /// Counts a reading that has a status by this baseline.
+    /// Counts a reading with its status by this baseline.
     fn count(&mut self, status: Status) {
         self.untouched = next_in_row(self.untouched, status == Status::NoContact);
         if self.touched < LET_GO {
@@ -534,7 +536,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         }
     }
 
-    /// True once readings in a row were a contact, and readings in a row afterwards untouched.
+    /// True once [`LET_GO`] consecutive readings were a contact, and as many afterwards untouched.
     fn saw_a_whole_touch(&self) -> bool {
         self.touched >= LET_GO && self.untouched >= LET_GO
     }
@@ -543,7 +545,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         (self.touched, self.untouched) = (0, 0);
     }
 
-    /// Adds a reading to the mean that the baseline is.
+    /// Adds a reading to the mean that is the baseline.
     fn average(&mut self, reading: &[f64], most: u32) {
         self.weight = self.weight.saturating_add(1).min(most);
         let share = 1.0 / f64::from(self.weight);
@@ -552,9 +554,9 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         }
     }
 
-    /// Moves the baseline and its drift towards a reading: a straight line through the last readings by least squares, whose memory grows to the
-    /// time constant (Morrison, *Introduction to Sequential Smoothing and Prediction*, 1969: the expanding-memory filter of degree 1). Of the first
-    /// readings, and after a rest, it is their mean.
+    /// Updates the baseline and its drift by a reading: a straight line through the last readings by least squares, with a memory that grows to the
+    /// time constant (Morrison, *Introduction to Sequential Smoothing and Prediction*, 1969: the expanding-memory filter of degree 1). For the first
+    /// readings, and after a rest, the baseline is their mean.
     fn follow(&mut self, reading: &[f64], time_constant: u32) {
         self.carried = 0;
         self.since_rest = self.since_rest.saturating_add(1);
@@ -576,7 +578,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
     }
 }
 
-/// Number of readings in a row after the next one, which is one of them or ends the row.
+/// Number of consecutive readings after the next one: `before` + 1 if it belongs to them, otherwise 0.
 fn next_in_row(before: u32, is_one: bool) -> u32 {
     if is_one { before.saturating_add(1) } else { 0 }
 }
@@ -602,12 +604,12 @@ mod tests {
 
     const LEARNT: [f64; 4] = [50.0, -20.0, 0.0, 7.0];
 
-    /// Readings of four channels of a newton at `x`, from 0 to 1.
+    /// Readings of four channels for one newton at `x`, from 0 to 1.
     fn influence(x: f64) -> [f64; 4] {
         [40.0 * (1.0 - x), 40.0 * x, 60.0 * x * (1.0 - x), 25.0 * (1.0 - x * x)]
     }
 
-    /// Least squares over a grid of places, by noise of 1 count.
+    /// Least squares over a grid of places, for noise of 1 count.
     fn locate(reading: &[f64]) -> Estimate {
         let d: [f64; 4] = core::array::from_fn(|c| reading[c] - LEARNT[c]);
         let square: f64 = d.iter().map(|d| d * d).sum();
@@ -645,7 +647,7 @@ mod tests {
         estimate
     }
 
-    /// So many readings of a force at a place.
+    /// Follows readings of a force at a place.
     fn follow_many(tare: &mut Tare<[f64; 4]>, numbers: core::ops::Range<u32>, (force, x): (f64, f64)) {
         for number in numbers {
             follow(tare, reading(number, MOVED, force, x));
@@ -755,7 +757,7 @@ mod tests {
             assert_eq!(estimate.status == Status::NoContact, force == 0.0, "{i}");
         }
         assert!(is_right(&aware, drifted), "{:?}", aware.baseline());
-        // A contact of another place is none of the drift, and one within the reach is right from its lift on.
+        // A contact at another place does not count as drift. After a contact within the reach the baseline is right from its end on.
         let mut touched = aware.restarted();
         assert_eq!(follow(&mut touched, reading(0, [0.0; 4], 4.0, 0.7)).status, Status::Located);
         let mut touched = aware.restarted();
@@ -795,8 +797,8 @@ mod tests {
         Estimate::of_position(Position::along(x), status)
     }
 
-    /// Presses of a force by hand on a board that drifts and leaves a residue, whose untouched readings are known within a second at
-    /// 100 readings a second after each. Drift in counts a reading.
+    /// Presses of a force by hand on a board that drifts and leaves a residue. The untouched readings are known within a second of the end of each, at
+    /// 100 readings a second. The drift is in counts per reading.
     fn presses_end(locate: fn(&[f64]) -> Estimate, drift: f64, residue: f64) {
         let mut tare = Tare::new(LEARNT).unwrap();
         let mut number = 0;
@@ -845,7 +847,7 @@ mod tests {
         assert!(is_right(&tare, MOVED), "{:?}", tare.baseline());
     }
 
-    /// So many readings of a palm, a newton or more at either end.
+    /// Follows readings of a palm, a newton or more at either end.
     fn follow_palm(tare: &mut Tare<[f64; 4]>, numbers: core::ops::Range<u32>, moved: [f64; 4]) -> Estimate {
         let mut estimate = None;
         for number in numbers {
@@ -871,7 +873,7 @@ mod tests {
     fn a_palm_while_a_moved_board_starts_is_forgotten_once_a_contact_has_come_and_gone() {
         let mut tare = Tare::new(LEARNT).unwrap();
         follow_palm(&mut tare, 0..300, MOVED);
-        // Nothing tells this from a palm on an untouched board.
+        // This cannot be distinguished from a palm on an untouched board.
         follow_many(&mut tare, 0..100, (0.0, 0.0));
         assert_eq!(follow(&mut tare, reading(1, MOVED, 0.0, 0.0)).status, Status::OutsideModel);
         follow_many(&mut tare, 0..20, (1.5, 0.6));

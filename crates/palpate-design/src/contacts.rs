@@ -1,21 +1,21 @@
-//! The contacts that a design is for.
+//! Contacts for which a design is made.
 
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::OutOfRange;
 
-/// Contact positions along a line, and along the longer side of a plane, where a design does not say.
+/// Default number of contact positions along a line, and along the longer side of a plane.
 const ALONG_A_LINE: f64 = 400.0;
 const ALONG_A_PLANE: f64 = 30.0;
 
-/// Prior of contact positions: every so far from one place to another, both included.
+/// Prior of contact positions: a regular grid between two positions, both included.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactPrior {
     /// The left end, or lower left corner.
     pub from: Position,
     /// The right end, or upper right corner.
     pub to: Position,
-    /// The distance of neighbours, in metres; greater than 0.
+    /// Distance between neighbours, in metres; greater than 0.
     pub every_m: f64,
     /// Relative frequencies of contacts in equal stretches along the length, from left to right; empty where they are uniform.
     pub weights: Vec<f64>,
@@ -35,14 +35,14 @@ impl ContactPrior {
         }
     }
 
-    /// Contacts along a line, as often everywhere: every `every_m` from `from_m` to `to_m`, in metres.
+    /// Contacts along a line with uniform weights: every `every_m` from `from_m` to `to_m`, in metres.
     pub fn along(from_m: f64, to_m: f64, every_m: f64) -> Self {
         let (from, to) = (Position::along(from_m), Position::along(to_m));
         Self { from, to, every_m, weights: Vec::new() }
     }
 }
 
-/// Checks that a number of things is no more than fit into memory.
+/// Checks that a count is at most 1,000,000, so that the items fit into memory.
 pub(crate) fn check_count(what: &'static str, count: f64) -> Result<(), OutOfRange> {
     OutOfRange::check("at most 1,000,000", [(what, count)], |count| count <= 1e6)
 }
@@ -61,7 +61,7 @@ pub(crate) fn check_positions(
     outside.map_or(Ok(()), |at| Err(beyond(at)))
 }
 
-/// The distance that so many make along a line, or along the longer side of a plane.
+/// Length of a line, or of the longer side of a plane, divided by `along_a_line` or `along_a_plane`.
 pub(crate) fn spacing(extent: Extent, along_a_line: f64, along_a_plane: f64) -> f64 {
     match extent.width_m() {
         None => extent.length_m() / along_a_line,
@@ -69,7 +69,7 @@ pub(crate) fn spacing(extent: Extent, along_a_line: f64, along_a_plane: f64) -> 
     }
 }
 
-/// Contact positions, and how often the surface is touched there.
+/// Contact positions and their relative frequencies.
 ///
 /// ```
 /// use palpate_design::{ContactPrior, WeightedContacts};
@@ -84,14 +84,14 @@ pub(crate) fn spacing(extent: Extent, along_a_line: f64, along_a_plane: f64) -> 
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeightedContacts {
-    /// Where; on a line from left to right, on a plane row by row from the lower left.
+    /// Positions; on a line from left to right, on a plane row by row from the lower left.
     pub positions: Vec<Position>,
-    /// The share of contacts there, as many; their sum is 1.
+    /// Share of the contacts at each position; the sum is 1.
     pub weights: Vec<f64>,
 }
 
 impl WeightedContacts {
-    /// The positions of a prior with the share of each; those that are never touched are left out.
+    /// The positions of a prior with the share of each; positions with a share of 0 are omitted.
     ///
     /// # Errors
     /// [`OutOfRange`] for a prior that does not lie on the surface or has no contacts.
@@ -107,7 +107,7 @@ impl WeightedContacts {
         let shares = weights.iter().map(|weight| ("a weight of contacts", *weight));
         OutOfRange::check("at least 0", shares, |value| value.is_finite() && value >= 0.0)?;
         let along = |from_m: f64, to_m: f64| {
-            // A rounding error must not cost the last one.
+            // A rounding error must not drop the last position.
             let steps = ((to_m - from_m) / *every_m + 1e-6).floor() as usize;
             (0..=steps).map(move |i| from_m + i as f64 * *every_m)
         };
@@ -127,7 +127,7 @@ impl WeightedContacts {
         Ok(Self { positions, weights: weights.iter().map(|weight| weight / sum).collect() })
     }
 
-    /// An even sample of at most so many of them, weighted by their shares among themselves.
+    /// An even sample of at most `most` contacts, with weights normalized among them.
     #[must_use]
     pub(crate) fn sample(&self, most: usize) -> Self {
         let step = self.len().div_ceil(most);
@@ -143,12 +143,12 @@ impl WeightedContacts {
         self.positions.len()
     }
 
-    /// Whether there are none.
+    /// True for zero contacts.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
 
-    /// The weighted mean of a figure of each position.
+    /// The weighted mean of one figure per position.
     pub fn mean(&self, figures: impl IntoIterator<Item = f64>) -> f64 {
         self.weights.iter().zip(figures).map(|(weight, figure)| weight * figure).sum()
     }

@@ -1,4 +1,4 @@
-//! Setups that tests share: those of the examples, as values.
+//! Setups that tests share, as in the examples.
 
 use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::Estimator;

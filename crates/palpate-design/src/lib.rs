@@ -1,8 +1,8 @@
 //! Placement of sensors and of training presses, scored by the location error that follows.
 //!
-//! [`sensors`] places sensors so that the Cramér–Rao bound over the expected contacts is small; [`positions`] places the training
-//! presses so that the estimator errs least after simulated calibrations, and says where a recording begun goes on. What both
-//! propose is verified alike: calibrated with fresh noise, and asked for contacts ([`Verification`]).
+//! [`sensors`] places sensors so that the Cramér–Rao bound over the expected contacts is small. [`positions`] places the training
+//! presses so that the error of the estimator is least after simulated calibrations, and advises where to continue a recording.
+//! Both proposals are verified in the same way: calibrations with fresh noise locate contacts ([`Verification`]).
 //!
 //! ```
 //! use palpate_design::positions::{PositionDesign, next_press};

@@ -17,12 +17,13 @@ pub struct Verification {
     pub median_error_m: f64,
     /// Share of the contacts located within the tolerance, in %.
     pub within_tolerance_percent: f64,
-    /// Calibrations.
+    /// Number of calibrations.
     pub calibrations: usize,
 }
 
 impl Verification {
-    /// Sums up calibrations, at least one, each judged by as many readings of each contact, one contact after the other.
+    /// Summarizes at least one calibration. Each is evaluated with equally many readings of each contact, one contact after the
+    /// other.
     pub(crate) fn from_calibrations(
         calibrations: &[Evaluation],
         contacts: &WeightedContacts,
@@ -41,7 +42,7 @@ impl Verification {
     }
 }
 
-/// One calibration's mean error at each contact, in metres.
+/// Mean error of one calibration at each contact, in metres.
 pub(crate) fn errors_by_contact(calibration: &Evaluation, contacts: &WeightedContacts) -> Vec<f64> {
     let readings = calibration.located.len() / contacts.len();
     let error_m =

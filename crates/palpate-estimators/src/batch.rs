@@ -1,4 +1,4 @@
-//! Batches: many readings located at once, in memory that does not grow with their number, by as many threads as one likes.
+//! Batches: many readings located at once, in memory that does not grow with their number, by any number of threads.
 
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,12 +18,12 @@ pub const BLOCK: usize = 256;
 pub struct BatchOptions<'a> {
     /// Threads that locate; the estimates do not depend on it.
     pub threads: NonZeroUsize,
-    /// Watch over the batch, which is told of each block.
+    /// Watch over the batch, which is notified of each block.
     pub watch: Watch<'a>,
 }
 
 impl Default for BatchOptions<'_> {
-    /// One thread, and nobody watches.
+    /// One thread, without a watch.
     fn default() -> Self {
         Self { threads: NonZeroUsize::MIN, watch: Watch::NONE }
     }
@@ -32,23 +32,23 @@ impl Default for BatchOptions<'_> {
 /// Callback for the estimates of a block, from any of the threads, and in any order: `take(first, estimates)`, with the row of the first one, from 0.
 pub type TakeBlock<'a> = dyn Fn(usize, &[Estimate]) + Sync + 'a;
 
-/// Readings that nothing can be told from.
+/// Invalid readings, or a batch that was stopped.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum BatchError {
     /// Values that do not make whole readings.
-    #[error("{values} values are no whole number of readings; the locator has {channels} channels")]
+    #[error("{values} values are not a whole number of readings; the locator has {channels} channels")]
     Uneven {
         /// Number of values.
         values: usize,
         /// Channels of the locator.
         channels: usize,
     },
-    /// A reading with a value that is no number.
+    /// A reading with a value that is not a number.
     #[error("reading {row}: {error}")]
     Reading {
-        /// Which reading is the first such, from 1.
+        /// Number of the first invalid reading, from 1.
         row: usize,
-        /// What is wrong with it.
+        /// Error of this reading.
         error: ReadingError,
     },
     /// The batch was stopped.
@@ -59,7 +59,7 @@ pub enum BatchError {
 impl<M: Locate> Fitted<M> {
     /// Estimates the contacts of many readings, which lie one after the other, one value a channel, in SI units or raw.
     ///
-    /// The estimates are those of [`Fitted::locate`], to the last bit; of the influence estimator on a line, eight readings are located together.
+    /// The estimates equal those of [`Fitted::locate`] to the last bit. The influence estimator on a line locates eight readings together.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, fit::Fit, influence::Influence, setup::Setup};
@@ -90,8 +90,8 @@ impl<M: Locate> Fitted<M> {
     /// Estimates the contacts of many readings, as [`Fitted::locate_batch`] does, [`BLOCK`] by [`BLOCK`], and hands each block to `take`.
     ///
     /// # Errors
-    /// [`BatchError`] for values that make no whole readings, or that are not finite, and when the watch stopped it; blocks that were located by then
-    /// `take` has been given.
+    /// [`BatchError`] for values that make no whole readings, or that are not finite, and when the watch stopped it. `take` has then
+    /// received the blocks that were located.
     pub fn locate_blocks(
         &self,
         readings: &[f64],
@@ -109,7 +109,8 @@ impl<M: Locate> Fitted<M> {
         let lock = || failed.lock().unwrap_or_else(PoisonError::into_inner);
         let work = || {
             let mut estimates = vec![NO_CONTACT; BLOCK.min(rows)];
-            // A block that is taken is gone through: those before one that fails have been, and the first bad reading is found whatever the threads.
+            // A block that a thread takes is always completed, and so are all blocks before one that fails. The first invalid reading is
+            // thus reported for any number of threads.
             while lock().is_none() {
                 let first = taken.fetch_add(BLOCK, Ordering::Relaxed);
                 if first >= rows {
@@ -139,7 +140,7 @@ impl<M: Locate> Fitted<M> {
         failed.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
     }
 
-    /// Channels of a reading; at least 1, of which the values make whole readings.
+    /// Channels of a reading, at least 1; the number of values must be a multiple of them.
     fn channels_of(&self, readings: &[f64]) -> Result<usize, BatchError> {
         let (values, channels) = (readings.len(), self.layout().len().max(1));
         if values.is_multiple_of(channels) {
@@ -149,7 +150,7 @@ impl<M: Locate> Fitted<M> {
         }
     }
 
-    /// Locates the readings of a block, of which the first is that of the row `first`, from 0.
+    /// Locates the readings of a block; `first` is the row of its first reading, from 0.
     fn locate_block(
         &self,
         readings: &[f64],
@@ -174,7 +175,7 @@ impl<M: Locate> Fitted<M> {
 }
 
 impl BatchError {
-    /// Which reading is meant, from 1; none of them comes last.
+    /// Number of the reading, from 1; errors without a reading come last.
     fn row(&self) -> usize {
         match self {
             Self::Reading { row, .. } => *row,

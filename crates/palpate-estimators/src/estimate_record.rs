@@ -1,11 +1,11 @@
-//! An estimate as files and streams have it: in millimetres and newtons, without what was not estimated.
+//! An estimate in files and streams: in millimetres and newtons, without quantities that are not estimated.
 
 use crate::force_prior::force_interval_95_n;
 use palpate_core::{ContactEstimate, Estimate, Mode};
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 
-/// The word for an estimate near an end, of a force that is not known.
+/// Quantities that trade off near an end where the force is unknown.
 const TRADE_OFF: &str = "force and position";
 
 /// An estimate as a record of JSON.
@@ -49,7 +49,7 @@ pub struct ContactRecord {
     /// Ends of the 95 % interval along the surface, in mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub x_95_mm: Option<[f64; 2]>,
-    /// The same across a plane.
+    /// Ends of the 95 % interval across a plane, in mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_95_mm: Option<[f64; 2]>,
     /// Standard deviation of the position, of a plane that of the distance, in mm.
@@ -58,7 +58,7 @@ pub struct ContactRecord {
     /// Ends of the force's 95 % interval where force and place trade off, in N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_95_n: Option<[f64; 2]>,
-    /// The word for that.
+    /// The quantities that trade off, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trade_off: Option<&'static str>,
     /// Standard deviation of the force, in N.
@@ -98,7 +98,7 @@ impl ContactRecord {
     pub fn new(contact: &ContactEstimate, extent: Extent) -> Self {
         let uncertainty = contact.uncertainty.as_ref();
         let mm = |(low, high): (f64, f64)| [low * 1e3, high * 1e3];
-        // JSON has no infinity: what is not known at all is left out.
+        // JSON has no infinity: an undetermined quantity is omitted.
         let sd = |variance: f64| Some(variance.sqrt()).filter(|sd| *sd > 0.0 && sd.is_finite());
         let force_95_n = uncertainty.and_then(|u| u.force_95_n).map(|(low_n, high_n)| [low_n, high_n]);
         Self {
@@ -114,8 +114,8 @@ impl ContactRecord {
         }
     }
 
-    /// The 95 % interval of a force that is estimated, in N: its own where it trades off against the place, elsewhere that of a normal distribution;
-    /// `None` of a force that is known, not estimated, or not told at all.
+    /// The 95 % interval of a force that is estimated, in N: its own where it trades off against the place, elsewhere that of a normal
+    /// distribution; `None` for a force that is known, not estimated, or undetermined.
     pub fn force_interval_95_n(&self) -> Option<[f64; 2]> {
         let normal =
             || self.force_n.zip(self.sd_force_n).map(|(at_n, sd_n)| force_interval_95_n(at_n, sd_n).into());

@@ -30,25 +30,25 @@ pub struct FitTask<'a> {
     pub setup: &'a Setup,
     /// Readings with their contacts; as many channels as the bench has sensors, and at least one row.
     pub recording: &'a Recording,
-    /// Seed of whatever the method draws at random.
+    /// Seed of the random numbers of the method.
     pub seed: u64,
-    /// Watch over the fit: it is told of the progress, and may stop it.
+    /// Watch over the fit: it receives the progress, and may stop the fit.
     pub watch: Watch<'a>,
 }
 
 impl<'a> FitTask<'a> {
-    /// A fit with seed 0 that nobody watches.
+    /// A fit with seed 0, without a watch.
     pub fn new(setup: &'a Setup, recording: &'a Recording) -> Self {
         Self { setup, recording, seed: 0, watch: Watch::NONE }
     }
 
-    /// The same from another seed.
+    /// Sets the seed.
     #[must_use]
     pub fn seed(self, seed: u64) -> Self {
         Self { seed, ..self }
     }
 
-    /// The same, watched.
+    /// Sets the watch.
     #[must_use]
     pub fn watch(self, watch: Watch<'a>) -> Self {
         Self { watch, ..self }
@@ -64,7 +64,7 @@ impl<'a> FitTask<'a> {
     }
 }
 
-/// A recording whose channels are not the setup's sensors.
+/// A recording with another number of channels than the setup has sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the recording has {found} channels; the bench has {needed} sensors")]
 pub struct ChannelMismatch {
@@ -74,7 +74,7 @@ pub struct ChannelMismatch {
     pub found: usize,
 }
 
-/// Seeds of fits that are still to be made, and where their results go.
+/// Queue of the seeds of pending fits, which takes their results.
 pub trait SeedQueue<T> {
     /// The seed of the next fit; `None` when all are taken.
     fn next_seed(&mut self) -> Option<u64>;
@@ -112,7 +112,7 @@ impl<T> SeedQueue<T> for SeedList<T> {
     }
 }
 
-/// A queue of `U` as one of what `map` makes into `U`.
+/// A queue of `U` as a queue of values that `map` converts into `U`.
 pub(crate) struct Mapped<'a, U, F> {
     pub queue: &'a mut dyn SeedQueue<U>,
     pub map: F,
@@ -189,7 +189,7 @@ pub trait Fit {
         None
     }
 
-    /// Fits with a seed, watched, without a check of the estimates: what studies of a method need.
+    /// Fits with a seed, watched, without a check of the estimates, for studies of a method.
     ///
     /// # Errors
     /// When the recording does not suit the setup or the method, or the watch stopped it.
@@ -198,8 +198,8 @@ pub trait Fit {
         Ok(Fitted::new(task, self.fit_method(task)?))
     }
 
-    /// Fits once for every seed of a queue, to the task's recording; the task's own seed is not used. A seed gives the same
-    /// locator as [`Fit::fit_alone`] does; methods that can, fit many seeds at once.
+    /// Fits once for every seed of a queue, to the task's recording; the task's own seed is not used. A seed gives the same locator as
+    /// [`Fit::fit_alone`] does. Some methods fit many seeds at once.
     ///
     /// ```
     /// use palpate_estimators::fit::{Fit, FitTask, SeedList};
@@ -217,8 +217,7 @@ pub trait Fit {
     /// ```
     ///
     /// # Errors
-    /// When the recording does not suit the setup or the method, or the watch stopped it; what was fitted before is in the
-    /// queue.
+    /// When the recording does not suit the setup or the method, or the watch stopped it. The queue then contains the locators fitted so far.
     fn fit_many(
         &self,
         task: FitTask,
@@ -231,8 +230,8 @@ pub trait Fit {
     }
 }
 
-/// Folds in which intervals are checked: each place alone where places are few, since a fold of several of them leaves holes that contacts in use do not
-/// meet. Intervals over holes are wide, and say little of those between presses.
+/// Number of folds in which intervals are checked: one for each place where places are few. A fold of several places leaves gaps that
+/// contacts in use do not meet. Intervals over such gaps are wide, and do not represent those between presses.
 pub(crate) fn check_folds(places: usize) -> usize {
     const MOST_ALONE: usize = 40;
     const OF_MANY: usize = 5;
@@ -252,8 +251,9 @@ pub(crate) fn fit_with_interval_check<E: Fit + ?Sized>(
     Ok(Fitted { interval_check, ..locator })
 }
 
-/// Checks the intervals of an estimator's locators at held-out places; `None` of fewer than [`FEWEST_FOR_95`] places, of a method without intervals, and
-/// where the folds cannot be fitted. A drift that the presses show is subtracted from the held-out readings, as a tare does in use.
+/// Checks the intervals of an estimator's locators at held-out places; `None` for fewer than [`FEWEST_FOR_95`] places, for a method without
+/// intervals, and where the folds cannot be fitted. A drift that the presses show is subtracted from the held-out readings, as by a tare in
+/// use.
 fn check_intervals<E: Fit + ?Sized>(
     estimator: &E,
     task: FitTask,
@@ -290,25 +290,25 @@ pub(crate) struct HeldOut {
     pub locating_s: f64,
 }
 
-/// Splits whose presses cannot be located.
+/// Failure to fit to a split, or to locate its presses.
 pub(crate) enum HoldOutError<E> {
     Fit(E),
     Reading(ReadingError),
 }
 
-/// Splits whose presses are held out.
+/// Splits, and what locating their held-out presses requires.
 pub(crate) struct HoldOutTask<'a> {
     pub setup: &'a Setup,
     pub splits: &'a [Split],
     pub seed: u64,
-    /// Tells seconds since any fixed moment.
+    /// Seconds since any fixed moment.
     pub clock: &'a dyn Fn() -> f64,
     pub watch: Watch<'a>,
 }
 
 impl HoldOutTask<'_> {
     /// Locates the judged presses of each split with the locator that `fit` gives for its training part. `fit` receives the number of the split, and returns
-    /// seconds too: those by which the fit would have taken longer alone.
+    /// seconds too: those by which the fit would take longer alone.
     pub fn run<M: Locate, E>(
         &self,
         fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
@@ -343,30 +343,30 @@ pub trait Locate {
     /// Estimates the contact from a reading: one finite value a channel, in SI units or raw.
     fn locate(&self, reading: &[f64]) -> Estimate;
 
-    /// Estimates the contact of each of many readings, which lie one after the other, `channels` values each, and writes over `estimates`, one a
-    /// reading. An estimate is the one that [`Locate::locate`] gives, to the last bit; methods that can, locate many readings at once.
+    /// Estimates the contact of each of many readings, which lie one after the other, `channels` values each, and writes over `estimates`,
+    /// one a reading. Each estimate equals that of [`Locate::locate`] to the last bit. Some methods locate many readings at once.
     fn locate_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate]) {
         for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
             *estimate = self.locate(reading);
         }
     }
 
-    /// Offset of each channel, in its SI unit; `None` where it was not learnt.
+    /// Offset of each channel, in its SI unit; `None` where the method does not learn it.
     fn offsets(&self) -> Option<Vec<f64>> {
         None
     }
 
-    /// Standard deviation of each channel's noise, `None` of channels that are not in use; `None` of a method that learns none.
+    /// Standard deviation of each channel's noise, `None` for channels that are not in use; `None` for a method that does not learn it.
     fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
         None
     }
 
-    /// Share of untouched readings that may be taken for a contact; `None` of a method that tells no untouched reading.
+    /// Share of untouched readings that may be mistaken for a contact; `None` for a method that does not detect untouched readings.
     fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         None
     }
 
-    /// Checks what a file may have got wrong.
+    /// Checks the values read from a file.
     ///
     /// # Errors
     /// [`LocatorFault`], naming what does not fit together.
@@ -375,7 +375,7 @@ pub trait Locate {
 
 /// A check of estimates by other means than those of the method that made them.
 pub trait CheckEstimate: Clone + Debug + PartialEq + Serialize + DeserializeOwned {
-    /// Share of untouched readings that may be taken for a contact; `None` of a check that tells no untouched reading.
+    /// Share of untouched readings that may be mistaken for a contact; `None` for a check that does not detect untouched readings.
     fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         None
     }
@@ -385,7 +385,7 @@ pub trait CheckEstimate: Clone + Debug + PartialEq + Serialize + DeserializeOwne
         None
     }
 
-    /// An estimate of a reading on a surface as the check leaves it.
+    /// The estimate of a reading on a surface after the check.
     fn checked(&self, reading: &[f64], estimate: Estimate, extent: Extent) -> Estimate;
 
     /// Checks the estimates of many readings, which lie one after the other, `channels` values each, as [`CheckEstimate::checked`] does.
@@ -395,7 +395,7 @@ pub trait CheckEstimate: Clone + Debug + PartialEq + Serialize + DeserializeOwne
         }
     }
 
-    /// Checks what a file may have got wrong.
+    /// Checks the values read from a file.
     ///
     /// # Errors
     /// [`LocatorFault`], naming what does not fit together.
@@ -416,7 +416,7 @@ impl CheckEstimate for NoCheck {
     }
 }
 
-/// A locator: a fitted method with its setup and provenance, so that nothing it needs is outside it.
+/// A locator: a fitted method with its setup and provenance. It contains everything that locating requires.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fitted<M: Locate> {
@@ -453,7 +453,7 @@ pub struct LocatorProvenance {
     pub seed: u64,
     /// The recording that it was fitted to.
     pub recording: Provenance,
-    /// Estimators among which this one was chosen, itself first, then the others by rising score; empty of an estimator that was named.
+    /// Estimators among which this one was chosen, itself first, then the others by rising score; empty for an estimator that was named.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub choice: Vec<Tried>,
 }
@@ -480,7 +480,7 @@ impl<M: Locate> Fitted<M> {
         }
     }
 
-    /// The same locator with its method as another type, without a check.
+    /// Converts the method to another type, and removes the check of its estimates.
     pub fn map<N: Locate>(self, convert: impl FnOnce(M) -> N) -> Fitted<N> {
         let Self { setup, provenance, method, untouched, untouched_scatter, untouched_drift, .. } = self;
         Fitted {
@@ -541,9 +541,9 @@ impl<M: Locate> Fitted<M> {
         }
     }
 
-    /// The locator with the scatter of the untouched rows of the recording that it was fitted to, where its noise does not explain it at the 5 % level. A
-    /// scatter that hides most presses is not that of an untouched surface, and is left out. A method without a rule of `no_contact` has the scatter as
-    /// its rule: by single untouched rows, or by repeats, where there are no rests.
+    /// Adds the scatter of the untouched rows of the recording that the locator was fitted to, where its noise does not explain it at the 5
+    /// % level. A scatter that hides most presses is not that of an untouched surface, and is omitted. A method without a rule of
+    /// `no_contact` uses the scatter as its rule. Without rests, the scatter is then that of single untouched rows, or of repeats.
     #[must_use]
     pub fn with_scatter_of(self, recording: &Recording) -> Self {
         let of_check = || self.check.as_ref()?.false_alarm_rate();
@@ -559,7 +559,7 @@ impl<M: Locate> Fitted<M> {
         self.with_scatter(scatter, recording)
     }
 
-    /// Standard deviation of each channel's noise by the method, its check or the layout; `None` of a channel that is not in use.
+    /// Standard deviation of each channel's noise by the method, its check or the layout; `None` for a channel that is not in use.
     pub(crate) fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
         let of_check = || self.check.as_ref()?.noise_sd();
         let of_layout = || self.setup.layout().reading_sds().ok();
@@ -575,7 +575,7 @@ impl<M: Locate> Fitted<M> {
         Self { untouched_scatter: if is_right { Some(scatter) } else { self.untouched_scatter }, ..self }
     }
 
-    /// Checks what a file may have got wrong.
+    /// Checks the values read from a file.
     ///
     /// # Errors
     /// [`LocatorFault`], naming what does not fit together.
@@ -603,14 +603,14 @@ impl<M: Locate> Fitted<M> {
 /// Largest size of a number of a locator, as of a reading.
 pub(crate) const LARGEST: f64 = palpate_core::LARGEST_READING;
 
-/// An estimate of a reading as locators give it: in numbers, and `located` only where the reading tells something of the place.
+/// The estimate that a locator returns for a reading: finite, and `located` only where the reading restricts the position.
 fn limited(estimate: Estimate, reading: &[f64], setup: &Setup) -> Estimate {
     let extent = setup.surface().extent();
     let is_absurd = |(value, sensor): (&f64, &Sensor)| value.abs() > LARGEST && !sensor.channel.dead;
     if reading.iter().zip(setup.layout().sensors()).any(is_absurd) {
         return anywhere_on(extent);
     }
-    // Where no contact explains a reading, and all are infinitely far from it, none is excluded beside another.
+    // Where no contact explains a reading, and all are infinitely far from it, no contact excludes another.
     let is_point = estimate.status == Status::OutsideModel
         && estimate
             .contact
@@ -623,8 +623,8 @@ fn limited(estimate: Estimate, reading: &[f64], setup: &Setup) -> Estimate {
     }
 }
 
-/// The estimate in place of one of which something is not a number, as of readings far beyond all that a sensor reads: no contact explains the
-/// reading, and the whole surface is left.
+/// The estimate in place of one with a value that is not a number, as for readings far beyond the range of a sensor: no contact explains
+/// the reading, and no position of the surface is excluded.
 fn anywhere_on(extent: Extent) -> Estimate {
     let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
     let uniform = |side_m: f64| side_m * side_m / 12.0;
@@ -639,7 +639,7 @@ fn anywhere_on(extent: Extent) -> Estimate {
     Estimate::of_contact(contact, Status::OutsideModel)
 }
 
-/// A reading that nothing can be told from.
+/// An invalid reading.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ReadingError {
     /// Another number of channels.
@@ -650,7 +650,7 @@ pub enum ReadingError {
         /// Channels of the reading.
         found: usize,
     },
-    /// A value that is no number.
+    /// A value that is not a number.
     #[error("channel {channel} reads {value}; it must be a finite number")]
     NotFinite {
         /// Which channel, from 1.

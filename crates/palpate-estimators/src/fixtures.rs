@@ -37,7 +37,7 @@ impl Example {
     }
 }
 
-/// Readings that a test takes: as many as PALPATE_READINGS says, else `usual`.
+/// Number of readings of a test: the value of PALPATE_READINGS, else `usual`.
 pub(crate) fn readings(usual: usize) -> usize {
     std::env::var("PALPATE_READINGS").ok().and_then(|count| count.parse().ok()).unwrap_or(usual)
 }
@@ -52,7 +52,7 @@ pub(crate) fn paper(noise_m: f64, repeats: usize) -> Example {
     faulty_paper(ChannelModel { noise_sd: noise_m, ..ChannelModel::default() }, repeats)
 }
 
-/// The same with these faults of every channel.
+/// The setup of [`paper`] with these faults of every channel.
 pub(crate) fn faulty_paper(channel: ChannelModel, repeats: usize) -> Example {
     let setup = Setup::new(beam()).sensors(Deflection.evenly(8).channel(channel));
     let setup = setup.and_then(|setup| setup.known_force(newtons(3.0))).unwrap();
@@ -69,7 +69,7 @@ pub(crate) fn plate(elements: usize, channel: ChannelModel) -> Example {
     Example { setup, training: Training::grid(6, 6).repeated(5) }
 }
 
-/// A finger with five strain gauges whose force is not known, pressed with `force_n` at 24 places, twice each.
+/// A finger with five strain gauges and contacts of unknown force, pressed with `force_n` at 24 places, twice each.
 pub(crate) fn digit(direction: ForceDirection, force_n: f64) -> Example {
     let digit = Digit::new(mm(120.0), mm(10.0), mm(0.5), gpa(200.0)).unwrap().with_direction(direction);
     let gauges = Strain.at_x([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
@@ -93,7 +93,7 @@ pub(crate) fn over_the_plate() -> Motion {
     to_and_fro(at(50.0, 80.0), at(250.0, 210.0))
 }
 
-/// The paper's beam of steel, which swings.
+/// The paper's beam of steel, which vibrates.
 pub(crate) fn swinging_beam() -> ModalBeam {
     ModalBeam::new(beam(), 7850.0, 0.01).unwrap()
 }
@@ -153,7 +153,7 @@ pub(crate) fn raw_recording(rows: Vec<Row>) -> Recording {
     Recording::new(&Layout::even(SensorKind::Raw, channels, 1.0), "test", rows)
 }
 
-/// The strip and a recording of it, from the folder of real recordings; `None`, said in one line, where the folder is absent.
+/// The strip and a recording of it, from the folder of real recordings; `None`, reported in one line, where the folder is absent.
 pub(crate) fn strip_recording(file: &str) -> Option<(Setup, Recording)> {
     let path = data::recording(&format!("tactile-fsi/{file}"))?;
     let setup = strip();
@@ -183,7 +183,7 @@ pub(crate) fn sheet_recording() -> Option<(Setup, Recording)> {
     Some((setup, recording))
 }
 
-/// The 95 % interval of a contact's force: its own, or that of a normal distribution; of a known force nothing but this.
+/// The 95 % interval of a contact's force: its own, or that of a normal distribution. Both ends are the force where it is known.
 pub(crate) fn force_95_n(contact: &ContactEstimate) -> (f64, f64) {
     let of_any_line = Extent::line(1.0).unwrap();
     let known_n = contact.force_n.unwrap();

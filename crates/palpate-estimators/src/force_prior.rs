@@ -36,8 +36,8 @@ pub struct ForceRange {
 /// Where readings are proportional to the force, contacts may be so many times lighter or harder than the presses of the calibration: a decade.
 pub(crate) const DECADE: f64 = 10.0;
 
-/// Ratio of the greatest to the least force of presses below which they are presses of one weight. A policy: over less, a saturation of some percent and a
-/// hand that varies are one.
+/// Ratio of the greatest to the least force of presses below which they count as presses of one force. A policy: over a smaller ratio, a
+/// saturation of some percent and a varying hand are indistinguishable.
 pub(crate) const ONE_WEIGHT: f64 = 1.5;
 
 impl ForceRange {
@@ -53,7 +53,7 @@ impl ForceRange {
         Ok(Self { least_n, greatest_n })
     }
 
-    /// A decade either side of the mean force of presses, in newtons, and all of these; `None` without a press.
+    /// From a decade below to a decade above the mean force of presses, in newtons, extended to include all presses; `None` without a press.
     ///
     /// Readings that are proportional to the force have the same directions at any force, so extrapolation is safe there. Another function
     /// of the force is calibrated over the presses alone, and contacts are expected to be about as hard as these.
@@ -108,7 +108,7 @@ pub(crate) struct ForceLikelihood {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ForceIntegral {
     /// −2·ln of the greatest value of prior times likelihood, and of the width about it, up to a constant of the prior. Their sum is −2·ln of the
-    /// integral; infinite where the integral is no number.
+    /// integral; infinite where the integral is not a number.
     pub peak_cost: f64,
     pub width_cost: f64,
     pub mean_n: f64,

@@ -21,7 +21,8 @@ pub struct HeldOutErrors {
 }
 
 impl HeldOutErrors {
-    /// The spread of errors (x, y) in metres; `None` of fewer than [`FEWEST_FOR_95`](palpate_numerics::FEWEST_FOR_95), which bound no 95 % interval.
+    /// The uncertainty by errors (x, y) in metres; `None` for fewer than [`FEWEST_FOR_95`](palpate_numerics::FEWEST_FOR_95), which bound no
+    /// 95 % interval.
     pub fn from_errors(errors_m: &[[f64; 2]]) -> Option<Self> {
         let axis = |axis: usize| {
             let sizes: Vec<f64> = errors_m.iter().map(|error| error[axis].abs()).collect();
@@ -42,7 +43,7 @@ impl HeldOutErrors {
         }
     }
 
-    /// Checks what a file may have got wrong.
+    /// Checks the values read from a file.
     ///
     /// # Errors
     /// [`LocatorFault::BadNumber`] for a number that is negative or not finite.

@@ -1,22 +1,24 @@
 //! Check of 95 % intervals at places that a locator was not fitted to, and their widening.
 //!
-//! An interval is right where the bench is as its method assumes. Presses at held-out places test this: a locator of the same estimator, fitted to the
-//! other folds, locates them. Up to 40 places, each is a fold.
+//! Intervals are valid where the bench fulfils the assumptions of the method. Presses at held-out places test this: a locator of the same
+//! estimator, fitted to the other folds, locates them. With up to 40 places, each place is a fold.
 //!
 //! Two numbers widen intervals: a standard deviation τ that is added to each one's own, and a factor. With the half-width h of an interval, the wider one has
-//! factor·√(h² + (1.96·τ)²); an ellipse of the covariance C has factor²·(C + τ²·I). The added standard deviation stands for errors that the method does not
-//! know, such as presses beside their places. Without it a factor that is right where intervals are wide is too small where they are narrow (Papadopoulos, Vovk
-//! and Gammerman, *Journal of Artificial Intelligence Research* 40, 2011, normalize residuals alike). τ is the one with which normal errors of the
-//! widened standard deviations, times any factor, are most likely. It is added where it raises the log-likelihood by more than 1, the price of a parameter
-//! (Akaike, *IEEE Transactions on Automatic Control* 19, 1974), with each place counted once.
+//! factor·√(h² + (1.96·τ)²); an ellipse of the covariance C has factor²·(C + τ²·I). The added standard deviation represents errors that the
+//! method does not model, such as presses beside their places. Without it, a factor that is right for wide intervals is too small for
+//! narrow ones (Papadopoulos, Vovk and Gammerman, *Journal of Artificial Intelligence Research* 40, 2011, normalize residuals alike). τ is
+//! the value with which normal errors of the widened standard deviations, times any factor, are most likely. It is added where it raises
+//! the log-likelihood by more than 1, the price of a parameter (Akaike, *IEEE Transactions on Automatic Control* 19, 1974), with each place
+//! counted once.
 //!
 //! The ratio of a press is the least factor by which its interval contains it, lengthened to both sides alike (Romano, Patterson and Candès, *NeurIPS*, 2019:
 //! conformalized quantile regression); on a plane, the square root of (e − t)ᵀ·C⁻¹·(e − t) over that of [`ELLIPSE_95`]. The factor is the 95 % quantile of
 //! the ratios, with the correction for their number by which it covers a press at a further place with a probability of 0.95 (cross-conformal
 //! prediction: Vovk, *Annals of Mathematics and Artificial Intelligence* 74, 2015; the jackknife+ and CV+: Barber and others, *Annals of Statistics* 49, 2021).
-//! Presses of one place may share an error, so places are what is counted: see [`conformal_95_of_groups`]. Fewer than [`FEWEST_FOR_95`] of them bound nothing.
+//! Presses of one place may share an error, so places are counted, not presses: see [`conformal_95_of_groups`]. Fewer than
+//! [`FEWEST_FOR_95`] places give no bound.
 //!
-//! Intervals are widened, and never narrowed: the factor of few places scatters, and intervals of a method that is right are right without it.
+//! Intervals are widened, and never narrowed: the factor of few places scatters, and the intervals of a valid method need no factor.
 
 mod region;
 mod widening;
@@ -50,13 +52,13 @@ pub struct IntervalCheck {
     pub force: Option<Coverage>,
 }
 
-/// Coverage of intervals at held-out places, and what widens them.
+/// Coverage of intervals at held-out places, and their widening.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Coverage {
     /// Share of the presses that the method's intervals contain, in %. Every place has the same weight.
     pub before_percent: f64,
-    /// The same by intervals that are widened as the other folds say, in %.
+    /// Share of the presses that intervals widened by the other folds contain, in %. Every place has the same weight.
     pub after_percent: f64,
     /// Standard deviation that is added to that of each estimate, in metres or newtons.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -80,7 +82,7 @@ pub(crate) struct HeldOutEstimate {
 }
 
 impl IntervalCheck {
-    /// The check by estimates at held-out places; `None` of fewer than [`FEWEST_FOR_95`] places, and of a method without intervals.
+    /// The check by estimates at held-out places; `None` for fewer than [`FEWEST_FOR_95`] places, and for a method without intervals.
     pub(crate) fn of_estimates(estimates: &[HeldOutEstimate], extent: Extent) -> Option<Self> {
         let positions = PlaceRegions::new(estimates, |held_out| Region::of_position(held_out, extent));
         let forces = PlaceRegions::new(estimates, |held_out| Region::of_force(held_out, extent));
@@ -96,20 +98,20 @@ impl IntervalCheck {
         })
     }
 
-    /// Share of the presses that are `outside_model`, in %, where these are more than noise makes so; `None` elsewhere.
+    /// Share of the presses that are `outside_model`, in %, where noise alone does not explain their number; `None` elsewhere.
     pub fn outside_model_percent(&self) -> Option<f64> {
         let Self { presses, outside_model, .. } = *self;
         let by_noise = binomial_tail(presses, outside_model, OUTSIDE_MODEL_RATE + SPREAD_RATE);
         (by_noise < SIGNIFICANCE).then(|| 100.0 * outside_model as f64 / presses as f64)
     }
 
-    /// What widens the intervals of estimates.
+    /// Widening of the intervals of estimates.
     pub(crate) fn widening(&self) -> EstimateWidening {
         let force = self.force.map_or(Widening::NONE, |force| force.widening());
         EstimateWidening { position: self.position.widening(), force }
     }
 
-    /// Checks what a file may have got wrong.
+    /// Checks the values read from a file.
     ///
     /// # Errors
     /// [`LocatorFault`], naming what does not fit together.
@@ -144,7 +146,7 @@ impl Coverage {
     }
 }
 
-/// Widens each estimate as the other folds say; not at all where these have too few places.
+/// Widens each estimate by the check of the other folds. Estimates stay unchanged where these have too few places.
 pub(crate) fn widen_by_other_folds(estimates: &mut [HeldOutEstimate], extent: Extent) {
     let last = estimates.iter().map(|held_out| held_out.fold).max();
     let of_others = |fold: usize| {
@@ -164,7 +166,7 @@ pub(crate) fn widen_by_other_folds(estimates: &mut [HeldOutEstimate], extent: Ex
 /// Regions of the presses of each place, with the fold of the place.
 struct PlaceRegions {
     groups: Vec<(usize, Vec<Region>)>,
-    /// Number of places whose presses are all `no_contact`, so that they have no interval.
+    /// Number of places where all presses are `no_contact`, and so have no interval.
     not_found: usize,
 }
 
@@ -199,7 +201,7 @@ impl PlaceRegions {
         })
     }
 
-    /// What widens the intervals of all places but those of a fold; `None` for too few places.
+    /// Widening of intervals by all places except those of a fold; `None` for too few places.
     fn widening_without(&self, fold: Option<usize>) -> Option<Widening> {
         /// Added standard deviations that are tried, in powers of √2 of the root mean square error.
         const TRIED: std::ops::RangeInclusive<i32> = -10..=6;
@@ -225,8 +227,8 @@ impl PlaceRegions {
         Some(best)
     }
 
-    /// The 95 % quantile of the ratios of some places; `None` for too few. Where fewer than [`FEWEST_FOR_95`] places have an interval, places that were not
-    /// found complete their number, and the factor is about the largest ratio.
+    /// The 95 % quantile of the ratios of some places; `None` for too few. Where fewer than [`FEWEST_FOR_95`] places have an interval,
+    /// places without a detection complete their number, and the factor is about the largest ratio.
     fn factor(&self, places: &[&[Region]], added_sd: f64) -> Option<f64> {
         let ratios_of = |group: &&[Region]| group.iter().map(|region| region.ratio(added_sd)).collect();
         let mut ratios: Vec<Vec<f64>> = places.iter().map(ratios_of).collect();
@@ -249,8 +251,8 @@ impl PlaceRegions {
 /// Price of a parameter in the log-likelihood, by Akaike's criterion.
 const PRICE_OF_A_PARAMETER: f64 = 1.0;
 
-/// Log-likelihood of the errors at some places, each counted once, where they are normal with the standard deviations of the intervals and the added one,
-/// times the most likely factor. A constant is left out; −∞ where an error lies in an interval without a length.
+/// Log-likelihood of the errors at some places, each counted once, where they are normal with the standard deviations of the intervals and
+/// the added one, times the most likely factor. A constant is omitted; −∞ where an error lies in an interval without a length.
 fn log_likelihood(places: &[&[Region]], added_sd: f64) -> f64 {
     let (mut log_sizes, mut squares, mut dimensions) = (0.0, 0.0, 0.0);
     for place in places {
@@ -265,7 +267,7 @@ fn log_likelihood(places: &[&[Region]], added_sd: f64) -> f64 {
     if log_likelihood.is_finite() { log_likelihood } else { f64::NEG_INFINITY }
 }
 
-/// Factor from which on intervals count as unbounded. A policy: one of a micrometre is then a metre long. Files keep finite numbers.
+/// Factor from which intervals count as unbounded. A policy: an interval of a micrometre is then a metre long. Files keep finite numbers.
 pub const UNBOUNDED: f64 = 1e6;
 
 #[cfg(test)]

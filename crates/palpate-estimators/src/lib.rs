@@ -1,8 +1,8 @@
 //! From recordings to locators: setups, recordings, every estimator, tracking, load profiles, evaluation.
 //!
-//! A [`Setup`](setup::Setup) is a surface with its sensors. A [`Recording`](recording::Recording) of it, read from a file or
-//! [simulated](simulate), is what an estimator is fitted to ([`Fit`](fit::Fit)); what that gives locates ([`Locate`](fit::Locate)),
-//! is judged by [`evaluation`], followed in time by [`tracking`], and kept in a file by [`estimator`].
+//! A [`Setup`](setup::Setup) is a surface with its sensors. A [`Recording`](recording::Recording) of it is read from a file or
+//! [simulated](simulate). An estimator is fitted to the recording ([`Fit`](fit::Fit)), which gives a locator ([`Locate`](fit::Locate)). The
+//! locator is judged by [`evaluation`], tracks contacts over time in [`tracking`], and is kept in a file by [`estimator`].
 //!
 //! ```
 //! use palpate_estimators::arrangement::Training;

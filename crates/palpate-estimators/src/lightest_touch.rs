@@ -1,14 +1,15 @@
-//! The lightest touch that is distinguished from noise: the force from which on a contact is found at a given false-alarm rate.
+//! The smallest detectable force: the force from which a contact is detected at a given false-alarm rate.
 //!
-//! The probability that a contact is found follows from its signal-to-noise ratio, by the rule of `no_contact` ([`crate::status`]). A locator with
-//! the scatter of untouched rows finds a contact that exceeds this scatter too; for that the scatter has the place of the noise.
+//! The detection probability follows from the contact's signal-to-noise ratio, by the rule of `no_contact` ([`crate::status`]). A locator
+//! with the scatter of untouched rows detects a contact only where it exceeds this scatter too. For that test the scatter replaces the
+//! noise.
 
 use crate::status::{Detection, FalseAlarmRate};
 use crate::untouched_scatter::UntouchedScatter;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::{bisect, percentile};
 
-/// The lightest touch of a surface, position by position, by a locator that does not know the force.
+/// The smallest detectable force on a surface, position by position, for contacts of unknown force.
 ///
 /// ```
 /// use palpate_estimators::{influence::Influence, setup::Setup};
@@ -31,13 +32,13 @@ pub struct LightestTouch<'a> {
     noise_sds: Vec<(usize, f64)>,
     /// Change of each of them by a contact, over this standard deviation.
     change: Box<dyn Fn(Contact) -> Vec<f64> + 'a>,
-    /// Rules that all have to be passed.
+    /// Detection rules; a detected contact passes all of them.
     rules: Vec<Rule>,
 }
 
-/// A contact is found where the length of its weighted change is large enough.
+/// Detection rule: a contact is detected where the length of its weighted change is large enough.
 struct Rule {
-    /// Lengths that are found with the probabilities [`LightestTouch::FOUND`].
+    /// Lengths that are detected with the probabilities [`LightestTouch::FOUND`].
     needed: [f64; 2],
     /// Weight of each channel.
     weights: Vec<f64>,
@@ -53,23 +54,23 @@ impl Rule {
     }
 }
 
-/// The lightest touch all over a surface, found with one probability.
+/// The smallest detectable force over a surface, for one detection probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchSummary {
-    /// Probability that it is found.
+    /// Detection probability.
     pub found: f64,
     /// Median over the positions, in newtons.
     pub median_n: f64,
-    /// The largest, in newtons, and where it is.
+    /// Position of the largest, and the largest in newtons.
     pub worst: (Position, f64),
-    /// Positions at which no force is found.
+    /// Number of positions at which no force is detected.
     pub without: usize,
 }
 
 impl<'a> LightestTouch<'a> {
-    /// Probabilities with which a touch is found.
+    /// Detection probabilities.
     pub const FOUND: [f64; 2] = [0.5, 0.95];
-    /// Forces beyond this are none that a surface is touched with, in newtons.
+    /// Largest force that is considered, in newtons.
     const MOST_N: f64 = 1e6;
 
     pub(crate) fn new(
@@ -82,7 +83,7 @@ impl<'a> LightestTouch<'a> {
         Self { rate, noise_sds, change, rules }
     }
 
-    /// The same, of a locator with the scatter of untouched rows. Channels without a scatter say nothing.
+    /// Adds the detection rule of a locator with the scatter of untouched rows. Channels without a scatter have weight 0.
     #[must_use]
     pub fn beyond(mut self, scatter: &UntouchedScatter) -> Self {
         let weight = |(channel, noise_sd): &(usize, f64)| match scatter.sd.get(*channel) {
@@ -98,12 +99,12 @@ impl<'a> LightestTouch<'a> {
         self
     }
 
-    /// The false-alarm rate at which it is found.
+    /// The false-alarm rate of the detection.
     pub fn rate(&self) -> FalseAlarmRate {
         self.rate
     }
 
-    /// The forces, in newtons, that are found with the probabilities [`LightestTouch::FOUND`] at a position; `None` where no force is.
+    /// The forces, in newtons, that are detected with the probabilities [`LightestTouch::FOUND`] at a position; `None` where no force is.
     pub fn forces_at(&self, position: Position) -> [Option<f64>; 2] {
         [0, 1].map(|i| {
             let forces = self.rules.iter().map(|rule| self.force_n(position, rule, rule.needed[i]));
@@ -111,7 +112,7 @@ impl<'a> LightestTouch<'a> {
         })
     }
 
-    /// The force whose weighted change has the length `needed`.
+    /// The force at which the weighted change has the length `needed`.
     fn force_n(&self, position: Position, rule: &Rule, needed: f64) -> Option<f64> {
         let signal = |force_n: f64| rule.length(&(self.change)(Contact { position, force_n }));
         let guess_n = needed / signal(1.0);
@@ -126,7 +127,7 @@ impl<'a> LightestTouch<'a> {
         Some(bisect((0.0, high_n), 50, |force_n| !enough(&force_n)))
     }
 
-    /// The lightest touch over some positions, for each of the probabilities; `None` where no force is found anywhere.
+    /// The smallest detectable force over some positions, for each of the probabilities; `None` where no position has one.
     pub fn summaries(&self, positions: &[Position]) -> [Option<TouchSummary>; 2] {
         let forces: Vec<[Option<f64>; 2]> = positions.iter().map(|at| self.forces_at(*at)).collect();
         [0, 1].map(|i| {

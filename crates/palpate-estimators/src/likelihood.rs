@@ -1,4 +1,4 @@
-//! Likelihood of a reading under contacts, as a filter over time needs it of a locator.
+//! Likelihood of a reading given contacts, which a filter over time needs from a locator.
 
 use crate::force_prior::ForceRange;
 use crate::interval_check::IntervalCheck;
@@ -9,7 +9,7 @@ use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
 use std::f64::consts::SQRT_2;
 
-/// Variance of a contact that calibration leaves, and no further reading takes away.
+/// Variance of a contact that remains from calibration, and that further readings do not reduce.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CalibrationVariance {
     /// Covariance of the position, xx, xy and yy in m²; on a line xx alone.
@@ -26,14 +26,15 @@ pub(crate) struct UntouchedSurface {
 }
 
 impl UntouchedSurface {
-    /// The surface as a filter sees it that follows the drift by itself. Where the random walk makes most of the scatter, in units of the noise over all
-    /// channels, the noise of two readings remains: the walk of a single channel is known too badly to be subtracted.
+    /// The untouched surface for a filter that itself tracks the drift. Where the random walk makes up most of the scatter, in units of the
+    /// noise over all channels, the noise of two readings replaces the scatter. The walk of a single channel is too uncertain to be
+    /// subtracted.
     pub fn beside_walk(
         scatter: Option<UntouchedScatter>,
         drift: Option<UntouchedDrift>,
         noise_sd: &[Option<f64>],
     ) -> Self {
-        /// Share of the scatter that is most of it.
+        /// Share of the scatter that counts as most of it.
         const MOST: f64 = 0.5;
         let walks = drift.as_ref().map(UntouchedDrift::walk_variances).unwrap_or_default();
         let scatter = scatter.map(|mut scatter| {
@@ -58,12 +59,12 @@ impl UntouchedSurface {
     }
 }
 
-/// A fitted method that can say how well contacts explain a reading.
+/// A fitted method that gives the likelihood of contacts for a reading.
 pub trait Likelihood: Send + Sync {
     /// The fits of contacts on this surface.
     fn geometry(&self) -> Geometry<'_>;
 
-    /// A reading as the fits want it, written over `whitened`.
+    /// Whitens a reading for the fits, and writes it over `whitened`.
     fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>);
 
     /// Fit of the surface alone to a reading that [`Likelihood::whiten`] prepared, at u = `mode_n`; the unknown is u
@@ -126,9 +127,9 @@ pub enum Geometry<'a> {
 
 /// Likelihood of contacts on a line.
 ///
-/// A surface that swings is bent by its first mode's force u = m·ω²·q where one in balance is bent by the contacts' share
-/// Σ W·φ(x) of it, φ the mode's shape: it reads Σ W·f(x) + (u − Σ W·φ(x))·g, with g what the sensors read per newton of u. The
-/// faster modes are taken to be in balance.
+/// A vibrating surface is bent by the force u = m·ω²·q of its first mode. A surface in balance is bent by the contacts' share Σ W·φ(x)
+/// instead, with φ the shape of the mode. So the vibrating surface reads Σ W·f(x) + (u − Σ W·φ(x))·g, with g the reading of the sensors per
+/// newton of u. The faster modes are assumed to be in balance.
 pub trait LineLikelihood {
     /// Fit of one contact; the unknowns are u, place and force. Without `mode_n` the surface is in balance.
     fn fit_one(&self, whitened: &[f64], contact: Contact, mode_n: Option<f64>) -> ContactFit<3>;
@@ -146,8 +147,8 @@ pub trait PlaneLikelihood {
     fn fit_on_plane(&self, whitened: &[f64], contact: Contact) -> ContactFit<3>;
 }
 
-/// The misfit χ² of K unknowns and its second-order expansion about them, by Gauss and Newton: moved by δ it is about
-/// χ² − 2·gᵀδ + δᵀ·A·δ. The log-likelihood is −χ²/2, up to what is the same for all unknowns.
+/// The χ² of K unknowns and its second-order expansion about them, by Gauss and Newton: moved by δ it is about χ² − 2·gᵀδ + δᵀ·A·δ. The
+/// log-likelihood is −χ²/2, up to a constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactFit<const K: usize> {
     /// χ².
@@ -159,7 +160,7 @@ pub struct ContactFit<const K: usize> {
 }
 
 impl<const K: usize> ContactFit<K> {
-    /// The fit of no data at all.
+    /// The fit to no data.
     pub const NOTHING: Self = Self { misfit: 0.0, score: [0.0; K], information: [[0.0; K]; K] };
 
     /// Adds a residual with its derivatives, the sign changed, and its weight; `information` only on and above its diagonal.
@@ -176,7 +177,7 @@ impl<const K: usize> ContactFit<K> {
         }
     }
 
-    /// With the information's lower triangle as its upper one.
+    /// Copies the upper triangle of the information to the lower one.
     #[must_use]
     pub fn mirrored(mut self) -> Self {
         for i in 0..K {

@@ -2,7 +2,7 @@
 
 use std::borrow::Borrow;
 
-/// A locator whose numbers do not fit together.
+/// A locator with inconsistent numbers.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LocatorFault {
     /// A list has the wrong length.
@@ -10,7 +10,7 @@ pub enum LocatorFault {
     Count {
         /// Name of the list's elements.
         what: &'static str,
-        /// Length that the rest asks for.
+        /// Length that the rest of the locator requires.
         needed: usize,
         /// Length of the list.
         found: usize,
@@ -27,7 +27,7 @@ pub enum LocatorFault {
         /// Bound of the number, in words.
         bound: &'static str,
     },
-    /// A number by which others are divided, and which is hardly more than 0.
+    /// A divisor that is hardly more than 0.
     #[error(
         "the locator's {what} number {number} is {value:?}; it must be at least {:e}",
         LocatorFault::LEAST
@@ -65,8 +65,8 @@ impl LocatorFault {
     /// Checks the numbers of a list.
     ///
     /// # Errors
-    /// [`LocatorFault::BadNumber`] for the first that is not finite or not `good`, and [`LocatorFault::TooSmall`] where 0 is not good and
-    /// it is hardly more.
+    /// [`LocatorFault::BadNumber`] for the first number that is not finite or not `good`, and [`LocatorFault::TooSmall`] for a number
+    /// hardly more than 0 where 0 is not good.
     pub fn check_numbers(
         what: &'static str,
         numbers: impl IntoIterator<Item = impl Borrow<f64>>,

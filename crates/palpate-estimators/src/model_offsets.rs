@@ -1,4 +1,4 @@
-//! Offsets of methods that compute from the model and the rig alone: those of the untouched rows of a recording, and how uncertain they are.
+//! Offsets for methods that compute from the model and the rig alone: the offsets of the untouched rows of a recording, and their uncertainty.
 
 use crate::locator_fault::LocatorFault;
 use crate::recording::Recording;
@@ -13,14 +13,14 @@ pub(crate) fn offsets_of(recording: &Recording, layout: &Layout) -> (Vec<f64>, L
     let offsets = recording.untouched_mean().unwrap_or_default();
     let untouched = recording.rows.iter().filter(|row| !row.touches()).count();
     let mut widened = layout.clone();
-    // Noise alone changes, which no layout refuses.
+    // Only the noise changes, and every layout accepts it.
     let _ = widened.edit(|sensors| {
         for channel in sensors.iter_mut().map(|sensor| &mut sensor.channel) {
             let variance = match untouched {
                 0 => channel.offset_error.powi(2) / 3.0,
                 count => channel.reading_sd().powi(2) / count as f64,
             };
-            // A channel whose noise is unknown stays one.
+            // A channel with unknown noise keeps it unknown.
             if channel.reading_sd() > 0.0 {
                 channel.noise_sd = (channel.noise_sd.powi(2) + variance).sqrt();
             }
@@ -40,7 +40,7 @@ pub(crate) fn check_offsets(offsets: &[f64], channels: usize) -> Result<(), Loca
     LocatorFault::check_numbers("offset", offsets.iter().copied(), |_| true, "a finite number")
 }
 
-/// A reading less offsets; as it is where there are none.
+/// A reading less the offsets; unchanged without offsets.
 pub(crate) fn less_offsets<'a>(reading: &'a [f64], offsets: &[f64]) -> Cow<'a, [f64]> {
     if offsets.is_empty() {
         return Cow::Borrowed(reading);

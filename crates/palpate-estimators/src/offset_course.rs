@@ -1,18 +1,18 @@
-//! Offsets of the channels in the course of a recording, to which readings of another time are brought as by a tare.
+//! Offsets of the channels in the course of a recording, by which its readings are tared.
 
 use crate::recording::Recording;
 
-/// Offsets of the channels of a surface at the rows of a recording that follow from the presses of another one.
+/// Offsets of the channels at the rows of a recording, estimated from the presses of another recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OffsetCourse {
-    /// Offset of each channel at each row; `None` of a channel that is not in use.
+    /// Offset of each channel at each row; `None` for a channel that is not in use.
     pub at_rows: Vec<Option<Vec<f64>>>,
-    /// Mean of each over the recording that told them.
+    /// Mean offset of each channel over the recording from which the offsets are estimated.
     pub means: Vec<Option<f64>>,
 }
 
 impl OffsetCourse {
-    /// The rows with the offsets `learnt` in the place of their own; with the means where nothing was learnt.
+    /// The rows with the offsets `learnt` in place of their own, or with the means where no offset was learnt.
     pub fn tared(&self, recording: &Recording, learnt: Option<&[f64]>) -> Recording {
         let mut tared = recording.clone();
         for (i, row) in tared.rows.iter_mut().enumerate() {

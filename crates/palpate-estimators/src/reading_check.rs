@@ -1,16 +1,16 @@
-//! A check of learnt locators by the forward way: what contacts read, learnt from the same recording as the locator.
+//! A check of learnt locators by a forward model, which gives the readings of contacts. It is learnt from the same recording as the locator.
 //!
-//! Networks, Gaussian processes, neighbours and the centroid go from a reading to a position, and give one for any reading. What a contact
-//! reads, they do not know. Influence functions (of a bending finger its own equations) do, and so tell by one rule, that of
-//! [`crate::status`], whether a reading is noise, or that of no contact; and the interval in which the contact is that explains it. Of an
-//! estimate with a check
+//! Networks, Gaussian processes, neighbours and the centroid map a reading to a position, and give one for any reading. They do not model
+//! the reading of a contact. Influence functions do, and for a bending finger its equations. By the rule of [`crate::status`] they decide
+//! whether noise explains a reading, or no contact does. They also give the interval of the contact that explains it. In an estimate with a
+//! check
 //!
-//! - `no_contact`, `outside_model` and `ambiguous`, with the other places, are as the check says them;
-//! - the position stays, but for one beyond an edge of the surface where a contact on it explains the reading: it is moved to that edge;
-//! - the 95 % interval is the least that holds the check's and the position. What a learnt method says of its own errors is of contacts like
-//!   those of its presses: how errors change with force and place, the forward way knows better.
-//! - Where it does not, as of surfaces whose readings influence functions do not explain well, a method that knows its errors at held-out positions has
-//!   the shorter intervals. Those stand at contacts like its presses: of the forces that were pressed.
+//! - the check determines `no_contact`, `outside_model` and `ambiguous`, with the other places;
+//! - the position remains. One beyond an edge of the surface moves to that edge where a contact on the surface explains the reading;
+//! - the 95 % interval is the smallest that contains the check's interval and the position. A learnt method estimates its errors for
+//!   contacts like those of its presses. The forward model better describes how errors change with force and place.
+//! - Where influence functions do not explain the readings well, a method with errors at held-out positions has the shorter intervals.
+//!   These are kept for contacts like its presses, that is, with forces in the pressed range.
 
 use serde::{Deserialize, Serialize};
 
@@ -35,14 +35,14 @@ pub struct ReadingCheck {
     own_intervals: Option<OwnIntervals>,
 }
 
-/// Model of what contacts read: influence functions, or the equations of a bending finger.
+/// Forward model, from a contact to its reading: influence functions, or the equations of a bending finger.
 #[derive(Clone, Debug, PartialEq)]
 enum Forward {
     Influence(InfluenceLocator),
     Digit(DigitLocator),
 }
 
-/// Share of the check's intervals below which, in the mean, the method's own are kept.
+/// Ratio of the mean length of the method's own intervals to that of the widened ones, below which the own intervals are kept.
 const OWN_SHARE: f64 = 0.9;
 
 /// Span of forces at which the method's own intervals are kept.
@@ -53,7 +53,7 @@ struct OwnIntervals {
     force_n: Option<(f64, f64)>,
 }
 
-/// A check as files have it.
+/// A check in a file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CheckData {
@@ -89,7 +89,7 @@ impl TryFrom<CheckData> for ReadingCheck {
 }
 
 impl ReadingCheck {
-    /// Rows that influence functions are learnt from, at most: with more the check gains nothing that would change a status.
+    /// The most rows that influence functions are learnt from. More rows would not improve the check enough to change a status.
     pub const MOST_ROWS: usize = 500;
 
     /// The check by a recording; `None` where influence functions cannot be learnt from it.
@@ -105,7 +105,7 @@ impl ReadingCheck {
         }
         let mut methods = vec![Influence::default()];
         if task.setup.surface().model().is_some() {
-            // Too few presses to correct mechanics by.
+            // For presses that are too few to correct the mechanics.
             methods.push(Influence { source: InfluenceSource::Mechanics, ..Influence::default() });
         }
         for method in methods {
@@ -118,10 +118,10 @@ impl ReadingCheck {
         Ok(None)
     }
 
-    /// The same check, by which a method's own intervals stand where in the mean, at the presses of a recording, they are a tenth shorter than those that it
-    /// widens. By less there is little to gain: the check's follow forces that were not pressed.
+    /// Keeps a method's own intervals where, at the presses of a recording, they are in the mean more than a tenth shorter than the
+    /// intervals that the check widens. A smaller gain is not worth it, since the check's intervals adapt to forces that were not pressed.
     ///
-    /// Of a force that is said to be known they never stand: nothing tells that a contact has another.
+    /// For a known force they are never kept, since no test detects that a contact has another force.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch stopped it.
@@ -161,7 +161,7 @@ impl ReadingCheck {
         Cow::Owned(recording.subset(&picked))
     }
 
-    /// Share of untouched readings that may be taken for a contact; `None` of one that tells no untouched reading.
+    /// Share of untouched readings that may be mistaken for a contact; `None` for a check that does not detect untouched readings.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         match &self.by {
             Forward::Influence(influence) => influence.false_alarm_rate(),
@@ -169,7 +169,7 @@ impl ReadingCheck {
         }
     }
 
-    /// Offset of each channel, in its SI unit; `None` where it was not learnt.
+    /// Offset of each channel, in its SI unit; `None` where the check does not learn it.
     pub fn offsets(&self) -> Option<Vec<f64>> {
         match &self.by {
             Forward::Influence(influence) => influence.offsets(),
@@ -182,7 +182,7 @@ impl ReadingCheck {
         self.own_intervals.is_some()
     }
 
-    /// Means, in words.
+    /// Name of the forward model, in words.
     pub fn in_words(&self) -> &'static str {
         match &self.by {
             Forward::Influence(_) => "influence functions of the same recording",
@@ -231,7 +231,7 @@ impl CheckEstimate for ReadingCheck {
 }
 
 impl ReadingCheck {
-    /// The estimate of a learnt method, as that of the forward way leaves it: `explained`.
+    /// The estimate of a learnt method after the check by `explained`, the estimate of the forward model.
     fn left_by(&self, explained: Estimate, estimate: Estimate, extent: Extent) -> Estimate {
         let is_like_presses = self.own_intervals.is_some_and(|OwnIntervals { force_n }| {
             let told = force_n.zip(explained.contact.force_n);
@@ -259,7 +259,7 @@ impl ReadingCheck {
     }
 }
 
-/// Length of the 95 % intervals on a surface, both together on a plane; infinite of an estimate without one.
+/// Length of the 95 % interval on a surface, the sum of both intervals on a plane; infinite for an estimate without one.
 fn interval_m(estimate: &Estimate, extent: Extent) -> f64 {
     let Some(told) = estimate.contact.uncertainty else { return f64::INFINITY };
     let length_m = |(low, high): (f64, f64), side_m: f64| high.min(side_m) - low.max(0.0);
@@ -273,7 +273,7 @@ fn nearest_on(extent: Extent, Position { x_m, y_m }: Position) -> Position {
     Position { x_m: held(x_m, extent.length_m()), y_m: held(y_m, extent.width_m().unwrap_or(0.0)) }
 }
 
-/// The uncertainty by the contact that explains the reading, widened such that it holds the estimate.
+/// The uncertainty of the contact that explains the reading, widened so that it contains the estimate.
 fn uncertainty_with(estimate: &ContactEstimate, explained: &ContactEstimate) -> Option<Uncertainty> {
     let Some(other) = explained.uncertainty else { return estimate.uncertainty };
     let (at, there) = (estimate.position, explained.position);

@@ -18,8 +18,8 @@ use palpate_mechanics::units::Quantity;
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 
-/// A surface with its sensors, all on it, and the contact force where it is known, or its bound where that is. A rig describes it, and a
-/// locator keeps it.
+/// A surface with its sensors, which all lie on it, and the contact force or its bound, where known. A rig describes a setup, and a locator
+/// contains it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked")]
 pub struct Setup {
@@ -35,7 +35,7 @@ pub struct Setup {
     imperfections: Option<Imperfections>,
 }
 
-/// A setup as a file has it.
+/// A setup in a file, not yet checked.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename = "Setup")]
 struct Unchecked {
@@ -72,7 +72,7 @@ pub enum SetupError {
     /// A sensor beside the surface.
     #[error(transparent)]
     OffSurface(#[from] OffSurface),
-    /// A reaction sensor where nothing supports the surface.
+    /// A reaction sensor at a place without a support.
     #[error("reaction sensor {number} is at {}, where no support takes up force", extent.place_in_words(*position))]
     NoSupport {
         /// Which sensor of its group, from 1.
@@ -82,9 +82,9 @@ pub enum SetupError {
         /// The surface.
         extent: Extent,
     },
-    /// A sensor that reads nothing, wherever the surface is touched.
+    /// A sensor that is insensitive to contacts anywhere on the surface.
     #[error(
-        "{kind} sensor {number} is at {} and would read nothing: {reason}",
+        "{kind} sensor {number} is at {} and would always read 0: {reason}",
         extent.place_in_words(*position)
     )]
     Insensitive {
@@ -96,10 +96,10 @@ pub enum SetupError {
         position: Position,
         /// The surface.
         extent: Extent,
-        /// Reason for which it would read nothing.
+        /// Reason for which the sensor is insensitive.
         reason: InsensitiveSensor,
     },
-    /// A sensor on a digit that is no strain gauge.
+    /// A sensor on a digit that is not a strain gauge.
     #[error("a digit is read by strain gauges, not by {kind} sensors")]
     NotAGauge {
         /// Quantity that it measures.
@@ -111,13 +111,13 @@ pub enum SetupError {
     /// A grid of sensors on a line.
     #[error("a grid of sensors needs a plane; this surface is a line")]
     GridOnLine,
-    /// A number of sensors, on a plane, where it does not say where they are.
-    #[error("{count} sensors along a length do not say where on a plane they are; place them by a grid")]
+    /// Evenly spaced sensors on a plane, where a number alone does not define their positions.
+    #[error("{count} sensors along a length do not determine places on a plane; place them by a grid")]
     EvenlyOnPlane {
         /// Number of sensors.
         count: usize,
     },
-    /// No sensor.
+    /// A group without sensors.
     #[error("a group of 0 sensors; at least 1 is needed")]
     NoSensors,
     /// Noise in a unit in which no sensor measures.
@@ -129,7 +129,7 @@ pub enum SetupError {
     /// A soft layer on a digit.
     #[error("a soft layer spreads a touch over several points; a digit bends too far for readings to add up")]
     SoftLayerOnDigit,
-    /// A sensor that cannot be.
+    /// An invalid layout.
     #[error(transparent)]
     Layout(#[from] LayoutError),
     /// A number that is not in its range.
@@ -140,7 +140,7 @@ pub enum SetupError {
 /// Checks that a sensor of this `kind` at `position` goes with a surface; `number` is its number in messages, from 1.
 ///
 /// # Errors
-/// [`SetupError`] off the surface, where it would read nothing, or for a kind that does not go with the surface.
+/// [`SetupError`] off the surface, where the sensor is insensitive, or for a kind that does not suit the surface.
 fn check_sensor(
     surface: &SurfaceSpec,
     kind: SensorKind,
@@ -261,10 +261,10 @@ impl Setup {
         self.columns.as_ref()
     }
 
-    /// The same with further sensors; each kind is numbered by itself: "deflection_1", "strain_1".
+    /// Adds sensors. Each kind is numbered separately: "deflection_1", "strain_1".
     ///
     /// # Errors
-    /// [`SetupError`] for a sensor that does not go with the surface, or numbers of its channel out of their range.
+    /// [`SetupError`] for a sensor that does not suit the surface, or numbers of its channel out of their range.
     pub fn sensors(mut self, group: SensorGroup) -> Result<Self, SetupError> {
         let SensorGroup { kind, placement, channel } = group;
         channel.check()?;
@@ -280,7 +280,7 @@ impl Setup {
         Ok(self)
     }
 
-    /// The same with these sensors instead, whether they read something there.
+    /// Replaces the sensors. It accepts sensors that are insensitive at their positions.
     ///
     /// # Errors
     /// [`OffSurface`] for the first sensor beside the surface.
@@ -289,7 +289,7 @@ impl Setup {
         Ok(Self { layout, ..self })
     }
 
-    /// Changes the sensors; the setup stays as it was where they are then refused.
+    /// Changes the sensors. The setup stays as it was where the changed sensors are refused.
     ///
     /// # Errors
     /// [`SetupError`] for a sensor beside the surface, or with a number out of its range.
@@ -301,7 +301,7 @@ impl Setup {
         Ok(())
     }
 
-    /// The same with this standard deviation of the noise of every sensor that measures in its unit.
+    /// Sets the standard deviation of the noise of every sensor that measures in the unit of `noise`.
     ///
     /// ```
     /// use palpate_estimators::setup::Setup;
@@ -315,7 +315,7 @@ impl Setup {
     /// ```
     ///
     /// # Errors
-    /// [`SetupError`] where no sensor measures in its unit, and for one that is less than 0.
+    /// [`SetupError`] where no sensor measures in this unit, and for a standard deviation less than 0.
     pub fn with_noise(mut self, noise: Quantity) -> Result<Self, SetupError> {
         let meant = |sensor: &Sensor| sensor.kind.dimension() == noise.dimension;
         if !self.layout.sensors().iter().any(meant) {
@@ -333,12 +333,12 @@ impl Setup {
         OffSurface::check("sensor", &positions, self.surface.extent())
     }
 
-    /// Says whether a channel, by its index from 0, is dead; see [`Layout::set_dead`].
+    /// Disables or enables a channel, by its index from 0; see [`Layout::set_dead`].
     pub fn set_dead(&mut self, channel: usize, dead: bool) {
         self.layout.set_dead(channel, dead);
     }
 
-    /// The same, touched by contacts of this known force in newtons.
+    /// Sets the known force of contacts, in newtons.
     ///
     /// # Errors
     /// [`SetupError::OutOfRange`] for a force that is not greater than 0 and finite.
@@ -346,13 +346,13 @@ impl Setup {
         Ok(self.with_force(Some(force_n))?)
     }
 
-    /// The same, touched by contacts of unknown force.
+    /// Makes the force of contacts unknown.
     #[must_use]
     pub fn unknown_force(self) -> Self {
         Self { force_n: None, ..self }
     }
 
-    /// The same, touched by contacts of this force in newtons, or of an unknown one.
+    /// Sets the force of contacts in newtons; `None` for an unknown force.
     ///
     /// # Errors
     /// [`OutOfRange`] for a force that is not greater than 0 and finite.
@@ -361,7 +361,7 @@ impl Setup {
         Ok(Self { force_n, ..self })
     }
 
-    /// The same, whose contacts of unknown force are no harder than this, in newtons; `None` for what the calibration tells.
+    /// Sets the greatest force of contacts of unknown force, in newtons; `None` to derive it from the calibration.
     ///
     /// # Errors
     /// [`OutOfRange`] for a force that is not greater than 0 and finite.
@@ -371,7 +371,7 @@ impl Setup {
         Ok(Self { greatest_force_n, ..self })
     }
 
-    /// The same with these imperfections, which its simulations have; estimators do not read them.
+    /// Sets the imperfections of simulations. Estimators do not use them.
     ///
     /// # Errors
     /// [`SetupError`] for a number out of its range, and for a soft layer on a digit.
@@ -383,18 +383,18 @@ impl Setup {
         Ok(Self { imperfections: Some(imperfections), ..self })
     }
 
-    /// The same without imperfections: simulations have the faults of the channels alone, and no course in time.
+    /// Removes the imperfections: simulations have the faults of the channels alone, and no course in time.
     #[must_use]
     pub fn without_imperfections(self) -> Self {
         Self { imperfections: None, ..self }
     }
 
-    /// Imperfections of its simulations; `None` where they have the faults of the channels alone.
+    /// Imperfections of simulations; `None` where these have the faults of the channels alone.
     pub fn imperfections(&self) -> Option<&Imperfections> {
         self.imperfections.as_ref()
     }
 
-    /// The setup whose contacts of unknown force have forces in this range; `None` for what the calibration tells.
+    /// Sets the range of the forces of contacts of unknown force; `None` to derive it from the calibration.
     #[must_use]
     pub fn with_force_range(self, force_range: Option<ForceRange>) -> Self {
         Self { force_range, ..self }
@@ -405,7 +405,7 @@ impl Setup {
         if self.force_n.is_some() { Force::Known } else { Force::Unknown }
     }
 
-    /// The same, whose recordings have these columns.
+    /// Sets the columns of recordings.
     #[must_use]
     pub fn recorded_as(self, columns: Columns) -> Self {
         Self { columns: Some(columns), ..self }
@@ -414,21 +414,21 @@ impl Setup {
     /// The Cramér–Rao bound of this bench.
     ///
     /// # Errors
-    /// [`LimitError`] for a measured surface, for a live sensor without noise, and when none is alive.
+    /// [`LimitError`] for a measured surface, for an enabled sensor without noise, and where all sensors are disabled.
     pub fn cramer_rao_bound(&self) -> Result<CramerRaoBound<'_>, LimitError> {
         self.cramer_rao_bound_watched(Watch::NONE)
     }
 
-    /// The same, watched while sensors are solved for.
+    /// The Cramér–Rao bound of this bench, watched while sensors are solved for.
     ///
     /// # Errors
-    /// Those of [`Setup::cramer_rao_bound`], and [`LimitError::Cancelled`].
+    /// The errors of [`Setup::cramer_rao_bound`], and [`LimitError::Cancelled`].
     pub fn cramer_rao_bound_watched(&self, watch: Watch) -> Result<CramerRaoBound<'_>, LimitError> {
         let model = self.surface.model().ok_or(LimitError::NoModel)?;
         CramerRaoBound::new_watched(model, &self.layout, watch)
     }
 
-    /// Roles of a recording's columns: those that were named, or those that palpate itself writes.
+    /// Roles of a recording's columns: the named ones, or the columns that palpate itself writes.
     pub fn recording_columns(&self) -> Columns {
         match &self.columns {
             Some(columns) => columns.clone(),
@@ -436,7 +436,7 @@ impl Setup {
         }
     }
 
-    /// Reads a recording of this bench; see [`recording::read`]. Where the file has no force, the bench's holds.
+    /// Reads a recording of this bench; see [`recording::read`]. The force of the bench is used where the file has none.
     ///
     /// # Errors
     /// [`CsvError`], with line and column.

@@ -1,4 +1,4 @@
-//! Recordings made by the model of a surface instead of its bench.
+//! Recordings simulated with the model of a surface.
 
 mod bench;
 mod faulty_channels;
@@ -31,7 +31,7 @@ pub enum SimulateError {
     #[error("a measured surface has no model to simulate; it needs a recording")]
     NoModel,
     /// The contact force is not given.
-    #[error("a simulation needs the contact force; there is no [contact] force")]
+    #[error("a simulation needs the contact force; the [contact] force is missing")]
     NoForce,
     /// The training positions cannot be laid out.
     #[error(transparent)]
@@ -42,7 +42,7 @@ pub enum SimulateError {
     /// A force, or the speed of a moving contact, is not in its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// The equations of the surface have no solution that is in balance.
+    /// The equations of the surface have no solution in balance.
     #[error("the equations of the surface could not be solved: {error}; {help}", error = .0, help = .0.help())]
     Surface(#[from] Unsolvable),
     /// A position does not lie on the surface.
@@ -51,14 +51,14 @@ pub enum SimulateError {
     /// The zero of the readings needs untouched rows.
     #[error("`zero = \"last\"` needs untouched rows, and only a bench with [imperfections] simulates them")]
     NoUntouchedRow(#[from] NoUntouchedRow),
-    /// Whoever watched the work stopped it.
+    /// The watch stopped the work.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
 
 /// Stage of the work, for the watch.
 const STAGE: &str = "simulating";
-/// Readings between two looks whether to go on.
+/// Readings between two checks of the watch.
 const READINGS_EACH: usize = 256;
 
 /// The sensors of a layout under a surface with a model, each with its response function.
@@ -73,19 +73,19 @@ impl<'a> CleanSensors<'a> {
         Self { functions: layout.sensors().iter().map(function).collect() }
     }
 
-    /// The same, watched while the surface is solved.
+    /// The response functions of all sensors of `layout`, watched while the surface is solved.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch stopped it.
     pub fn new_watched(surface: &'a dyn Surface, layout: &Layout, watch: Watch) -> Result<Self, Cancelled> {
-        // One by one, as without a watch: solved together they might differ in the last bit.
+        // One by one, as without a watch: a joint solution might differ in the last bit.
         let function =
             |sensor: &Sensor| surface.response_functions_watched(sensor.kind, &[sensor.position], watch);
         let functions = layout.sensors().iter().map(function).collect::<Result<Vec<_>, _>>()?;
         Ok(Self { functions: functions.into_iter().flatten().collect() })
     }
 
-    /// Faultless reading of the sensors at `contact`, in the SI unit of each sensor.
+    /// Faultless reading of the sensors under `contact`, in the SI unit of each sensor.
     pub fn reading(&self, contact: Contact) -> Vec<f64> {
         self.functions.iter().map(|function| function.at(contact)).collect()
     }
@@ -98,7 +98,7 @@ pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -
 }
 
 impl Setup {
-    /// The bench as it is when pressed to calibrate: with the force of these presses.
+    /// The bench during calibration: with the force of the training presses.
     ///
     /// # Errors
     /// [`OutOfRange`] for a force of the presses that is not greater than 0 and finite.
@@ -107,8 +107,8 @@ impl Setup {
     }
 
     /// Presses the simulated surface at the training positions, with the force of the training presses, and records what its
-    /// faulty channels report; see [`simulate_at`]. With imperfections the presses lie beside the positions of their rows by the placement
-    /// of the training.
+    /// faulty channels report; see [`simulate_at`]. With imperfections the presses are displaced from the positions of their rows by the placement of
+    /// the training.
     ///
     /// # Errors
     /// [`SimulateError`] when the bench lacks a model or a force, or the positions cannot be laid out.
@@ -116,10 +116,10 @@ impl Setup {
         self.simulate_watched(training, seed, Watch::NONE)
     }
 
-    /// The same, watched.
+    /// Simulates the presses of `training`, watched.
     ///
     /// # Errors
-    /// Those of [`Setup::simulate`], and [`SimulateError::Cancelled`].
+    /// As for [`Setup::simulate`], and [`SimulateError::Cancelled`].
     pub fn simulate_watched(
         &self,
         training: &Training,
@@ -136,10 +136,10 @@ impl Setup {
 /// Presses the bench's simulated surface with its force at each of `positions`, `repeats` times in a row, and records what its
 /// faulty channels report. Gains, offsets and the places of sensors are drawn once for the recording, noise for each reading.
 ///
-/// A setup with imperfections has a course in time: each press is read `repeats` times, untouched rows (force 0) stand before, between and
-/// after the presses, and every row has its time; see [`Schedule`].
+/// A setup with imperfections has a course in time. Each press is read `repeats` times; untouched rows (force 0) stand before the presses,
+/// between them and after them; every row has its time; see [`Schedule`].
 ///
-/// The same seed gives the same recording.
+/// Equal seeds give equal recordings.
 ///
 /// # Errors
 /// [`SimulateError`] when the bench lacks a model or a force, or a position lies off the surface.
@@ -152,10 +152,10 @@ pub fn simulate_at(
     simulate_at_watched(setup, positions, repeats, seed, Watch::NONE)
 }
 
-/// The same, watched.
+/// Presses the simulated surface as by [`simulate_at`], watched.
 ///
 /// # Errors
-/// Those of [`simulate_at`], and [`SimulateError::Cancelled`].
+/// As for [`simulate_at`], and [`SimulateError::Cancelled`].
 pub fn simulate_at_watched(
     setup: &Setup,
     positions: &[Position],
@@ -166,7 +166,7 @@ pub fn simulate_at_watched(
     simulate_contacts_watched(setup, &contacts_at(setup, positions)?, repeats, seed, watch)
 }
 
-/// Contacts at positions with the force of a bench that has a model.
+/// Contacts at positions with the force of a bench with a model.
 ///
 /// # Errors
 /// [`SimulateError::NoModel`] and [`SimulateError::NoForce`].
@@ -176,12 +176,12 @@ pub fn contacts_at(setup: &Setup, positions: &[Position]) -> Result<Vec<Contact>
     Ok(positions.iter().map(|position| Contact { position: *position, force_n }).collect())
 }
 
-/// Touches a calibrated bench in use with each of `contacts`, once, and records it, watched. A bench with imperfections is the one of the calibration,
-/// whose provenance this is, after the pause of its schedule; the seed draws noise and random walks from there on. Another bench is drawn from
-/// the seed as by [`simulate_contacts`].
+/// Touches a calibrated bench in use with each of `contacts`, once, and records it, watched. A bench with imperfections is the one of the
+/// calibration with this provenance, after the pause of its schedule; the seed draws noise and random walks from there on. Another bench is drawn
+/// from the seed as by [`simulate_contacts`].
 ///
 /// # Errors
-/// Those of [`simulate_contacts_watched`].
+/// As for [`simulate_contacts_watched`].
 pub fn simulate_use_watched(
     setup: &Setup,
     calibration: &Provenance,
@@ -200,7 +200,7 @@ pub fn simulate_use_watched(
     bench.record(&presses, None, watch)
 }
 
-/// The same with a force of each contact's own.
+/// Presses the simulated surface as by [`simulate_at`], with a force of each contact's own.
 ///
 /// # Errors
 /// [`SimulateError`] when the bench lacks a model, or a contact lies off the surface.
@@ -213,10 +213,10 @@ pub fn simulate_contacts(
     simulate_contacts_watched(setup, contacts, repeats, seed, Watch::NONE)
 }
 
-/// The same, watched.
+/// Presses the simulated surface as by [`simulate_contacts`], watched.
 ///
 /// # Errors
-/// Those of [`simulate_contacts`], and [`SimulateError::Cancelled`].
+/// As for [`simulate_contacts`], and [`SimulateError::Cancelled`].
 pub fn simulate_contacts_watched(
     setup: &Setup,
     contacts: &[Contact],
@@ -227,11 +227,11 @@ pub fn simulate_contacts_watched(
     simulate_presses_watched(setup, contacts, repeats, None, seed, watch)
 }
 
-/// Presses of these contacts, watched, by a person who misses their places by this standard deviation in each direction, in metres, where the bench
-/// has imperfections; see [`simulate_contacts`].
+/// Simulates presses of these contacts, watched; see [`simulate_contacts`]. Where the bench has imperfections, the pressed places deviate
+/// from those of the contacts by the standard deviation `placement_sd_m` in each direction, in metres.
 ///
 /// # Errors
-/// Those of [`simulate_contacts_watched`].
+/// As for [`simulate_contacts_watched`].
 pub fn simulate_presses_watched(
     setup: &Setup,
     contacts: &[Contact],
@@ -263,11 +263,11 @@ pub fn simulate_presses_watched(
     Ok(Recording::new(setup.layout(), "simulation", rows).seeded(seed))
 }
 
-/// Spreads `loads` over the bench's simulated surface, all at once, `repeats` times in a row, and gives what its faulty channels
-/// report. Gains, offsets and the places of sensors are drawn once, noise for each reading. Imperfections act by their schedule; a soft layer
-/// does not, as the loads say themselves how far they spread.
+/// Spreads `loads` over the bench's simulated surface, all at once, `repeats` times in a row, and returns the readings of its faulty
+/// channels. Gains, offsets and the places of sensors are drawn once, noise for each reading. Imperfections act by their schedule; a soft layer
+/// does not, as the loads themselves define their extent.
 ///
-/// The same seed gives the same readings.
+/// Equal seeds give equal readings.
 ///
 /// # Errors
 /// [`SimulateError::NoModel`] for a measured surface.
@@ -280,10 +280,10 @@ pub fn simulate_loads(
     simulate_loads_watched(setup, loads, repeats, seed, Watch::NONE)
 }
 
-/// The same, watched.
+/// Spreads `loads` as by [`simulate_loads`], watched.
 ///
 /// # Errors
-/// Those of [`simulate_loads`], and [`SimulateError::Cancelled`].
+/// As for [`simulate_loads`], and [`SimulateError::Cancelled`].
 pub fn simulate_loads_watched(
     setup: &Setup,
     loads: &[UniformLoad],
@@ -320,7 +320,7 @@ pub fn simulate_loads_watched(
 /// The places of the sensors, the gains and offsets of the channels, and the stream of their noise.
 fn draw_faults(setup: &Setup, seed: u64) -> (Layout, ChannelErrors, Xoshiro256PlusPlus) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    // Places have a stream of their own, so that the noise is the same whether sensors are displaced.
+    // Places have their own random stream, so the noise does not depend on displaced sensors.
     let mut places = rng.clone();
     places.jump();
     let placed = displaced(setup.layout(), setup.surface().extent(), &mut places);
@@ -328,8 +328,8 @@ fn draw_faults(setup: &Setup, seed: u64) -> (Layout, ChannelErrors, Xoshiro256Pl
     (placed, errors, rng)
 }
 
-/// The layout as one simulated bench happens to have it: every sensor within its position error of its place, held at the
-/// surface's edge. A perfectly placed sensor stays where it is.
+/// The layout of one simulated bench: every sensor lies within its position error of its place, clamped to the surface. A perfectly placed
+/// sensor stays where it is.
 pub(crate) fn displaced(layout: &Layout, extent: Extent, rng: &mut impl Rng) -> Layout {
     layout.clone().with_positions(|sensor| {
         let error_m = sensor.channel.position_error_m;

@@ -1,9 +1,9 @@
-//! Splits of recordings into what is fitted and what is judged.
+//! Splits of recordings into a part to fit and a part to judge by.
 
 use crate::offset_course::OffsetCourse;
 use crate::recording::{Fold, Recording, TooFewPositions};
 
-/// A recording to fit, and one to judge by, whose contacts the fit has not seen.
+/// A recording to fit, and one to judge by, with contacts that the fit does not use.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
     /// Recording to fit.

@@ -1,26 +1,26 @@
-//! The test whether more than one point presses: a second contact close by, or a patch.
+//! Test for a distributed contact: a second contact close by, or a patch, instead of a single point.
 //!
-//! Two contacts at a − h and a + h, or a patch that presses with variance h² about a, read W·(f(a) + ½·h²·f″(a) + …): f influence, W force of them all.
-//! Of the change along f″ a point takes up what lies along f and f′, by pressing harder and by moving. What is left has a direction u of
-//! unit length, over the noise. Of the best point's residual e, z = e·u is a standard normal variable where a point presses, and greater where
-//! h² > 0. This is the score of h² at 0 (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948), the most powerful test of a small h: χ² looks along all
-//! directions, and so tells less along each. On a plane h² is a matrix of three numbers, f″ are three derivatives, and Σz² along three
-//! directions is χ² of three.
+//! Two contacts at a − h and a + h, or a patch that presses with variance h² about a, read W·(f(a) + ½·h²·f″(a) + …): f influence, W total
+//! force. A point contact explains the part of the change along f″ that lies along f and f′, by a greater force and a displacement. The
+//! remainder has a direction u of unit length, over the noise. With the residual e of the best point contact, z = e·u is a standard normal
+//! variable for a point contact, and greater where h² > 0. This is the score of h² at 0 (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948), the
+//! most powerful test of a small h. χ² tests all directions, and so has less power along each. On a plane h² is a matrix of three numbers,
+//! f″ are three derivatives, and Σz² along three directions is χ² of three degrees of freedom.
 //!
-//! A residual is at right angles to f and f′ whatever u is. So z errs no more often where u is of differences in place of derivatives, or of a
-//! place near by, but tells a little less.
+//! A residual is at right angles to f and f′ for any u. So differences in place of derivatives, or a u of a place near by, do not increase
+//! the error rate of z. They reduce its power a little.
 
 use crate::status::SPREAD_RATE;
 use palpate_numerics::small::dot;
 use palpate_numerics::{chi_squared_critical_value, push_rest};
 use std::sync::OnceLock;
 
-/// A contact about which readings are looked at.
+/// Contact about which readings are expanded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct About {
-    /// Position along and across, and force or whatever else a reading depends on.
+    /// Position along and across, and force or another unknown of the reading.
     pub at: [f64; 3],
-    /// Ends of each unknown; the same of one that is known.
+    /// Ends of each unknown; both ends are equal for a known quantity.
     pub ends: [(f64, f64); 3],
 }
 
@@ -29,10 +29,10 @@ pub(crate) struct About {
 const REACH: f64 = 1.0 / 32.0;
 /// Share of the reach over which first differences are taken.
 const STEP: f64 = 1e-3;
-/// A direction of which all but this share lies along the others is not told.
+/// Least share of a direction that must lie across the others; a direction with less is omitted.
 const LEAST_LEFT: f64 = 1e-3;
 
-/// Directions of unit length along which a spread moves a reading, and a point does not.
+/// Directions of unit length along which a distributed contact changes a reading, and a point contact does not.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SpreadDirections {
     units: Vec<Vec<f64>>,
@@ -40,7 +40,7 @@ pub(crate) struct SpreadDirections {
 }
 
 impl SpreadDirections {
-    /// The directions about a contact; `reads` is what contacts read, channel by channel, over the noise about this one.
+    /// The directions about a contact; `reads` gives the reading of a contact, channel by channel, over the noise about this one.
     pub fn about(About { at, ends }: About, mut reads: impl FnMut([f64; 3]) -> Vec<f64>) -> Self {
         let side = |k: usize| ends[k].1 - ends[k].0;
         let is_free = |k: usize| side(k) > 0.0;
@@ -75,7 +75,7 @@ impl SpreadDirections {
         Self { units: basis.split_off(tangents), is_line }
     }
 
-    /// The square of what a residual has along them; on a line, where a spread has but one sign, 0 for the other.
+    /// The squared component of a residual along the directions. On a line, a distributed contact has only one sign; the score is 0 for the other.
     pub fn score(&self, residual: &[f64]) -> f64 {
         let along = |unit: &Vec<f64>| dot(unit, residual);
         match self.units.as_slice() {
@@ -90,7 +90,7 @@ impl SpreadDirections {
     }
 }
 
-/// Score of a reading about a contact by which it is explained best; `reads` as for [`SpreadDirections::about`], and the reading over the same noise.
+/// Score of a reading about the contact that explains it best; `reads` as for [`SpreadDirections::about`], and the reading over the same noise.
 pub(crate) fn spread_score(
     about: About,
     reading: impl IntoIterator<Item = f64>,
@@ -100,11 +100,11 @@ pub(crate) fn spread_score(
     SpreadDirections::about(about, reads).score(&residual)
 }
 
-/// The score that a point exceeds at [`SPREAD_RATE`], on a surface of so many dimensions.
+/// The score that a point contact exceeds at [`SPREAD_RATE`], on a surface of so many dimensions.
 pub(crate) fn spread_bound(dimensions: usize) -> f64 {
     static KNOWN: [OnceLock<f64>; 2] = [const { OnceLock::new() }; 2];
     if dimensions == 1 {
-        // Of one sign.
+        // One-sided test.
         return *KNOWN[0].get_or_init(|| chi_squared_critical_value(2.0 * SPREAD_RATE, 1));
     }
     *KNOWN[1].get_or_init(|| chi_squared_critical_value(SPREAD_RATE, 3))

@@ -1,21 +1,21 @@
-//! The rule by which an estimate is `no_contact`, `outside_model` or `ambiguous`, one for every estimator that knows the noise of
-//! its channels.
+//! The rule by which an estimate is `no_contact`, `outside_model` or `ambiguous`. All estimators with a known noise of their channels share it.
 //!
-//! - `no_contact`: |d|², the squared length of the whitened reading d (less offsets, over the noise), is one that noise alone
-//!   exceeds more often than half the [`FalseAlarmRate`], and the best contact takes no more of it off than a contact costs. Noise alone
-//!   fails the first at half the rate. The cost of a contact is that of the extended Bayesian information criterion at 0.2 %; at
-//!   another rate Φ(−√cost), the chance that noise exceeds it along one contact's reading, changes as the rate does. A cost is no quantile:
-//!   noise fails the second at a rate that the numbers of channels and places give, 0.3 to 1 times the one that is set on the benches of
-//!   docs/at-the-limit.md. Force-linear surfaces without a model have `NoiseBounds` in its place, which noise fails at the rate itself.
-//! - `outside_model`: the misfit χ² of the best contact is one that a contact of the model exceeds less often than
-//!   [`OUTSIDE_MODEL_RATE`], or the contact seems spread out, as that of a point does less often than
-//!   [`SPREAD_RATE`]: the residual lies along the second derivative of the influences (estimators of a finger do without).
-//! - `ambiguous`: another place has a share of at least [`OTHER_PLACE`] of the posterior probability, or the reading leaves the place open:
-//!   the 95 % interval has at least the share [`PLACE_LEFT_OPEN`] of every side of the surface, as that of a contact anywhere has.
+//! - `no_contact`: a reading passes two conditions. Noise alone exceeds |d|², the squared length of the whitened reading d (less offsets,
+//!   over the noise), more often than half the [`FalseAlarmRate`]. The best contact reduces |d|² by no more than the cost of a contact.
+//!   Noise alone fails the first condition at half the rate. The cost of a contact is that of the extended Bayesian information criterion
+//!   at a rate of 0.2 %. The probability Φ(−√cost) that noise exceeds the cost along one contact's reading is proportional to the rate; this
+//!   gives the cost at other rates. A cost is not a quantile: noise fails the second condition at a rate that depends on the numbers of
+//!   channels and places. It is 0.3 to 1 times the set rate on the benches of docs/at-the-limit.md. Force-linear surfaces without a model
+//!   have `NoiseBounds` instead, which noise fails at the rate itself.
+//! - `outside_model`: a contact of the model exceeds the χ² of the best contact less often than [`OUTSIDE_MODEL_RATE`], or the contact
+//!   seems distributed. A point contact seems distributed less often than [`SPREAD_RATE`]. The residual of a distributed contact lies along
+//!   the second derivative of the influences (estimators of a finger do without this test).
+//! - `ambiguous`: another place has a share of at least [`OTHER_PLACE`] of the posterior probability, or the position is undetermined: the
+//!   95 % interval covers at least the share [`PLACE_LEFT_OPEN`] of every side of the surface, as for a contact that may be anywhere.
 //!
-//! One reading in a thousand, or three, is a false alarm that an engineer sees and can live with: a channel read a hundred times a second
-//! then gives one every few seconds, and a tracker averages it away; a rate ten times lower moves both bounds by a tenth of their size
-//! and hides contacts that are that much stronger.
+//! An engineer can accept one to three false alarms in a thousand readings. A channel that is read a hundred times a second then gives one
+//! every few seconds, and a tracker averages it away. A rate ten times lower moves both bounds by a tenth of their size, and misses
+//! contacts that are stronger by that much.
 
 use crate::recording::Recording;
 use crate::thinning::thinned;
@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
-/// Share of the readings of an untouched surface that may be taken for a contact: 0.0001 % to 10 %.
+/// Share of the readings of an untouched surface that may be mistaken for a contact: 0.0001 % to 10 %.
 ///
 /// ```
 /// use palpate_estimators::status::FalseAlarmRate;
@@ -88,34 +88,34 @@ impl From<FalseAlarmRate> for f64 {
 
 impl std::fmt::Display for FalseAlarmRate {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // A percentage has no digits that the share has not: 0.07 is 7 %, not 7.000000000000001 %.
+        // A percentage has no more digits than the share: 0.07 is 7 %, not 7.000000000000001 %.
         let percent = (self.0 * 1e14).round() / 1e12;
         write!(f, "{percent} %")
     }
 }
 
-/// Share of the readings of contacts whose noise makes them `outside_model`.
+/// Share of the readings of contacts that are `outside_model` by noise alone.
 pub const OUTSIDE_MODEL_RATE: f64 = 1e-3;
 
-/// Share of the readings of contacts at a point that are `outside_model` as those of a contact spread out, of two close by or of a patch.
+/// Share of the readings of point contacts that are `outside_model` as those of a distributed contact: two contacts close by, or a patch.
 pub const SPREAD_RATE: f64 = 2e-3;
 
-/// Level of tests whether noise explains what a recording shows: untouched rows that are contacts, their drift, presses that are `outside_model`. The usual
-/// one of statistics: one recording in twenty whose noise explains it fails.
+/// Significance level of the tests whether noise explains a recording: untouched rows that are contacts, their drift, presses that are
+/// `outside_model`. This is the usual level of statistics: one recording in twenty fails by noise alone.
 pub(crate) const SIGNIFICANCE: f64 = 0.05;
 
-/// The least share of the posterior probability for another place to make an estimate `ambiguous`: of the readings that are `located`,
-/// fewer than one in a hundred comes from another place than the one that is said.
+/// The least share of the posterior probability for another place to make an estimate `ambiguous`. Among `located` readings, fewer than one
+/// in a hundred comes from another place than the estimated one.
 pub const OTHER_PLACE: f64 = 0.01;
 
-/// Share of a side of the surface that a 95 % interval has of a contact that may be anywhere along it.
+/// Share of a side of the surface that the 95 % interval covers for a contact that may be anywhere along it.
 pub const PLACE_LEFT_OPEN: f64 = 0.95;
 
-/// χ² that noise exceeds at [`OUTSIDE_MODEL_RATE`], with `freedom` channels more than unknowns; without any, that of one. Contacts press and
-/// lie on the surface, so that as many readings as unknowns need not have a contact that explains them; what the best leaves then is the
-/// noise of the direction in which an end or a force of 0 held it.
+/// χ² that noise exceeds at [`OUTSIDE_MODEL_RATE`], with `freedom` channels more than unknowns; for 0, the χ² of 1. Contacts press and lie
+/// on the surface, so with as many channels as unknowns a contact need not explain the reading. The residual of the best contact is then
+/// the noise along the direction in which an end of the surface, or the force 0, limits it.
 pub(crate) fn misfit_bound(freedom: usize) -> f64 {
-    /// Bounds that were asked for: estimators that weigh their channels anew for each reading ask every time.
+    /// Computed bounds: estimators that weight their channels anew for each reading need one every time.
     static KNOWN: [OnceLock<f64>; 65] = [const { OnceLock::new() }; 65];
     let freedom = freedom.max(1);
     let bound = || chi_squared_critical_value(OUTSIDE_MODEL_RATE, freedom);
@@ -124,7 +124,7 @@ pub(crate) fn misfit_bound(freedom: usize) -> f64 {
 
 /// |d|² that noise of so many channels exceeds at half a rate.
 fn noise_bound(channels: usize, rate: FalseAlarmRate) -> f64 {
-    /// Bounds at the default rate that were asked for: some estimators ask for each reading.
+    /// Computed bounds at the default rate: some estimators need one for each reading.
     static KNOWN: [OnceLock<f64>; 65] = [const { OnceLock::new() }; 65];
     let channels = channels.max(1);
     let bound = || chi_squared_critical_value(0.5 * rate.0, channels);
@@ -134,22 +134,22 @@ fn noise_bound(channels: usize, rate: FalseAlarmRate) -> f64 {
     }
 }
 
-/// The cost of a contact at half a rate, from that at 0.1 %: noise exceeds it along the reading of a contact as much more often as the rate
-/// is greater.
+/// The cost of a contact at half a rate, from the cost at 0.1 %. The probability that noise exceeds it along the reading of a contact is
+/// proportional to the rate.
 fn detection_cost(contact_cost: f64, rate: FalseAlarmRate) -> f64 {
     let tail = normal_cdf(-contact_cost.sqrt()) * 0.5 * rate.0 / FalseAlarmRate::DEFAULT.0;
     bisect((0.0, 20.0), 40, |u| normal_cdf(-u) > tail).powi(2)
 }
 
-/// Bounds of misfit, score of a spread or the like, from which on no contact explains a reading, of a surface that is known by its recording
-/// alone: each that for `normal` noise, and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer
-/// tails.
+/// Bounds of χ², of the score of a distributed contact or the like, for a surface that is known by its recording alone. Beyond them no
+/// contact explains a reading. Each is the bound for `normal` noise, and at least twice the value that one in a hundred of the recording's
+/// own readings exceeds, as real noise has longer tails.
 pub(crate) fn learnt_bounds<const N: usize>(
     normal: [f64; N],
     recording: &Recording,
     left: impl Fn(&[f64]) -> [f64; N],
 ) -> [f64; N] {
-    /// Readings that are tried.
+    /// The most readings that are used.
     const TRIED: usize = 400;
     let rows = &recording.rows;
     let tried: Vec<[f64; N]> = thinned(rows.len(), TRIED).map(|i| left(&rows[i].reading)).collect();
@@ -170,14 +170,14 @@ pub(crate) fn contact_cost(unknowns: usize, channels: usize, places: usize) -> f
     unknowns as f64 * (channels as f64).ln() + 2.0 * (places as f64).ln()
 }
 
-/// Numbers that a reading must tell of a contact: the coordinates of its position, and its force where that is not known.
+/// Number of unknowns of a contact: the coordinates of its position, and its force where that is not known.
 pub(crate) fn unknowns(coordinates: usize, force_n: Option<f64>) -> usize {
     coordinates + usize::from(force_n.is_none())
 }
 
 /// The bounds of `no_contact` and `outside_model`, for readings of given channels.
 ///
-/// Symbols: |d|² squared length of the whitened reading, χ² misfit of the best contact.
+/// Symbols: |d|² squared length of the whitened reading, χ² chi-squared of the best contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct StatusRule {
     /// Largest |d|² of noise alone.
@@ -191,7 +191,7 @@ pub(crate) struct StatusRule {
 }
 
 impl StatusRule {
-    /// The rule for `channels` whose noise is known, and a contact of so many unknowns that could be at so many places.
+    /// The rule for `channels` with known noise, and a contact with so many unknowns that could be at so many places.
     pub fn new(channels: usize, unknowns: usize, places: usize, rate: FalseAlarmRate) -> Self {
         let contact_cost = contact_cost(unknowns, channels, places);
         Self {
@@ -202,7 +202,7 @@ impl StatusRule {
         }
     }
 
-    /// The rule for a reading of channels whose noise is not known: only zeros are no contact, and the best contact may leave the share
+    /// The rule for a reading of channels with unknown noise: only zeros are `no_contact`, and the best contact may leave the share
     /// `misfit` of the reading's `square`.
     pub fn without_noise(square: f64, misfit: f64) -> Self {
         Self { noise_bound: 0.0, detection_cost: 0.0, contact_cost: 0.0, misfit_bound: misfit * square }
@@ -214,30 +214,30 @@ impl StatusRule {
         square <= self.noise_bound
     }
 
-    /// Whether noise alone explains a reading of length `square` = |d|², and no worse than a contact whose χ² is `misfit`.
+    /// Whether noise alone explains a reading of length `square` = |d|², and no worse than a contact with the χ² `misfit`.
     #[inline(always)]
     pub fn is_no_contact(&self, square: f64, misfit: f64) -> bool {
         square <= misfit + self.detection_cost && self.is_within_noise(square)
     }
 
-    /// The part that a contact whose χ² is `misfit` takes off the length of a reading, `square` = |d|², beyond the least with which a reading within the
-    /// noise is a contact's.
+    /// Reduction of `square` = |d|² by a contact with the χ² `misfit`, less the smallest reduction for which a reading within the noise
+    /// counts as a contact.
     pub fn taken_beyond_cost(&self, square: f64, misfit: f64) -> f64 {
         square - misfit - self.detection_cost
     }
 
-    /// Whether a contact whose χ² is `misfit` explains the reading; otherwise it is `outside_model`.
+    /// Whether a contact with the χ² `misfit` explains the reading; otherwise it is `outside_model`.
     #[inline(always)]
     pub fn is_explained(&self, misfit: f64) -> bool {
         misfit <= self.misfit_bound
     }
 
-    /// Bounds from which the rule finds a contact of so many unknowns in readings of so many channels.
+    /// Bounds from which the rule detects a contact with so many unknowns in readings of so many channels.
     pub fn detection(&self, channels: usize, unknowns: usize) -> Detection {
         Detection { channels, unknowns, square: self.noise_bound, taken: self.detection_cost }
     }
 
-    /// χ² that a contact costs beside others, which no false-alarm rate changes.
+    /// Cost in χ² of a contact beside others, which does not depend on the false-alarm rate.
     pub fn contact_cost(&self) -> f64 {
         self.contact_cost
     }
@@ -260,8 +260,9 @@ impl Directions {
         normal_cdf(-u) + (-0.5 * u * u).exp() * (self.length / TAU + self.area * u / TAU.powf(1.5))
     }
 
-    /// The same, of noise of so many channels whose |d|² is at most `square` besides. Each term of [`Directions::exceeded`] is the integral
-    /// of a density of the component; the remainder of |d|² is χ² of the channels that the term does not use.
+    /// Probability that noise of so many channels has a component greater than `u` along a direction while |d|² is at most `square`. Each
+    /// term of [`Directions::exceeded`] is the integral of a density of the component. The remainder of |d|² is χ² of the channels that the
+    /// term does not use.
     fn exceeded_within(self, u: f64, square: f64, channels: usize) -> f64 {
         const STEPS: usize = 64;
         let most = square.sqrt();
@@ -280,13 +281,13 @@ impl Directions {
     }
 }
 
-/// Bounds of noise: of |d|², and of what the best contact takes off it. Noise exceeds either alone equally often, and one or the other at
-/// the false-alarm rate.
+/// Bounds of noise: on |d|², and on its reduction by the best contact. Noise exceeds each of them equally often, and at least one of them
+/// at the false-alarm rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct NoiseBounds {
     /// Largest |d|² of noise alone.
     pub square: f64,
-    /// The most that a contact takes off it.
+    /// Largest reduction of |d|² by a contact.
     pub taken: f64,
 }
 
@@ -306,15 +307,15 @@ impl NoiseBounds {
     }
 }
 
-/// Bounds from which a contact is found: a rule of `no_contact` for channels of unit noise.
+/// Bounds from which a contact is detected: a rule of `no_contact` for channels of unit noise.
 ///
-/// Symbols: d whitened reading, n channels, k unknowns of a contact (its coordinates and its force, which nobody knows), s length of the
-/// contact's own whitened reading (its signal-to-noise ratio), B the bound on |d|² and C that on what the best contact takes off it.
+/// Symbols: d whitened reading, n channels, k unknowns of a contact (its coordinates and its unknown force), s length of the contact's own
+/// whitened reading (its signal-to-noise ratio), B the bound on |d|² and C the bound on its reduction by the best contact.
 ///
-/// About the contact the readings of all others span k dimensions, along its own reading and along its tangents, so that the best of them
-/// takes u = (s + z)² + v off |d|² = u + w, with z normal, v χ² of k − 1 and w χ² of n − k degrees of freedom, all independent. The
-/// contact is missed where u ≤ C and u + w ≤ B. To first order, as contacts far away in the readings are left out, and the curvature of the
-/// readings between.
+/// Near the contact, the readings of all others span k dimensions, along its own reading and along its tangents. So the best of them
+/// reduces |d|² = u + w by u = (s + z)² + v, with z normal, v χ² of k − 1 and w χ² of n − k degrees of freedom, all independent. The
+/// contact is missed where u ≤ C and u + w ≤ B. This is valid to first order: contacts with distant readings, and the curvature of the
+/// readings between, are neglected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Detection {
     /// n.
@@ -328,17 +329,17 @@ pub(crate) struct Detection {
 }
 
 impl Detection {
-    /// Probability that a contact of signal-to-noise ratio `signal` is found.
+    /// Probability that a contact of signal-to-noise ratio `signal` is detected.
     pub fn probability(&self, signal: f64) -> f64 {
         const STEPS: usize = 80;
-        /// Standard deviations beyond which a normal variable has no probability worth adding up.
+        /// Standard deviations beyond which the probability of a normal variable is negligible.
         const FAR: f64 = 7.0;
         let Self { channels, unknowns, square, taken } = *self;
         let tangents = unknowns.min(channels).saturating_sub(1);
         let rest = channels.saturating_sub(unknowns);
         let below = |left: f64| if left < 0.0 { 0.0 } else { 1.0 - chi_squared_survival(left, rest) };
         let normal = |z: f64| (-0.5 * z * z).exp() / TAU.sqrt();
-        // Missed for a component x = s + z along the contact: over the length y of what the tangents take.
+        // Probability of a miss for a component x = s + z along the contact, integrated over the length y of the component along the tangents.
         let missed = |x: f64| {
             let room = (taken - x * x).max(0.0);
             match tangents {
@@ -359,7 +360,7 @@ impl Detection {
         1.0 - simpson((from, to), STEPS, |x| normal(x - signal) * missed(x))
     }
 
-    /// Signal-to-noise ratio of a contact that is found with a probability.
+    /// Signal-to-noise ratio of a contact that is detected with a probability.
     pub fn signal(&self, probability: f64) -> f64 {
         let most = self.taken.sqrt() + self.square.sqrt() + 10.0;
         bisect((0.0, most), 40, |signal| self.probability(signal) < probability)
@@ -373,10 +374,10 @@ fn simpson((from, to): (f64, f64), steps: usize, of: impl Fn(f64) -> f64) -> f64
     (0..=steps).map(|i| weight(i) * of(from + i as f64 * step)).sum::<f64>() * step / 3.0
 }
 
-/// The estimate of a reading that nothing but noise is in.
+/// The estimate of a reading that contains only noise.
 pub(crate) const NO_CONTACT: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);
 
-/// The estimate with the status of one that leaves the place open where it does: `ambiguous` instead of `located`.
+/// The estimate with the status `ambiguous` instead of `located` where the position is undetermined.
 pub(crate) fn unless_left_open(estimate: Estimate, extent: Extent) -> Estimate {
     let is_left_open = estimate.contact.uncertainty.is_some_and(|uncertainty| {
         let is_open = |(low, high): (f64, f64), side_m: f64| {
@@ -391,7 +392,7 @@ pub(crate) fn unless_left_open(estimate: Estimate, extent: Extent) -> Estimate {
     }
 }
 
-/// The estimate of a method that does not know the noise of its channels: located, or outside the surface.
+/// The estimate of a method without a noise model: located, or outside the surface.
 pub(crate) fn on_surface(contact: ContactEstimate, extent: Extent) -> Estimate {
     let status = if extent.contains(contact.position) { Status::Located } else { Status::OutsideSurface };
     Estimate::of_contact(contact, status)

@@ -1,15 +1,15 @@
-//! Few of many: an even choice that does not fall into step with an order that repeats itself.
+//! Even subsets of many items, out of step with a periodic order.
 //!
-//! Recordings come back to the same places over and over, and grids are numbered row by row. One in k of them, the same one of each k, leaves
-//! places out wherever k and the period have a common divisor: one press in two of a line that is pressed at forty places in turn is twenty places.
+//! Recordings return to the same places again and again, and grids are numbered row by row. Every k-th item omits places where k and the
+//! period have a common divisor. Every second press of a line that is pressed at forty places in turn covers twenty places.
 
-/// Indices of no more than `most` of `len` things, rising: one of every `len`/`most`, not the same one of each, as their order may repeat
-/// itself. All of them where `len` is no more than `most`.
+/// Indices of at most `most` of `len` items, rising: one from every `len`/`most` items, with a varying offset, as the order may be
+/// periodic. All indices where `len` is at most `most`.
 ///
 /// # Panics
 /// When `most` is 0.
 pub(crate) fn thinned(len: usize, most: usize) -> impl ExactSizeIterator<Item = usize> + Clone {
-    /// Of the golden section: its multiples never come near a period.
+    /// Golden ratio less 1: its multiples never come near a period.
     const IRRATIONAL: f64 = 0.618_033_988_749_895;
     assert!(most > 0, "at least one is kept");
     let kept = len.min(most);

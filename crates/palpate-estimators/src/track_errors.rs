@@ -1,4 +1,4 @@
-//! Errors of a track, beside those of its readings one by one; and how they grow with the contact's speed.
+//! Errors of a track and of its single readings, and their growth with the contact's speed.
 
 use crate::estimator::{
     ContactEstimate, Estimate, Locator, NotTrackable, SmoothTracker, Status, Track, TrackError, Tracked,
@@ -12,25 +12,25 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Mean errors over the contacts while they touched, in metres, and how often the 95 % intervals held them. Where there are
-/// several, those that were found are paired with the true ones so that the distances are least.
+/// Mean errors over the contacts while they touched, in metres, and coverage of the 95 % intervals. Several detected contacts are paired
+/// with the true ones such that the sum of the distances is least.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct TrackErrors {
-    /// Readings while something touched.
+    /// Number of readings with at least one contact.
     pub readings: usize,
-    /// Contacts that touched and that the tracker had, over all readings; the track's errors are of these.
+    /// Number of touching contacts that the tracker had, over all readings. The errors of the track are those of these contacts.
     pub tracked: usize,
-    /// Mean error of a reading by itself.
+    /// Mean error of single readings.
     pub single_m: f64,
     /// Mean error of the track.
     pub track_m: f64,
-    /// Share of the contacts of readings by themselves whose interval held the true one.
+    /// Share of the contacts of single readings with an interval that contains the true one.
     pub single_covered: f64,
-    /// Share of the track's intervals that held it.
+    /// Share of the track's intervals that contain the true one.
     pub track_covered: f64,
-    /// Share of all readings at which the reading by itself shows as many contacts as touch.
+    /// Share of all readings at which the single reading gives the true number of contacts.
     pub single_number_right: f64,
-    /// Share of all readings at which the tracker has as many.
+    /// Share of all readings at which the tracker has the true number of contacts.
     pub track_number_right: f64,
 }
 
@@ -44,7 +44,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// Adds a reading's contacts, and those that were found.
+    /// Adds the true and the detected contacts of a reading.
     fn add(&mut self, truths: &[Position], found: &[ContactEstimate], extent: Extent) {
         self.numbers_right += usize::from(truths.len() == found.len());
         let places: Vec<Position> = found.iter().map(|contact| contact.position).collect();
@@ -62,8 +62,8 @@ impl Sums {
 }
 
 impl TrackErrors {
-    /// Compares tracks with the true contacts of each, whose force is 0 where they do not touch; `None` where nothing ever
-    /// did, or nothing was tracked.
+    /// Compares tracks with the true contacts of each, which have force 0 where they do not touch; `None` where no contact touched, or none
+    /// was tracked.
     pub fn new(tracks: &[Track], truths: &[Vec<Contact>], extent: Extent) -> Option<Self> {
         let (mut readings, mut single, mut track) = (0, Sums::default(), Sums::default());
         for (one, truths) in tracks.iter().zip(truths) {
@@ -87,13 +87,13 @@ impl TrackErrors {
         })
     }
 
-    /// Mean error of the readings by themselves over that of the track.
+    /// Mean error of the single readings over that of the track.
     pub fn ratio(&self) -> f64 {
         self.single_m / self.track_m
     }
 }
 
-/// The contacts of a reading by itself; while something touches, its best guess at least.
+/// The contacts of a single reading; while a contact touches, at least the best guess.
 fn contacts_of_single(estimate: &Estimate, touched: bool) -> Vec<ContactEstimate> {
     if !touched && estimate.status == Status::NoContact {
         return Vec::new();
@@ -101,7 +101,7 @@ fn contacts_of_single(estimate: &Estimate, touched: bool) -> Vec<ContactEstimate
     std::iter::once(&estimate.contact).chain(estimate.further.as_slice()).copied().collect()
 }
 
-/// For each true contact, the tracked one that is it; none for those that do not touch or were not found.
+/// For each true contact, the tracked one that is paired with it; `None` for contacts that do not touch or were not detected.
 pub fn tracked_of(track: &Track, truths: &[Contact]) -> Vec<Option<Tracked>> {
     let touching: Vec<usize> = (0..truths.len()).filter(|i| truths[*i].force_n > 0.0).collect();
     let places: Vec<Position> = touching.iter().map(|i| truths[*i].position).collect();
@@ -123,7 +123,7 @@ fn pairs(a: &[Position], b: &[Position]) -> Vec<(usize, usize)> {
     best.1.into_iter().enumerate().collect()
 }
 
-/// Goes through every choice of one of `b` for each of `a`, none twice; `chosen` is the choice so far.
+/// Enumerates every assignment of distinct elements of `b` to those of `a`; `chosen` is the assignment so far.
 fn choose(a: &[Position], b: &[Position], chosen: &mut Vec<usize>, sum: f64, best: &mut (f64, Vec<usize>)) {
     if chosen.len() == a.len() {
         if sum < best.0 {
@@ -141,30 +141,30 @@ fn choose(a: &[Position], b: &[Position], chosen: &mut Vec<usize>, sum: f64, bes
     }
 }
 
-/// A recording followed, by the filter and by the smoother.
+/// Tracks of a recording, by the filter and by the smoother.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Followed {
-    /// As the readings came.
+    /// Tracks by the filter, each from the readings up to its time.
     pub filtered: Vec<Track>,
-    /// With all of them.
+    /// Tracks by the smoother, each from all readings.
     pub smoothed: Vec<Track>,
 }
 
-/// A recording that cannot be followed.
+/// A recording that cannot be tracked.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FollowError {
-    /// The locator cannot follow.
+    /// The locator cannot track.
     #[error(transparent)]
     NotTrackable(#[from] NotTrackable),
     /// A row is out of order.
     #[error(transparent)]
     Track(#[from] TrackError),
-    /// It was stopped.
+    /// The watch stopped the work.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
 
-/// Follows a recording whose times rise.
+/// Tracks the contacts of a recording with rising times.
 ///
 /// # Errors
 /// [`FollowError`] for a locator that has no likelihood, or a time that is not later than the one before.
@@ -184,26 +184,26 @@ pub fn follow(
 /// The errors at one speed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct SpeedErrors {
-    /// The speed between the turns over the critical one.
+    /// Ratio of the speed between the turns to the critical speed.
     pub ratio: f64,
-    /// That speed, in m/s.
+    /// Speed between the turns, in m/s.
     pub speed_m_per_s: f64,
-    /// Of the filter.
+    /// Errors of the filter.
     pub filtered: TrackErrors,
-    /// Of the smoother.
+    /// Errors of the smoother.
     pub smoothed: TrackErrors,
 }
 
-/// A sweep over speeds that cannot be made.
+/// Error of a sweep over speeds.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SweepError {
-    /// The locator cannot follow.
+    /// The locator cannot track.
     #[error(transparent)]
     Follow(#[from] FollowError),
     /// The bench cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// The surface does not swing.
+    /// The surface does not vibrate.
     #[error("a sweep over speeds needs a beam that swings; this surface is in balance at any speed")]
     NoCriticalSpeed,
 }
@@ -211,11 +211,11 @@ pub enum SweepError {
 /// Speeds of a sweep, over the critical one.
 pub const SPEED_RATIOS: [f64; 8] = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.95];
 
-/// The errors at each of [`SPEED_RATIOS`]: the contacts moving at that speed, simulated and followed. A speed at which
-/// nothing is tracked is left out.
+/// The errors at each of [`SPEED_RATIOS`]: the contacts are simulated with that speed, and tracked. A speed at which no contact is tracked
+/// is omitted.
 ///
 /// # Errors
-/// [`SweepError`] when the surface has no critical speed, or the locator cannot follow.
+/// [`SweepError`] when the surface has no critical speed, or the locator cannot track.
 pub fn sweep_speeds(
     locator: &Locator,
     config: TrackerConfig,

@@ -17,7 +17,7 @@ pub struct Tried {
 }
 
 impl Tried {
-    /// Geometric mean of mean error and interval score in metres: an estimator must be near, and its intervals must be right.
+    /// Geometric mean of mean error and interval score in metres: an estimator must be accurate, and its intervals must be valid.
     pub fn score_m(&self) -> f64 {
         (self.mean_error_m * self.interval_score_m).sqrt()
     }

@@ -1,4 +1,4 @@
-//! Drift of an untouched surface in the course of a recording: how far the untouched reading may have gone by the time of use.
+//! Drift of an untouched surface in the course of a recording: how much the untouched reading may have changed by the time of use.
 
 use crate::locator_fault::LocatorFault;
 use crate::recording::Recording;
@@ -16,7 +16,7 @@ pub struct UntouchedDrift {
     pub last: Vec<f64>,
     /// Range of each channel's untouched readings.
     pub range: Vec<f64>,
-    /// Standard deviation of each channel's random walk after a second, in its unit; none where the rows have no times.
+    /// Standard deviation of each channel's random walk after a second, in its unit; empty where the rows have no times.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub walk_per_root_s: Vec<f64>,
     /// Time from the first rest to the last, in seconds, where the rows have times.
@@ -34,7 +34,7 @@ impl UntouchedDrift {
         let channels = recording.channels.len();
         let levels: Vec<Vec<f64>> = rests.iter().map(|rest| recording.mean_reading(rest)).collect();
         let course = |channel: usize| levels.iter().map(|level| level[channel]).collect::<Vec<f64>>();
-        // Of each channel, so that all together err at this level.
+        // Level of each channel, so that the test of all channels has the level `SIGNIFICANCE`.
         let share = SIGNIFICANCE / channels as f64;
         if !(0..channels).any(|channel| is_drifting(&course(channel), share)) {
             return None;
@@ -59,7 +59,7 @@ impl UntouchedDrift {
     }
 
     /// Variance that the random walk of each channel has in the scatter of the rests: twice its mean square deviation w²·T/15 from a straight line over the time T.
-    /// None where it is not known.
+    /// Empty where the duration or the walk is not known.
     pub fn walk_variances(&self) -> Vec<f64> {
         let of = |duration_s: f64| {
             self.walk_per_root_s.iter().map(|walk| 2.0 / 15.0 * walk * walk * duration_s).collect()
@@ -74,7 +74,7 @@ impl UntouchedDrift {
         self.range.iter().zip(layout.sensors().iter().map(|sensor| sensor.channel.dead)).map(reach).collect()
     }
 
-    /// Checks what a file may have got wrong.
+    /// Checks the values read from a file.
     ///
     /// # Errors
     /// [`LocatorFault`], naming what does not fit together.
@@ -102,7 +102,7 @@ impl UntouchedDrift {
     }
 }
 
-/// Whether values in the order of time drift, with this probability of an error where they are independent.
+/// Whether values in the order of time drift; `share` is the probability of an error for independent values.
 ///
 /// Von Neumann's ratio η = Σ(xᵢ₊₁ − xᵢ)²/Σ(xᵢ − x̄)² has the mean 2 for n independent normal values and the variance 4·(n − 2)/(n² − 1) (*Annals of Mathematical
 /// Statistics* 12, 1941). It is about normal, and small where they drift.
@@ -117,8 +117,8 @@ fn is_drifting(values: &[f64], share: f64) -> bool {
 
 /// Standard deviation w of a random walk after a second, by values in the order of time; 0 where they show none.
 ///
-/// White noise of variance σ² on a walk has the mean square D_k = 2·σ² + w²·T_k of the changes over k values, T_k being their mean duration, so two lags tell
-/// it: w² = (D_k − D₁)/(T_k − T₁). The longer lag is a quarter of the values, over which three changes overlap nowhere.
+/// For white noise of variance σ² on a walk, changes over k values have the mean square D_k = 2·σ² + w²·T_k, with T_k their mean duration.
+/// So two lags determine w² = (D_k − D₁)/(T_k − T₁). The longer lag is a quarter of the values, over which three changes do not overlap.
 fn walk_per_root_s(values: &[f64], times_s: &[f64]) -> f64 {
     let over = |lag: usize| {
         let changes = values.iter().zip(&values[lag..]).map(|(before, after)| (after - before).powi(2));
@@ -139,7 +139,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// Presses with two untouched rows after each, of noise 1 and a drift of the second channel a press.
+    /// Presses with two untouched rows after each. The noise is 1, and the second channel drifts by `drift` a press.
     fn recording(presses: usize, drift: f64, seed: u64) -> Recording {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut row = |force_n: f64, press: usize| {

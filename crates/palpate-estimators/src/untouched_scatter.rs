@@ -1,17 +1,17 @@
 //! Scatter of an untouched surface from one rest to the next: the residue that hysteresis, creep and drift leave after a touch, with the noise.
 //!
-//! Noise is learnt from repeats, and hardly shows what a touch leaves behind. The untouched rows of a recording do, where presses are between
-//! them. Each run of untouched rows is a rest. About a straight line in time, which takes a steady drift off, the rests have the variance s² in each
-//! channel; a reading less a baseline, which is a rest too, has 2·s².
+//! Noise is learnt from repeats, and hardly includes the residue of a touch. The untouched rows of a recording show the residue, where
+//! presses lie between them. Each run of untouched rows is a rest. About a straight line in time, which removes a steady drift, the rests
+//! have the variance s² in each channel. A reading less a baseline, which is a rest too, has the variance 2·s².
 //!
 //! Symbols: d reading less the untouched reading, n channels, ν degrees of freedom of the rests, R correlation matrix of the channels.
 //!
-//! T = Σ d²/(2·s²) is Σ λ·χ²₁ with the eigenvalues λ of R. With c₁ = n, c₂ = tr R² and c₃ = tr R³ it is about n − g·b + g·χ²_b with g = c₃/c₂ and
-//! b = c₂³/c₃², which has its first three moments (Imhof, *Biometrika* 48, 1961). So channels whose residues go together count as fewer. As s² is estimated, the
-//! critical value c of χ²_b becomes that of b·F with b and ν degrees of freedom, about ν·(e^(c/(ν + b/2 − 1)) − 1) (Bartlett, *Journal of the Royal
-//! Statistical Society B* 9, 1947). R is the sample's, whose eigenvalues scatter more than those of the
-//! surface: with few rests of unrelated channels the test is conservative. Where the deviations have heavier tails than normal ones, the critical value is
-//! at least that of Student's t distribution (`tails.rs`).
+//! T = Σ d²/(2·s²) is Σ λ·χ²₁ with the eigenvalues λ of R. With c₁ = n, c₂ = tr R² and c₃ = tr R³ it is about n − g·b + g·χ²_b with g =
+//! c₃/c₂ and b = c₂³/c₃², which has the first three moments of T (Imhof, *Biometrika* 48, 1961). So channels with correlated residues count
+//! as fewer. As s² is estimated, the critical value c of χ²_b becomes that of b·F with b and ν degrees of freedom, about ν·(e^(c/(ν + b/2 −
+//! 1)) − 1) (Bartlett, *Journal of the Royal Statistical Society B* 9, 1947). R is estimated from the sample, and its eigenvalues scatter
+//! more than those of the surface: with few rests of unrelated channels the test is conservative. Where the deviations have heavier tails
+//! than normal ones, the critical value is at least that of Student's t distribution (`tails.rs`).
 
 mod tails;
 
@@ -27,18 +27,20 @@ use tails::HeavyTails;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UntouchedScatter {
-    /// Untouched reading of each channel that the scatter is about.
+    /// Untouched reading of each channel, the centre of the scatter.
     pub centre: Vec<f64>,
-    /// Standard deviation of each channel about it, from one rest to the next; 0 of a channel that never changes untouched, and of a disabled one.
+    /// Standard deviation of each channel about it, from one rest to the next; 0 for a channel that never changes untouched, and for a
+    /// disabled one.
     pub sd: Vec<f64>,
     /// Critical value of Σ d²/sd² of an untouched surface at the false-alarm rate.
     pub bound: f64,
 }
 
-/// Rests by which the untouched surface is known, at least: with fewer the critical value would be that of a t with hardly any degrees of freedom.
+/// Fewest rests that determine the untouched surface. With fewer, the critical value would be that of a t distribution with hardly any
+/// degrees of freedom.
 pub(crate) const FEWEST_RESTS: usize = 5;
 
-/// Rests of a recording about their slow course.
+/// Rests of a recording, as deviations from their slow course.
 pub(crate) struct Rests {
     /// Deviation of each untouched row from the course, with the share that the row has of its rest.
     deviations: Vec<(Vec<f64>, f64)>,
@@ -59,14 +61,15 @@ impl Rests {
         Some(Self { noise: noise.map(Box::new), ..rests })
     }
 
-    /// The untouched rows of a recording with too few rests, each as a rest of its own: their noise, without the residue of touches; `None` of too few rows.
+    /// The untouched rows of a recording with too few rests, each as a rest of its own: their noise, without the residue of touches; `None`
+    /// for too few rows.
     pub fn of_single_rows(recording: &Recording) -> Option<Self> {
         let rows: Vec<Vec<usize>> = recording.rests().into_iter().flatten().map(|row| vec![row]).collect();
         Self::new(recording, &rows)
     }
 
-    /// The noise by repeats, of a recording with too few untouched rows: rows of one position and force, and untouched rows, about their means. `None` of
-    /// too few repeats.
+    /// The noise by repeats, for a recording with too few untouched rows: rows of one position and force, and untouched rows, about their
+    /// means. `None` for too few repeats.
     pub fn of_repeats(recording: &Recording) -> Option<Self> {
         let rows = &recording.rows;
         let key = |row: &usize| {
@@ -83,7 +86,7 @@ impl Rests {
         }
         let deviations = groups.into_iter().flat_map(|group| {
             let mean = recording.mean_reading(group);
-            // The mean has a part of each row, by which rows deviate less from it than from the truth.
+            // Each row is part of the mean, so rows deviate less from the mean than from the truth.
             let share = 1.0 - 1.0 / group.len() as f64;
             let off = move |row: &usize| -> Vec<f64> {
                 let values = rows[*row].reading.iter().zip(&mean);
@@ -130,8 +133,9 @@ impl Rests {
             && self.heavy_tails(&channels.iter().map(|(channel, _)| *channel).collect::<Vec<_>>()).is_none()
     }
 
-    /// True where repeats scatter no more in the mean over the channels, at the 5 % level. The median absolute deviation is compared, which hardly depends on the
-    /// tails; of n normal values it has a relative variance of 1.36/n (Serfling, *Approximation Theorems of Mathematical Statistics*, 1980).
+    /// True where repeats scatter no more than the rests, in the mean over the channels, at the 5 % level. The test compares the median
+    /// absolute deviation, which hardly depends on the tails; for n normal values it has a relative variance of 1.36/n (Serfling,
+    /// *Approximation Theorems of Mathematical Statistics*, 1980).
     fn scatter_as_much_as(&self, repeats: &Self) -> bool {
         const RELATIVE_VARIANCE: f64 = 1.36;
         let spread =
@@ -166,7 +170,7 @@ impl Rests {
         self.deviations.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.freedom
     }
 
-    /// Their scatter about `centre`, of the channels that are not disabled.
+    /// Scatter of the rests about `centre`, for the channels that are not disabled.
     pub fn scatter(&self, centre: Vec<f64>, layout: &Layout, rate: FalseAlarmRate) -> UntouchedScatter {
         let is_live = |c: usize| !layout.sensors()[c].channel.dead;
         let variances: Vec<f64> =
@@ -184,7 +188,7 @@ impl Rests {
     }
 }
 
-/// Critical value of Σ d²/(2·s²) for channels of a correlation matrix whose variances were estimated with so many degrees of freedom.
+/// Critical value of Σ d²/(2·s²) for channels of a correlation matrix, with variances that were estimated with `freedom` degrees of freedom.
 fn critical_value(correlations: &[Vec<f64>], freedom: f64, rate: FalseAlarmRate) -> f64 {
     let n = correlations.len();
     if n == 0 {
@@ -196,7 +200,7 @@ fn critical_value(correlations: &[Vec<f64>], freedom: f64, rate: FalseAlarmRate)
     let pairs = (0..n).flat_map(|a| (0..n).map(move |b| (a, b)));
     let third: f64 = pairs.map(|(a, b)| squared(a, b) * correlations[b][a]).sum();
     let scale = third / second;
-    // At least 1, but for rounding where all channels go together.
+    // At least 1, except for rounding where all channels are fully correlated.
     let effective = (second.powi(3) / third.powi(2)).max(1.0);
     // Critical values are nearly linear in the degrees of freedom.
     let below = effective.floor();
@@ -206,7 +210,7 @@ fn critical_value(correlations: &[Vec<f64>], freedom: f64, rate: FalseAlarmRate)
     n as f64 - scale * effective + scale * freedom * (exponent.exp() - 1.0)
 }
 
-/// Level and slope of the straight line through values at some times by least squares; no slope where all times are one.
+/// Level and slope of the straight line through values at some times by least squares; slope 0 where all times are equal.
 fn line(times_s: &[f64], values: &[f64]) -> [f64; 2] {
     let (time_s, value) = (mean(times_s.iter().copied()), mean(values.iter().copied()));
     let products = times_s.iter().zip(values).map(|(t, y)| (t - time_s) * (y - value));
@@ -223,13 +227,13 @@ impl UntouchedScatter {
         }
     }
 
-    /// True for a reading that an untouched surface has at the false-alarm rate. Channels of standard deviation 0 say nothing.
+    /// True for a reading of an untouched surface, at the false-alarm rate. Channels of standard deviation 0 are not used.
     pub fn contains(&self, reading: &[f64]) -> bool {
         let channels = reading.iter().zip(&self.centre).zip(&self.sd).filter(|(_, sd)| **sd > 0.0);
         channels.map(|((value, centre), sd)| ((value - centre) / sd).powi(2)).sum::<f64>() <= self.bound
     }
 
-    /// Checks what a file may have got wrong.
+    /// Checks the values read from a file.
     ///
     /// # Errors
     /// [`LocatorFault`], naming what does not fit together.

@@ -1,7 +1,8 @@
-//! Frames of 8 channels that the decoder reads in a second of one core: cargo bench -p palpate-live --bench decoder
+//! Frames of 8 channels per second that the decoder reads on one core: cargo bench -p palpate-live --bench decoder
 //!
-//! CPU time, the median of nine runs. Beside it the least that a program does with such bytes: lines found and nothing else, by the search for a byte that the standard library
-//! has (`str::lines`), frames of COBS by their zeros; and for plain values the lines split at commas and their numbers read, without names, checks and time.
+//! CPU time, the median of nine runs. For comparison, the bench measures the minimum work on such bytes: the search for line ends by `str::lines` of
+//! the standard library, or for the zeros of COBS frames. For plain values it also splits the lines at commas and parses the numbers, without names,
+//! checks and time.
 
 use cpu_time::ProcessTime;
 use palpate_live::frame::{Channel, Decoder, encode_into};
@@ -45,14 +46,14 @@ fn main() {
     println!("  values: read plainly {read:.2} million lines/s, {:.2} times as many", read / rate);
 }
 
-/// Median rate of nine runs of all frames, in millions a second; `run` gives its CPU seconds.
+/// Median rate of nine runs of all frames, in millions per second; `run` returns its CPU seconds.
 fn million_a_second(run: impl Fn() -> f64) -> f64 {
     let mut seconds: Vec<f64> = (0..9).map(|_| run()).collect();
     seconds.sort_by(f64::total_cmp);
     f64::from(FRAMES) / seconds[seconds.len() / 2] * 1e-6
 }
 
-/// CPU seconds of finding the ends of all frames.
+/// CPU seconds of the search for the ends of all frames.
 fn find(bytes: &[u8], is_binary: bool) -> f64 {
     let start = ProcessTime::now();
     let count = match (is_binary, std::str::from_utf8(bytes)) {
@@ -64,7 +65,7 @@ fn find(bytes: &[u8], is_binary: bool) -> f64 {
     seconds
 }
 
-/// CPU seconds of splitting all lines at their commas, and of reading the numbers.
+/// CPU seconds of splitting all lines at their commas and parsing the numbers.
 fn read_plainly(text: &str) -> f64 {
     let start = ProcessTime::now();
     let sum: f64 =
@@ -74,7 +75,7 @@ fn read_plainly(text: &str) -> f64 {
     seconds
 }
 
-/// CPU seconds of decoding all frames in chunks as a source brings them.
+/// CPU seconds of decoding all frames, in chunks as from a source.
 fn decode(channels: &[Channel], bytes: &[u8]) -> f64 {
     let mut decoder = Decoder::new(channels);
     let (mut frames, mut sum) = (0, 0.0);

@@ -1,8 +1,8 @@
-//! A contact held for a minute on a simulated board that drifts and creeps, followed with and without drift and creep in the state:
+//! A contact of one minute on a simulated board that drifts and creeps, tracked with and without drift and creep in the state:
 //! cargo bench -p palpate-live --bench drift
 //!
-//! Untouched for 30 s, held for 60 s, let go for 30 s, at 100 readings a second, at six places. Means of
-//! all readings of the hold; "after" is the time from the contact's end until no contact is told.
+//! Untouched for 30 s, pressed for 60 s, untouched for 30 s, at 100 readings a second, at six places. The means are
+//! over all readings of the contact; "after" is the time from the end of the contact to the first `no_contact`.
 
 use cpu_time::ProcessTime;
 use palpate_core::Status;
@@ -21,7 +21,7 @@ const UNTOUCHED_S: f64 = 30.0;
 const HELD_S: f64 = 60.0;
 const AFTER_S: f64 = 30.0;
 const NOISE_M: f64 = 5e-6;
-/// Time for which a press of a guided calibration has been held when it is taken, in seconds: the middle of its stretch at rest.
+/// Time from the onset of a press to its reading in a guided calibration, in seconds: the middle of its stretch at rest.
 const PRESSED_S: f64 = 0.2;
 
 fn main() {
@@ -62,7 +62,7 @@ fn imperfect(imperfections: Imperfections) -> FaultConfig {
     FaultConfig { imperfections, ..FaultConfig::default() }
 }
 
-/// A locator calibrated by presses on the surface that creeps.
+/// A locator calibrated by presses on the creeping surface.
 fn calibrated(rig: &Rig, faults: &FaultConfig) -> Locator {
     let mut recording = rig.simulate(0).expect("a surface with a model");
     let [creep, _] = faults.imperfections.creep;
@@ -73,11 +73,11 @@ fn calibrated(rig: &Rig, faults: &FaultConfig) -> Locator {
     rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).expect("an influence locator")
 }
 
-/// Trackers with nothing, with drift, and with creep too where there is some.
+/// Trackers without drift and creep, with drift, and, for a board that creeps, with both.
 fn states(faults: &FaultConfig) -> Vec<(&'static str, TrackerConfig)> {
     let nothing = TrackerConfig::default();
     let drift = TrackerConfig { drift: Some(Drift::default()), ..nothing };
-    // (1 − c)·r of a reading r is fresh, and c·r comes.
+    // Of a reading r, (1 − c)·r is immediate, and c·r creeps.
     let [of_board, _] = faults.imperfections.creep;
     let creep = Creep { share: of_board.share / (1.0 - of_board.share), time_s: of_board.time_s };
     let mut states = vec![("neither", nothing), ("drift", drift)];
@@ -120,7 +120,7 @@ impl Outcome {
                 let estimate =
                     follower.follow(sample.unix_ns, &sample.reading, &sample.tared, sample.estimate);
                 let time_s = sample.number as f64 / RATE_HZ;
-                // A second for the contact to come, and one to go.
+                // The first second of the contact is omitted.
                 if (UNTOUCHED_S + 1.0..UNTOUCHED_S + HELD_S).contains(&time_s) {
                     count += 1.0;
                     located += f64::from(u8::from(estimate.status == Status::Located));
@@ -148,7 +148,7 @@ impl Outcome {
     }
 }
 
-/// Readings of a session, each located by itself.
+/// Samples of a session, each located by itself.
 fn samples(rig: &Rig, locator: &Locator, faults: &FaultConfig, x_mm: f64, seed: u64) -> Vec<Sample> {
     let config = BoardConfig { rate_hz: RATE_HZ, seed, ..BoardConfig::default() };
     let board =

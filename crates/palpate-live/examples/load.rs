@@ -3,7 +3,7 @@
 //! ```console
 //! $ cargo run --release -p palpate-live --example load [SECONDS]
 //! ```
-//! The board is simulated, and the browsers are threads, in the same process: their CPU seconds are among those that are printed.
+//! The board is simulated, and the browsers are threads, in the same process: the printed CPU seconds include theirs.
 #![allow(clippy::print_stdout, reason = "it prints a table")]
 
 use cpu_time::ProcessTime;
@@ -20,10 +20,10 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use tungstenite::{Message, WebSocket};
 
 const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
-/// Browsers at 60 Hz, in the case of many.
+/// Number of browsers at 60 Hz in the case with many.
 const MANY: usize = 200;
 
-/// A case: readings a second, browsers that follow at 60 Hz, those that never read, and whether the session is recorded.
+/// A case: readings per second, browsers that follow at 60 Hz, browsers that never read, and whether the session is recorded.
 struct Case {
     rate_hz: f64,
     browsers: usize,
@@ -74,7 +74,7 @@ fn run(case: &Case, length: Duration) -> Result<(), Box<dyn Error>> {
     if case.records {
         live.begin_recording(None)?;
     }
-    // What is allocated once is allocated by then.
+    // One-time allocations are complete by then.
     std::thread::sleep(Duration::from_secs(1));
     let (before_mb, cpu, start) = (memory_mb(), ProcessTime::now(), Instant::now());
     std::thread::sleep(length);
@@ -82,7 +82,7 @@ fn run(case: &Case, length: Duration) -> Result<(), Box<dyn Error>> {
     let after_mb = memory_mb();
     let recorded = live.end_recording()?.map(|status| (status.readings, status.lost));
     live.end();
-    // What is on its way arrives before the connections end.
+    // Data in transit arrive before the connections end.
     std::thread::sleep(Duration::from_millis(200));
     drop(server);
     let Packets { mut latencies_ms, sent, lost } = all.join().map_err(|_| "a reader has panicked")?;
@@ -123,13 +123,13 @@ fn follow(address: SocketAddr, query: &str) -> Result<WebSocket<TcpStream>, Box<
     Ok(socket)
 }
 
-/// Latencies and losses that a client of all packets has seen.
+/// Latencies and losses of a client that receives all packets.
 struct Packets {
-    /// From the last byte of each arrival to its packet.
+    /// Times from the last byte of each arrival to its packet.
     latencies_ms: Vec<f64>,
-    /// Samples, with those that did not come.
+    /// Number of samples, including lost ones.
     sent: u64,
-    /// Samples that did not come.
+    /// Number of lost samples.
     lost: u64,
 }
 
@@ -146,13 +146,13 @@ fn packets(socket: &mut WebSocket<TcpStream>) -> Packets {
             expected = u64_at(0) + 1;
             last_ns = u64_at(8);
         }
-        // Of the readings that arrived together, the last one has the time of its last byte.
+        // Among readings that arrived together, only the last one has the time of its last byte.
         latencies_ms.push(now_ns.saturating_sub(last_ns) as f64 * 1e-6);
     }
     Packets { latencies_ms, sent: expected, lost }
 }
 
-/// Resident memory, where /proc tells it.
+/// Resident memory from /proc; NaN without it.
 fn memory_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let kb =

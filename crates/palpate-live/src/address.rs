@@ -12,7 +12,7 @@ pub struct Address {
 }
 
 impl Address {
-    /// Reads `host:port`; without a default the port is needed, and with an example the host.
+    /// Parses `host:port`. The port is required unless a default is given, and the host is required if an example is given.
     ///
     /// # Errors
     /// The problem, in words.

@@ -1,13 +1,13 @@
-//! Address of an MQTT broker with the login, and reasons why it cannot be reached.
+//! Address of an MQTT broker with the login, and messages for connection errors.
 
 use crate::address::Address;
 use crate::login::{Login, PASSWORD_VARIABLE};
 use rumqttc::{ConnectReturnCode, ConnectionError};
 
-/// Port of MQTT, unless the URL says another.
+/// Default port of MQTT.
 const MQTT_PORT: u16 = 1883;
 
-/// Reads `user:password@host:port` before the topic of a broker; all but the host may be left out.
+/// Parses `user:password@host:port` before the topic of a broker; only the host is required.
 pub fn broker_and_login(
     text: &str,
     topic: &str,
@@ -30,7 +30,7 @@ pub fn broker_and_login(
     Ok((Address::read(broker, Some(MQTT_PORT), example)?, Some(login)))
 }
 
-/// The failure of a connection to a broker, in words.
+/// Message for the failure of a connection to a broker.
 pub fn explain(broker: &str, error: &ConnectionError) -> String {
     match error {
         ConnectionError::ConnectionRefused(

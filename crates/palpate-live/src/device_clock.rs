@@ -1,51 +1,52 @@
-//! A board's clock against the host's.
+//! Synchronization of a board's clock with the host's.
 //!
-//! A reading arrives after it was taken: arrival − device time = offset of the clocks + delay, and the delay is never less than some least one. So
-//! the offset, with the least delay in it, is the lower envelope of arrival − device time over device time, and its slope is the drift of one clock
-//! against the other. The envelope is the line below all points whose mean distance from them is least, which is the edge of their lower convex hull
-//! over their mean device time (Zhang, Liu, Xia, "Clock synchronization algorithms for network measurements", INFOCOM 2002). It follows a drift
-//! that changes, for it sees [`WINDOW_S`] only.
+//! A reading arrives after it was taken: arrival − device time = offset of the clocks + delay, and the delay has a minimum. So the offset, including
+//! the least delay, is the lower envelope of arrival − device time over device time. The slope of the envelope is the drift of one clock against the
+//! other. The envelope is the line below all points with the least mean distance from them. This line is the edge of their lower convex hull
+//! over their mean device time (Zhang, Liu, Xia, "Clock synchronization algorithms for network measurements", INFOCOM 2002). It follows a changing
+//! drift, because it is fitted to the last [`WINDOW_S`] only.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Device time that the envelope is fitted to, in seconds.
+/// Window of device time for the fit of the envelope, in seconds.
 pub const WINDOW_S: f64 = 30.0;
-/// Device time of which only the lowest and the highest point are kept, in seconds, and as a ratio of the time since the first reading: a drift of
-/// percents shows from the first readings on.
+/// Longest bin of device time, in seconds, and as a ratio of the time since the first reading. Only the lowest and the highest point of a bin are kept.
+/// The ratio makes the first bins short, so a drift of some percent shows from the first readings on.
 const BIN_S: f64 = 0.25;
 const BIN_RATIO: f64 = 1.0 / 16.0;
 /// Greatest drift of a clock, as a ratio: three times that of an uncalibrated oscillator of a microcontroller.
 const GREATEST_DRIFT: f64 = 0.03;
-/// Values at which clocks of 32 bits wrap around: of microseconds and of milliseconds.
+/// Times at which 32-bit clocks wrap around: those in microseconds and those in milliseconds.
 const WRAPS: [Duration; 2] = [Duration::from_micros(1 << 32), Duration::from_millis(1 << 32)];
-/// A step by the board's clock is that by the host's within this, in seconds, and within [`GREATEST_DRIFT`]; a clock that steps otherwise was set.
+/// Largest difference between a step of the board's clock and one of the host's, in seconds, in addition to [`GREATEST_DRIFT`]. A larger one means
+/// that the clock was set.
 const STEP_S: f64 = 2.0;
 
-/// Time from one reading to the next by the board's clock alone, which may wrap around; `None` where it was set back.
+/// Time from one reading to the next by the board's clock alone, which may wrap around; `None` for a clock that was set back.
 pub fn step(from: Duration, to: Duration) -> Option<Duration> {
-    /// Share of the range of a clock below and above which a step back is one around its end.
+    /// A step back from the last 1/END of the clock's range to the first 1/END is a wrap-around.
     const END: u32 = 16;
     let around = |wrap: &Duration| from < *wrap && *wrap - from < *wrap / END && to < *wrap / END;
     let wrapped = || WRAPS.iter().find(|wrap| around(wrap)).map(|wrap| *wrap - from + to);
     to.checked_sub(from).or_else(wrapped)
 }
 
-/// Map from a board's clock to the host's, learnt from readings as they arrive.
+/// Map from a board's clock to the host's, estimated from the arrivals of readings.
 #[derive(Debug, Default)]
 pub struct DeviceClock {
     epoch: Option<Epoch>,
 }
 
-/// Stretch in which the board's clock runs on.
+/// Period in which the board's clock is not set.
 #[derive(Debug)]
 struct Epoch {
-    /// Times of its first reading: further ones are reckoned from there.
+    /// Device and host time of the first reading, the origins of the relative times.
     first_device: Duration,
     first_host: Duration,
     last_device: Duration,
     last_host: Duration,
-    /// Time by which the clock has wrapped around.
+    /// Sum of the wrap-arounds of the clock.
     wrapped: Duration,
     bins: VecDeque<Bin>,
     line: Line,
@@ -73,7 +74,7 @@ struct Point {
     offset_s: f64,
 }
 
-/// Lowest and highest point of some stretch of device time.
+/// Lowest and highest point of an interval of device time.
 #[derive(Clone, Copy, Debug)]
 struct Bin {
     start_s: f64,
@@ -82,8 +83,8 @@ struct Bin {
 }
 
 impl DeviceClock {
-    /// Host time at which a reading was taken, which is never after its arrival; both since some instant of their own. A clock that was set, as by a
-    /// reset of the board, is learnt anew.
+    /// Host time at which a reading was taken, which is never after its arrival. Device and host time have independent origins. After the clock was
+    /// set, as by a reset of the board, the estimation restarts.
     pub fn host_time(&mut self, device: Duration, arrival: Duration) -> Duration {
         if !self.epoch.as_mut().is_some_and(|epoch| epoch.step(device, arrival)) {
             self.epoch = Some(Epoch::new(device, arrival));
@@ -91,7 +92,7 @@ impl DeviceClock {
         self.epoch.as_mut().map_or(arrival, |epoch| epoch.host_time(device, arrival))
     }
 
-    /// Seconds by which the host's clock gains on the board's in each second of the board's; `None` before there are two readings.
+    /// Seconds by which the host's clock gains on the board's per second of the board's clock; `None` before the second reading.
     pub fn drift(&self) -> Option<f64> {
         self.epoch.as_ref().map(|epoch| epoch.line.slope).filter(|slope| *slope != 0.0)
     }
@@ -111,7 +112,7 @@ impl Epoch {
         }
     }
 
-    /// Steps on to the next reading, by as many times around as the host's clock says; false where the clock was set.
+    /// Advances to the next reading. The host's clock gives the number of wrap-arounds. False for a clock that was set.
     fn step(&mut self, device: Duration, arrival: Duration) -> bool {
         let host_s = arrival.as_secs_f64() - self.last_host.as_secs_f64();
         let device_s = device.as_secs_f64() - self.last_device.as_secs_f64();
@@ -122,7 +123,7 @@ impl Epoch {
             (*wrap, times)
         });
         let stay = std::iter::once((Duration::ZERO, 0.0));
-        // A clock that goes back has gone around, or was set.
+        // A clock that goes back has wrapped around, or was set.
         let Some((wrap, times)) = stay
             .chain(around)
             .filter(|(wrap, times)| device_s + times * wrap.as_secs_f64() >= 0.0)
@@ -142,7 +143,7 @@ impl Epoch {
         let host_s = since_first_s(arrival, self.first_host);
         let point = Point { device_s, offset_s: host_s - device_s };
         self.add(point);
-        // Not after the arrival, and not before it by more than ever was seen.
+        // The time is not after the arrival, and not before it by more than the largest delay so far.
         let above_s = (point.offset_s - self.line.offset_at(device_s)).clamp(0.0, self.spread_s);
         arrival.saturating_sub(Duration::from_secs_f64(above_s))
     }
@@ -167,7 +168,7 @@ impl Epoch {
         }
         let above_s = point.offset_s - self.line.offset_at(point.device_s);
         if above_s < 0.0 {
-            // Below the envelope, which is lowered onto it until the next fit.
+            // A point below the envelope lowers it until the next fit.
             self.line.offset_s += above_s;
             self.spread_s -= above_s;
         }
@@ -182,7 +183,7 @@ impl Epoch {
     }
 }
 
-/// The line below all points whose mean distance from them is least.
+/// The line below all points with the least mean distance from them.
 fn envelope(bins: &VecDeque<Bin>) -> Line {
     let lowest = |slope: f64| {
         let offsets = bins.iter().map(|bin| bin.low.offset_s - slope * bin.low.device_s);
@@ -196,7 +197,7 @@ fn envelope(bins: &VecDeque<Bin>) -> Line {
     lowest(slope.clamp(-GREATEST_DRIFT, GREATEST_DRIFT))
 }
 
-/// Lower convex hull of points whose device times rise.
+/// Lower convex hull of points in ascending order of device time.
 fn lower_hull(points: impl Iterator<Item = Point>) -> Vec<Point> {
     let mut hull: Vec<Point> = Vec::new();
     for point in points {
@@ -220,7 +221,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// A board whose clock runs off the host's, and a line whose delay jitters.
+    /// A board with a clock that drifts against the host's, and a line with a jittering delay.
     struct Bench {
         rng: Xoshiro256PlusPlus,
         drift: f64,
@@ -233,7 +234,7 @@ mod tests {
             Self { rng: Xoshiro256PlusPlus::seed_from_u64(seed), drift, jitter_s, start_s }
         }
 
-        /// Device time and arrival of the reading that is taken at a host time; the least delay is none.
+        /// Device time and arrival of the reading that is taken at a host time; the least delay is 0.
         fn read(&mut self, taken_s: f64) -> (Duration, Duration) {
             let device_us = (self.start_s + taken_s * (1.0 - self.drift)) * 1e6;
             let arrival_s = taken_s + self.rng.random_range(0.0..self.jitter_s);
@@ -271,7 +272,7 @@ mod tests {
             seed: u64,
             drift in -0.02..0.02,
             jitter_s in 1e-4..0.02,
-            // Some wrap around on their way.
+            // Some clocks wrap around during the test.
             start_s in prop_oneof![Just(4290.0), 0.0..4200.0],
             rate_hz in 20.0..500.0,
         ) {
@@ -280,7 +281,7 @@ mod tests {
             let errors = errors_s(&mut bench, &mut clock, 10.0, 40.0, rate_hz);
             let greatest = errors.iter().map(|error| error.abs()).fold(0.0, f64::max);
             prop_assert!(greatest < jitter_s + TICK_S, "{greatest} of {jitter_s}");
-            // Where the drift is known, next to nothing of the jitter is left.
+            // Once the drift is known, the errors are far below the jitter.
             let mut last = errors[errors.len() / 2..].to_vec();
             last.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
             let median = last[last.len() / 2].abs();
@@ -295,7 +296,7 @@ mod tests {
         let mut clock = DeviceClock::default();
         let mut start_s = 0.0;
         for drift in [50e-6, 80e-6, 20e-6] {
-            // The clock runs on from where it is, at another rate.
+            // The clock continues at another rate.
             bench.start_s += start_s * (drift - bench.drift);
             bench.drift = drift;
             let errors = errors_s(&mut bench, &mut clock, start_s, start_s + 60.0, 200.0);
@@ -343,7 +344,7 @@ mod tests {
     fn a_clock_of_another_unit_than_said_leaves_arrivals_as_they_are() {
         let mut clock = DeviceClock::default();
         for i in 0..1000_u64 {
-            // Milliseconds that are taken for seconds, 10 s each.
+            // Milliseconds are mistaken for seconds: 10 s each.
             let arrival = Duration::from_millis(10 * i);
             assert_eq!(clock.host_time(Duration::from_secs(10 * i), arrival), arrival);
         }

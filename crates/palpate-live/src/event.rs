@@ -17,49 +17,49 @@ pub struct EventRecord {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
-    /// The source is there.
+    /// The source was opened.
     SourceOpened {
         /// Name.
         name: String,
     },
-    /// The source went away, and is looked for again.
+    /// The source went away, and is tried again.
     SourceLost {
-        /// Why.
+        /// Cause.
         why: String,
     },
-    /// The source has no more.
+    /// The source has ended.
     SourceEnded,
     /// Readings are missing.
     Gap {
         /// Seconds without a reading.
         seconds: f64,
-        /// Frames that the board sent in the meantime, where it counts them.
+        /// Frames that the board sent in the meantime, if it counts them.
         #[serde(skip_serializing_if = "Option::is_none")]
         lost_frames: Option<u32>,
     },
     /// The wall clock was set.
     ClockSet {
-        /// By so many seconds, forward where positive.
+        /// Change in seconds, forward where positive.
         by_s: f64,
     },
-    /// Something touches.
+    /// A contact began.
     TouchDown {
         /// Position and force.
         #[serde(flatten)]
         contact: ContactRecord,
     },
-    /// A contact has moved by more than is uncertain of it.
+    /// A contact has moved by more than its uncertainty.
     Move {
         /// Position and force.
         #[serde(flatten)]
         contact: ContactRecord,
     },
-    /// The contact has gone.
+    /// The contact has ended.
     LiftOff {
-        /// Seconds since it was touched.
+        /// Duration of the contact in seconds.
         seconds: f64,
     },
-    /// A second contact came, or what cannot be distinguished from one.
+    /// A second contact began, or a reading that cannot be distinguished from one.
     OutsideModel,
     /// Contacts beside the first.
     SecondContact {
@@ -74,11 +74,11 @@ pub enum Event {
         /// State now.
         state: ChannelState,
     },
-    /// The baseline was taken anew.
+    /// The baseline was set by a tare.
     Tared,
-    /// Something beside the session does not work, or works again: a recording, a broker.
+    /// A recording, a broker or another part beside the session has failed, or works again.
     Trouble {
-        /// What, and why.
+        /// Problem and cause.
         text: String,
     },
     /// A rule has raised an alarm.
@@ -88,7 +88,7 @@ pub enum Event {
         /// Text.
         text: String,
     },
-    /// Somebody's mark.
+    /// A mark of a user.
     Mark {
         /// Text.
         text: String,
@@ -96,7 +96,7 @@ pub enum Event {
 }
 
 impl Event {
-    /// Its name, as records have it.
+    /// Name of the event in records.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::SourceOpened { .. } => "source_opened",
@@ -122,11 +122,11 @@ impl Event {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ChannelState {
-    /// It reads.
+    /// The channel works.
     #[default]
     Well,
-    /// It reads one and the same value, whatever the others read.
+    /// The channel repeats one value while others change.
     Dead,
-    /// It reads the end of its range.
+    /// The channel reads the end of its range.
     Saturated,
 }

@@ -1,37 +1,37 @@
-//! Watch over the feed of a session or a calibration: notices when a source brings no readings, and says why.
+//! Monitoring of the feed of a session or a calibration: detects a source without readings, and reports the cause.
 
 use crate::frame::{FrameReader, quote};
 use crate::input::Arrival;
 use std::time::Duration;
 
-/// Words on a source that repeats readings.
+/// Message about a source that repeats readings.
 pub const REPEATED_READINGS: &str =
     "the board repeats readings: it sends faster than its sensors measure; each reading counts once";
-/// Frames in a row, and time since the last reading, from which on frames without a reading among them are reported: a board that starts prints some lines
-/// for people first, and a serial line tears one now and then.
+/// Consecutive bad frames, and time since the last reading, after which they are reported. Fewer are tolerated: a starting board prints some lines for
+/// people first, and a serial line occasionally tears a frame.
 const FRAMES: u64 = 5;
 const FRAMES_FOR: Duration = Duration::from_secs(1);
-/// Frames in a row that are reported whatever the time: a stream may come at any pace.
+/// Consecutive bad frames that are reported after any time, because a stream may have any pace.
 const MANY_FRAMES: u64 = 100;
-/// Silence that is reported: longer than a board takes to start that was reset by opening its port.
+/// Silence that is reported: longer than the start of a board after the reset by the opening of its port.
 const SILENCE: Duration = Duration::from_secs(3);
-/// Least silence in periods of the readings.
+/// Shortest silence that is reported, in periods of the readings.
 const PERIODS: u32 = 5;
 
-/// Watch over a feed of readings.
+/// Monitor of a feed of readings.
 #[derive(Debug, Default)]
 pub struct FeedWatch {
     state: FeedState,
-    /// Instant of the last reading, or else of the opening.
+    /// Instant of the last reading or, before the first, of the opening.
     since: Duration,
     /// Instant of the last reading, and time between the last two arrivals with readings.
     last_reading: Option<Duration>,
     period: Duration,
-    /// Readings at the last look.
+    /// Number of readings at the last arrival.
     readings: u64,
     /// Bytes since the last reading, or the opening.
     bytes: u64,
-    /// True for messages, which a board may send at changes only.
+    /// True for messages, which a board may send only when a value changes.
     has_messages: bool,
     is_reported: bool,
 }
@@ -45,12 +45,12 @@ enum FeedState {
     Open,
     /// Ended by itself.
     Ended,
-    /// Lost, for this reason.
+    /// Lost, with the cause.
     Lost(String),
 }
 
 impl FeedWatch {
-    /// Takes an arrival that was read into `frames` and processed by `now`. Time for processing is no silence.
+    /// Takes an arrival that was read into `frames` and processed by `now`. Processing time does not count as silence.
     pub fn receive(&mut self, arrival: &Arrival, now: Duration, frames: &FrameReader) {
         match arrival {
             Arrival::Opened(_) | Arrival::Joined(_) | Arrival::Piped(_) => {
@@ -74,7 +74,7 @@ impl FeedWatch {
         }
     }
 
-    /// Report that there are no readings, once in each stretch without any; `None` while there are.
+    /// Report of missing readings, once per period without readings; `None` otherwise.
     pub fn report(&mut self, now: Duration, frames: &FrameReader) -> Option<String> {
         let since = now.saturating_sub(self.since);
         let bad = frames.bad_in_a_row();
@@ -89,7 +89,7 @@ impl FeedWatch {
         Some(format!("no readings: {}", self.reason(frames)))
     }
 
-    /// Fault of a feed that ends now: no reading at all, or none towards its end. `None` of one that had readings to its end.
+    /// Fault of a feed that ends now: no reading at all, or none towards its end. `None` for a feed with readings up to its end.
     pub fn fault(&self, frames: &FrameReader) -> Option<String> {
         let is_cut_short = match &self.state {
             FeedState::Lost(_) => true,
@@ -126,6 +126,6 @@ impl FeedWatch {
         if self.state == FeedState::Ended {
             return "the source ended; check what sends to it".to_owned();
         }
-        "the source is open and sends nothing; check that the board is on and sends to this port".to_owned()
+        "the source is connected and silent; check that the board is on and sends to this port".to_owned()
     }
 }

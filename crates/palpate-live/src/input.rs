@@ -1,4 +1,4 @@
-//! Inputs of a session: what sources and users bring.
+//! Inputs of a session, from sources and users.
 
 use crate::stamp::Stamp;
 
@@ -7,7 +7,7 @@ use crate::stamp::Stamp;
 pub enum Input {
     /// An arrival of a source.
     Arrived(Arrived),
-    /// A user's wish.
+    /// A command of a user.
     Command(Command),
     /// The session is to end.
     Stop,
@@ -16,41 +16,42 @@ pub enum Input {
 /// Arrival of a source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Arrival {
-    /// The device is there, and its bytes begin with a frame; its name.
+    /// The device with this name was opened, and its bytes begin with a frame.
     Opened(String),
-    /// The device is there, and sends already: its bytes may begin amid a frame; its name.
+    /// The device with this name was opened while it sends: its bytes may begin amid a frame.
     Joined(String),
-    /// The stream is there, and comes at any pace, as through a pipe: its readings have the times of the board's clock, where it tells them; its name.
+    /// The stream with this name was opened, and comes at any pace, as through a pipe. The readings have the times of the board's clock, if the frames
+    /// contain them.
     Piped(String),
-    /// Bytes of a stream that waited when it was opened: old readings.
+    /// Bytes of a stream that waited before it was opened: old readings.
     Backlog(Vec<u8>),
-    /// Bytes of a stream, in order, cut anywhere.
+    /// Bytes of a stream, in order, split at any place.
     Bytes(Vec<u8>),
-    /// Bytes of a message, as of UDP and MQTT: whole frames.
+    /// Bytes of a message, as from UDP and MQTT: whole frames.
     Message(Vec<u8>),
-    /// The device went away, and is looked for again; the reason.
+    /// The device went away, with the cause, and is tried again.
     Lost(String),
-    /// There will be no more.
+    /// The source has ended.
     Ended,
 }
 
 /// An arrival with its instant.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Arrived {
-    /// The instant at which its last byte was there.
+    /// Instant of the last byte.
     pub at: Stamp,
-    /// Kind, with the bytes.
+    /// Kind of the arrival, with its bytes.
     pub arrival: Arrival,
 }
 
-/// Wish of a user.
+/// Command of a user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// Take the next readings for untouched.
+    /// Tare: the next readings are untouched.
     Tare,
     /// Set a mark.
     Mark(String),
-    /// Tell that something beside the session does not work, or works again.
+    /// Report that a part beside the session has failed, or works again.
     Trouble(String),
     /// Raise an alarm.
     Alarm {

@@ -1,7 +1,7 @@
-//! Live use of palpate: bytes of a board in, contacts out.
+//! Live use of palpate: turns the bytes of a board into contacts.
 //!
-//! A [`source`] brings bytes, each with the instant of its arrival. A [`session`] turns them into readings, estimates and events; it touches no
-//! device, file or clock, so that the same bytes at the same instants give the same answers, in a test, a replay or on the bench.
+//! A [`source`] brings bytes, each with the instant of its arrival. A [`session`] turns them into readings, estimates and events. The session uses no
+//! device, file or clock. Therefore the same bytes at the same instants give the same results in a test, in a replay or on the bench.
 
 mod address;
 mod broker;

@@ -1,9 +1,9 @@
-//! Login at a broker: user name and password, which no message shows.
+//! Login at a broker: user name and password. Messages never show the password.
 
 use std::fmt::{self, Write};
 use std::path::PathBuf;
 
-/// Environment variable of the password, where the URL names a user and neither a password nor a file.
+/// Environment variable of the password, for URLs that contain a user and neither a password nor a file.
 pub const PASSWORD_VARIABLE: &str = "PALPATE_MQTT_PASSWORD";
 
 /// User name and password of a URL. Neither `Display` nor `Debug` shows the password.
@@ -29,13 +29,13 @@ pub enum LoginError {
     File {
         /// The file.
         path: String,
-        /// Why.
+        /// Cause.
         error: std::io::Error,
     },
 }
 
 impl Login {
-    /// The login of `user` or `user:password` before the `@` of a URL, percent-encoded, or with the password in a file.
+    /// Parses the percent-encoded `user` or `user:password` before the `@` of a URL. The password may instead be in a file.
     ///
     /// # Errors
     /// The problem, without the password.
@@ -59,7 +59,7 @@ impl Login {
         Ok(Self { user, password })
     }
 
-    /// User name and password; the password is empty where the environment has none.
+    /// User name and password; the password is empty if the environment variable is not set.
     ///
     /// # Errors
     /// [`LoginError`] for a file that cannot be read.
@@ -76,7 +76,7 @@ impl Login {
         Ok((self.user.clone(), password))
     }
 
-    /// File of the password, where a URL names one.
+    /// File of the password, if the URL contains one.
     pub fn file(&self) -> Option<String> {
         match &self.password {
             Password::File(path) => Some(path.display().to_string()),
@@ -85,7 +85,7 @@ impl Login {
     }
 }
 
-/// The user name as a URL has it.
+/// The user name, percent-encoded as in a URL.
 impl fmt::Display for Login {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.user.bytes().try_for_each(|byte| match byte {
@@ -101,7 +101,7 @@ impl fmt::Debug for Login {
     }
 }
 
-/// Text whose `%40` and the like are decoded; `None` where a `%` begins no two digits, or the bytes are no UTF-8.
+/// Decodes percent-encoded text such as `%40`; `None` for a `%` without two hexadecimal digits, or bytes that are not UTF-8.
 fn decoded(text: &str) -> Option<String> {
     let mut bytes = Vec::new();
     let mut rest = text.bytes();
@@ -118,7 +118,7 @@ fn decoded(text: &str) -> Option<String> {
     String::from_utf8(bytes).ok()
 }
 
-/// A message without the passwords of URLs in it: `mqtt://user:secret@host` becomes `mqtt://user:***@host`.
+/// Replaces the passwords of URLs in a message: `mqtt://user:secret@host` becomes `mqtt://user:***@host`.
 pub fn without_passwords(message: &str) -> String {
     let mut shown = String::new();
     let mut rest = message;

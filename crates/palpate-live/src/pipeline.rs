@@ -1,4 +1,4 @@
-//! The thread of a session: what sources and users bring goes in, and what follows goes to the sinks.
+//! The thread of a session: takes the inputs of sources and users, and passes the outputs to the sinks.
 
 use crate::feed::FeedWatch;
 use crate::input::{Arrival, Command, Input};
@@ -10,12 +10,12 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-/// Inputs that wait for the session at most: then the source waits, and the device's own buffer grows.
+/// Most inputs that wait for the session. Beyond this the source waits, and the buffer of the device fills.
 pub const WAITING: usize = 1024;
-/// Time between two states.
+/// Time between two state records.
 const STATE_EVERY: Duration = Duration::from_micros(16_667);
 
-/// A source whose readings come at another pace than that at which they were taken.
+/// Error for a source with readings at another pace than that of their recording.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "a recording at speed={speed} has other times than its readings, by which a low-pass filter and a tracker go; use speed=1, or `palpate replay`"
@@ -25,10 +25,10 @@ pub struct PaceError {
     pub speed: f64,
 }
 
-/// Checks that readings of a source come at the pace at which they were taken, where an estimation goes by their times.
+/// Checks that the readings of a source come at the pace of their recording, if the estimation depends on their times.
 ///
 /// # Errors
-/// [`PaceError`].
+/// [`PaceError`] for another pace.
 pub fn check_pace(estimation: &Estimation, from: &SourceUrl) -> Result<(), PaceError> {
     match (estimation, from) {
         (Estimation::LowPass { .. } | Estimation::Track { .. }, SourceUrl::File { speed, .. })
@@ -40,8 +40,8 @@ pub fn check_pace(estimation: &Estimation, from: &SourceUrl) -> Result<(), PaceE
     }
 }
 
-/// Runs a session until the source has ended, everybody who sends has gone, or it is to stop. Gives the fault of its feed: that there was no reading, or none
-/// towards the end. The same is an event as soon as it is noticed.
+/// Runs a session until the source has ended, all senders of inputs have gone, or it is to stop. Returns the fault of the feed: no reading at all, or
+/// none towards the end. Such a fault is also an event as soon as it is detected.
 pub fn run(
     session: &mut Session,
     clock: HostClock,
@@ -99,7 +99,7 @@ fn state(session: &Session, source: Option<&str>) -> StateRecord {
         let factor = channel.unit.factor();
         ChannelRecord {
             state: health.state,
-            // JSON has no infinity, which stands where nothing was read yet.
+            // The range is infinite before the first reading, and JSON has no infinity.
             range: Some(health.range.map(|end| end / factor)).filter(|range| range[0] <= range[1]),
             noise_sd: health.noise_sd / factor,
         }

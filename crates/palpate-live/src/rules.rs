@@ -1,4 +1,4 @@
-//! Rules: messages, commands to the board and alarms when a contact is somewhere, presses with some force, or something happens.
+//! Rules: messages, commands to the board and alarms for contacts within bands of position and force, and for events.
 //!
 //! A rule file is TOML:
 //!
@@ -47,29 +47,29 @@ pub struct Rules(Vec<Rule>);
 pub struct Rule {
     /// Name.
     pub name: String,
-    /// When it acts.
+    /// Condition under which the rule acts.
     pub condition: Condition,
-    /// What it does then.
+    /// Action of the rule.
     pub action: Action,
 }
 
-/// What a rule does when it acts.
+/// Action of a rule.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Action {
-    /// Publishes a message of MQTT.
+    /// Publishes an MQTT message.
     Publish {
         /// The topic.
         topic: String,
         /// The message.
         message: String,
     },
-    /// Sends a line to the board that the readings come from.
+    /// Sends a line to the board of the session.
     Command(String),
     /// Raises an alarm with this text.
     Alarm(String),
 }
 
-/// Rules of a file by what they do.
+/// Rules of a file by action.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RulesByAction {
     /// Rules that publish messages.
@@ -80,21 +80,21 @@ pub struct RulesByAction {
     pub alarming: Rules,
 }
 
-/// When a rule acts.
+/// Condition of a rule.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Condition {
-    /// While a contact is in these bands, for so long.
+    /// A contact is within these bands for the time `hold`.
     Contact {
-        /// Positions along the surface, in m.
+        /// Band of positions along the surface, in m.
         x_m: Option<(f64, f64)>,
-        /// Positions across it, in m.
+        /// Band of positions across the surface, in m.
         y_m: Option<(f64, f64)>,
-        /// Forces, in N.
+        /// Band of forces, in N.
         force_n: Option<(f64, f64)>,
-        /// Time for which it must be there before the rule acts, and not be there before it can act again.
+        /// Time that the contact must spend within the bands before the rule acts, and outside them before it can act again.
         hold: Duration,
     },
-    /// At an event of this name.
+    /// An event of this name occurs.
     Event(String),
 }
 
@@ -104,11 +104,11 @@ pub enum Condition {
 pub struct RuleError {
     /// The problem.
     pub problem: String,
-    /// The bytes of the file that are meant.
+    /// Byte range of the problem in the file.
     pub span: Option<Range<usize>>,
 }
 
-/// Names of events, as records have them.
+/// Names of events in records.
 const EVENTS: [&str; 14] = [
     "source_opened",
     "source_lost",
@@ -125,7 +125,7 @@ const EVENTS: [&str; 14] = [
     "trouble",
     "mark",
 ];
-/// Events at which the board is away, so that no command can be sent to it.
+/// Events at which the board is away and cannot receive a command.
 const AWAY: [&str; 2] = ["source_lost", "source_ended"];
 /// Most bytes of a command.
 const LONGEST_COMMAND: usize = 200;
@@ -157,7 +157,7 @@ struct RuleIn {
 }
 
 impl RuleError {
-    /// The problem with the line of the text that is meant.
+    /// The problem, with its line in the text.
     pub fn with_line(&self, text: &str) -> String {
         match self.span.as_ref().and_then(|span| text.get(..span.start)) {
             Some(before) => format!("line {}: {}", before.matches('\n').count() + 1, self.problem),
@@ -167,15 +167,15 @@ impl RuleError {
 }
 
 impl Rules {
-    /// The rules of a file's text, for contacts on a surface of this extent.
+    /// Parses the text of a rule file, for contacts on a surface of this extent.
     ///
     /// # Errors
-    /// [`RuleError`] for the first thing that is wrong, with its place; also for a band that no contact on the surface is in.
+    /// [`RuleError`] for the first problem, with its place; also for a band that contains no place on the surface.
     pub fn from_toml(text: &str, extent: Extent) -> Result<Self, RuleError> {
         let file: FileIn = toml::from_str(text)
             .map_err(|error| RuleError { problem: error.message().to_owned(), span: error.span() })?;
         if file.rule.is_empty() {
-            return Err(RuleError { problem: "there is no [[rule]]".to_owned(), span: None });
+            return Err(RuleError { problem: "[[rule]] is missing".to_owned(), span: None });
         }
         if let Some(beyond) = file.rule.get(MOST) {
             return Err(error_at(beyond.span(), format!("there are more than {MOST} rules")));
@@ -189,13 +189,13 @@ impl Rules {
         &self.0
     }
 
-    /// The first rule that asks for a force, of which a locator that [tells none](palpate_estimators::estimator::Locator::tells_force) has none.
+    /// The first rule with a band of forces. It needs a locator that [estimates the force](palpate_estimators::estimator::Locator::tells_force).
     pub fn first_of_force(&self) -> Option<&Rule> {
         let asks = |rule: &&Rule| matches!(rule.condition, Condition::Contact { force_n: Some(_), .. });
         self.0.iter().find(asks)
     }
 
-    /// The rules by what they do.
+    /// Sorts the rules by action.
     pub fn by_action(self) -> RulesByAction {
         let mut sorted = RulesByAction::default();
         for rule in self.0 {
@@ -209,7 +209,7 @@ impl Rules {
         sorted
     }
 
-    /// The rules as a file's text.
+    /// Text of a file with these rules.
     pub fn to_toml(&self) -> String {
         self.0.iter().map(Rule::to_toml).collect::<Vec<_>>().join("\n")
     }
@@ -217,7 +217,7 @@ impl Rules {
     /// Checks that all rules raise alarms, and can act with this locator.
     ///
     /// # Errors
-    /// The first rule that does not, in words.
+    /// A message about the first rule that does not.
     pub fn check_alarms(&self, locator: &Locator) -> Result<(), String> {
         if let Some(rule) = self.0.iter().find(|rule| !matches!(rule.action, Action::Alarm(_))) {
             return Err(format!(
@@ -244,7 +244,7 @@ impl Rule {
                 let bands = [("x", x_m, 1e3, "mm"), ("y", y_m, 1e3, "mm"), ("force", force_n, 1.0, "N")];
                 for (key, band, factor, unit) in bands {
                     let Some((low, high)) = band else { continue };
-                    // Twelve digits hide the last bits of the change of unit.
+                    // Twelve digits hide the rounding error of the unit conversion.
                     let rounded = |value: f64| format!("{value:.11e}").parse().unwrap_or(value);
                     let (low, high) = (rounded(low * factor), rounded(high * factor));
                     lines.push(format!("{key} = [\"{low} {unit}\", \"{high} {unit}\"]"));
@@ -335,7 +335,7 @@ fn action(
         (Some(topic), Some(message), None) => {
             let text = topic.get_ref();
             if text.is_empty() || text.len() > 1000 || text.contains(['+', '#', '\0']) {
-                let problem = "`topic` must have 1 to 1000 bytes, and none of + and #".to_owned();
+                let problem = "`topic` must have 1 to 1000 bytes, without + and #".to_owned();
                 return Err(error_at(topic.span(), problem));
             }
             Ok(Action::Publish { topic: topic.into_inner(), message: message.into_inner() })
@@ -363,7 +363,7 @@ fn action(
     }
 }
 
-/// The action of a rule with an `alarm`, beside which it has no `others`.
+/// The action of a rule with an `alarm`, which excludes the `others`.
 fn alarm_of(alarm: Spanned<String>, others: [Option<Spanned<String>>; 3]) -> Result<Action, RuleError> {
     if let Some(other) = others.into_iter().flatten().next() {
         let problem = "a rule has an `alarm`, or `topic` and `message`, or a `command`; write two rules";
@@ -415,7 +415,7 @@ fn band(
     ))
 }
 
-/// Refuses bands in which no contact can be: on a line `y`, and those beside the surface.
+/// Refuses bands without possible contacts: bands of `y` on a line, and bands beside the surface.
 fn check_on_surface(
     given: &RuleIn,
     x_m: Option<(f64, f64)>,
@@ -447,7 +447,7 @@ fn check_on_surface(
     }
 }
 
-/// Watch over the rules in the course of a session.
+/// State of the rules during a session.
 #[derive(Debug)]
 pub struct RuleWatch {
     rules: Rules,
@@ -458,12 +458,12 @@ pub struct RuleWatch {
 #[derive(Clone, Copy, Debug, Default)]
 struct State {
     acted: bool,
-    /// Instant since which the condition is otherwise than the rule has it.
+    /// Instant since which the condition differs from `acted`.
     changed: Option<Duration>,
 }
 
 impl RuleWatch {
-    /// Watch over rules of which none has acted.
+    /// Initial state: all rules have yet to act.
     pub fn new(rules: Rules) -> Self {
         Self { states: vec![State::default(); rules.0.len()], rules }
     }
@@ -473,7 +473,7 @@ impl RuleWatch {
         &self.rules
     }
 
-    /// Takes the next output of a session, and hands on the rules that act now.
+    /// Takes the next output of a session, and calls `act` with each rule that acts now.
     pub fn add(&mut self, output: &Output, mut act: impl FnMut(&Rule)) {
         for (rule, state) in self.rules.0.iter().zip(&mut self.states) {
             let acts = match (output, &rule.condition) {
@@ -491,7 +491,7 @@ impl RuleWatch {
 }
 
 impl State {
-    /// Takes whether the condition holds now; true when the rule acts.
+    /// Updates the state with the present condition, `holds`; true when the rule acts.
     fn next(&mut self, now: Duration, hold: Duration, holds: bool) -> bool {
         if holds == self.acted {
             self.changed = None;
@@ -520,7 +520,7 @@ impl Condition {
         let Self::Contact { x_m, y_m, force_n, .. } = self else { return false };
         let within = |band: Option<(f64, f64)>, value: Option<f64>| match (band, value) {
             (None, _) => true,
-            // A force that is not estimated is in no band.
+            // A contact without an estimated force is outside every band of forces.
             (Some(_), None) => false,
             (Some((low, high)), Some(value)) => (low..=high).contains(&value),
         };
@@ -576,7 +576,7 @@ mod tests {
     fn a_band_acts_once_it_holds_and_again_only_after_it_was_left_for_as_long() {
         let mut watch = RuleWatch::new(Rules::from_toml(FILE, beam()).unwrap());
         let mut acted = Vec::new();
-        // Bounces at 5 and 43 ms; there from 10, left from 50 to 80, there again from 90.
+        // The contact bounces at 5 and 43 ms. It is within the band from 10, outside from 50 to 80, within again from 90.
         let course = [
             (0, None),
             (5, Some(30.0)),

@@ -1,4 +1,4 @@
-//! A reading with what it tells.
+//! A reading with its estimate.
 
 use crate::frame::Channel;
 use palpate_core::Estimate;
@@ -7,17 +7,17 @@ use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 use std::time::Duration;
 
-/// A reading, its times, and the estimate that follows from it.
+/// A reading, its times, and its estimate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
-    /// Which reading of the session, from 0.
+    /// Number of the reading in the session, from 0.
     pub number: u64,
-    /// Nanoseconds since 1970-01-01 00:00 UTC at which it was taken: by the board's clock, mapped to the host's, where the board tells the time.
-    /// Never falls in a session.
+    /// Time of the reading, in ns since 1970-01-01 00:00 UTC. If the frames contain the time by the board's clock, it is that time mapped to the host's
+    /// clock. The times of a session never decrease.
     pub unix_ns: u64,
-    /// Instant of its last byte by the host's monotonic clock.
+    /// Instant of the last byte by the host's monotonic clock.
     pub arrived: Duration,
-    /// The reading as it came, in SI units or raw.
+    /// The received reading, in SI units or raw.
     pub reading: Vec<f64>,
     /// The reading that was located: tared and filtered.
     pub tared: Vec<f64>,
@@ -28,16 +28,16 @@ pub struct Sample {
 /// A sample as a record of JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SampleRecord {
-    /// Which reading of the session, from 0.
+    /// Number of the reading in the session, from 0.
     pub number: u64,
     /// Seconds since 1970-01-01 00:00 UTC.
     pub time_s: f64,
-    /// The reading as it came, in the units of its channels.
+    /// The received reading, in the units of its channels.
     pub reading: Vec<f64>,
     /// The estimate.
     #[serde(flatten)]
     pub estimate: EstimateRecord,
-    /// Covariance of the position on a plane, as of [`covariance_mm2`].
+    /// Covariance of the position on a plane, from [`covariance_mm2`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance_mm2: Option<[f64; 3]>,
 }
@@ -56,11 +56,11 @@ impl SampleRecord {
     }
 }
 
-/// Covariance of an estimated position on a plane, xx, xy and yy in mm², of the first contact; `None` on a line, and where it is not known.
+/// Covariance of the estimated position of the first contact on a plane: xx, xy and yy in mm². `None` on a line, and for an unknown covariance.
 pub fn covariance_mm2(estimate: &Estimate, extent: Extent) -> Option<[f64; 3]> {
     let uncertainty = estimate.contact.uncertainty.filter(|_| extent.width_m().is_some())?;
     let [xx, xy, _, yy, ..] = uncertainty.covariance;
-    // JSON has no infinity, which stands for no knowledge at all.
+    // An undetermined position has an infinite covariance, and JSON has no infinity.
     Some([xx, xy, yy].map(|entry_m2| entry_m2 * 1e6)).filter(|entries| entries.iter().all(|x| x.is_finite()))
 }
 

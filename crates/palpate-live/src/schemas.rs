@@ -11,7 +11,7 @@ pub const TOPICS: [(&str, &str, &str); 3] = [
     (ESTIMATE, "palpate.Estimate", ESTIMATE_SCHEMA),
     (EVENT, "palpate.Event", EVENT_SCHEMA),
 ];
-/// Readings as the board sent them.
+/// Readings of the board.
 pub const READING: &str = "/reading";
 /// Estimates.
 pub const ESTIMATE: &str = "/estimate";
@@ -49,7 +49,7 @@ pub struct ReadingMessage<'a> {
 /// Message of `/estimate`.
 #[derive(serde::Serialize)]
 pub struct EstimateMessage<'a> {
-    /// The reading that it is of.
+    /// Number of the reading.
     pub number: u64,
     /// The estimate.
     #[serde(flatten)]
@@ -62,7 +62,7 @@ pub struct EstimateMessage<'a> {
 }
 
 impl<'a> EstimateMessage<'a> {
-    /// That of a sample.
+    /// Message of a sample.
     pub fn new(sample: &'a Sample, extent: Extent) -> Self {
         Self {
             number: sample.number,
@@ -91,9 +91,10 @@ impl Serialize for Values<'_> {
     }
 }
 
-/// The number that a board sent for a value, so that `number * factor` is the value to the last bit.
+/// The number from the board for a value: `number * factor` is the value to the last bit.
 ///
-/// A value that came as `number * factor` is divided to within one unit in the last place of a number that gives it; any other value gets the quotient.
+/// If the value was computed as `number * factor`, the quotient or one of its two neighbours among floating-point numbers gives it exactly. Any other
+/// value gets the quotient.
 pub fn in_board_units(value: f64, factor: f64) -> f64 {
     let quotient = value / factor;
     let near = [quotient, quotient.next_down(), quotient.next_up()];

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 /// An instant by the host's two clocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamp {
-    /// Time since the [`HostClock`] was started, by the monotonic clock: all durations are reckoned by it.
+    /// Time since the [`HostClock`] was started, by the monotonic clock, the reference of all durations.
     pub elapsed: Duration,
     /// Nanoseconds since 1970-01-01 00:00 UTC by the wall clock, which may be set at any time.
     pub unix_ns: u64,
@@ -26,7 +26,7 @@ impl HostClock {
         Self::with_speed(1)
     }
 
-    /// Clocks that start now, the monotonic one `speed` times as fast: for a simulated board and a simulated machine that run as fast.
+    /// Clocks that start now, with a monotonic clock that is `speed` times as fast, for a simulated board and machine of this speed.
     pub fn with_speed(speed: u32) -> Self {
         Self { start: Instant::now(), speed }
     }
@@ -36,7 +36,7 @@ impl HostClock {
         self.start.elapsed().saturating_mul(self.speed)
     }
 
-    /// Real time in which `span` passes by the monotonic clock.
+    /// Real time that corresponds to `span` of the monotonic clock.
     pub fn real_time(&self, span: Duration) -> Duration {
         span / self.speed.max(1)
     }

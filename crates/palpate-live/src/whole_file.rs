@@ -1,23 +1,22 @@
-//! Files that are written whole: under a temporary name first, so that nobody ever sees half of one.
+//! Files that are written whole: first under a temporary name, so readers never see an incomplete file.
 
 use std::fs::File;
 use std::io::{Error, Result, Write};
 use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 
-/// Writes a file that is on the disk, whole, when this returns. A link stays, and what it leads to is written; a file that is replaced keeps
-/// its mode.
+/// Writes a file that is completely on the disk when this returns. A link is kept, and its target is written. A replaced file keeps its mode.
 ///
 /// # Errors
-/// The folder takes no file, or the disk is full; then the file of before is there still.
+/// The folder is not writable, or the disk is full; the old file then remains.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_with(path, |file| file.write_all(bytes))
 }
 
-/// Writes a file by a function, as [`write()`] does.
+/// Writes a file as [`write()`] does; `fill` writes its content.
 ///
 /// # Errors
-/// As of [`write()`], and the function's own.
+/// As for [`write()`], and the errors of `fill`.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<()> {
     let place = place(path)?;
     let mut file = temporary(folder_of(&place))?;
@@ -30,12 +29,12 @@ pub fn write_with(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Re
     Ok(())
 }
 
-/// The file with all links followed, whether it is there yet or not.
+/// Path of a file, which need not exist, with all links followed.
 ///
 /// # Errors
 /// Links that lead in a circle.
 pub fn place(path: &Path) -> Result<PathBuf> {
-    /// As many as Linux follows.
+    /// Most links that are followed, as in Linux.
     const MOST: usize = 40;
     let mut place = path.to_owned();
     for _ in 0..MOST {
@@ -47,14 +46,14 @@ pub fn place(path: &Path) -> Result<PathBuf> {
     Err(Error::other("its links lead in a circle"))
 }
 
-/// A temporary file in a folder, which shows that the folder takes files; it is removed when it is dropped.
+/// A temporary file in a folder, which also proves that the folder is writable. The file is removed when it is dropped.
 ///
 /// # Errors
-/// The folder takes none.
+/// The folder is not writable.
 pub fn temporary(folder: &Path) -> Result<NamedTempFile> {
     let mut builder = Builder::new();
     builder.prefix(".palpate-");
-    // Results are for whoever may read files that are made here, as the umask says.
+    // The umask determines who may read the results.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder)

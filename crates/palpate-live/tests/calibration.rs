@@ -1,4 +1,4 @@
-//! A hand that does what the guide of a calibration asks for.
+//! Guided calibrations with a simulated hand that follows the guide.
 
 use palpate_core::Status;
 use palpate_estimators::estimator::Locator;
@@ -18,16 +18,16 @@ use std::time::Duration;
 const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
 const FORCE_N: f64 = 3.0;
 
-/// A hand that takes its time, and a surface that takes its time too.
+/// A slow hand on a surface that responds slowly.
 struct Hand<'a> {
     bench: SimulatedBench<'a>,
-    /// What the sensors read without noise, which follows the contact with the time constant of a soft surface.
+    /// Readings without noise, which follow the contact with the time constant of a soft surface.
     clean: Vec<f64>,
     contact: Option<Contact>,
     at: Duration,
 }
 
-/// Time between readings, and that in which the surface follows all but an e-th of the way.
+/// Time between readings, and time constant of the surface.
 const EVERY: Duration = Duration::from_millis(5);
 const FOLLOWS_S: f64 = 0.15;
 
@@ -45,7 +45,7 @@ impl<'a> Hand<'a> {
         (self.at, self.bench.measure(&self.clean))
     }
 
-    /// Does what the guide waits for, for at most so many readings; the rows that were taken, each with the mean reading of its stretch at rest.
+    /// Does what the guide waits for, for at most `most` readings. Returns the recorded rows, each with the mean reading of its stretch at rest.
     fn obey(&mut self, guide: &mut Guide, most: usize) -> Vec<RestingRow> {
         let mut rows = Vec::new();
         for _ in 0..most {
@@ -100,7 +100,7 @@ fn presses_are_taken_at_rest_and_the_locator_is_near_the_limit() {
     for (RestingRow { row, mean }, press) in presses.into_iter().zip(&plan) {
         assert_eq!((row.position, row.force_n), (press.position, press.force_n));
         let clean = hand.bench.clean(&[Contact { position: press.position, force_n: FORCE_N }]);
-        // At rest within a percent of the reading. The noise of a reading is 5 µm, that of a mean of 80 readings a ninth of it.
+        // The surface is at rest within a percent of the reading. The noise of a reading is 5 µm, that of a mean of 80 readings a ninth of it.
         let size = clean.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
         for ((value, mean), clean) in row.reading.iter().zip(mean).zip(&clean) {
             assert!((mean - clean).abs() < 5e-6 + 0.01 * size, "{mean} {clean}");
@@ -114,7 +114,7 @@ fn presses_are_taken_at_rest_and_the_locator_is_near_the_limit() {
     assert!((x_m - 0.1234).abs() < 1e-3, "{x_m}");
 }
 
-/// The beam as a board without a model, of whose noise nothing is said.
+/// The beam as a board without a model, with unspecified noise.
 const BOARD: &str = r#"
 [surface]
 kind = "measured"
@@ -190,7 +190,7 @@ fn a_surface_that_is_touched_or_never_rests_is_not_taken() {
     let rig = Rig::from_toml(RIG).unwrap();
     let mut guide = Guide::new(plan(&rig));
     let mut hand = Hand::new(&rig.setup);
-    // A load that goes to and fro from the beginning.
+    // A load that changes periodically from the beginning.
     for i in 0..2000 {
         let position = Position::along(0.2 + 0.1 * (f64::from(i) * 0.01).sin());
         hand.contact = Some(Contact { position, force_n: FORCE_N });
@@ -217,7 +217,7 @@ fn a_press_that_is_held_for_long_is_not_taken_for_an_untouched_surface() {
     assert_eq!(guide.waiting(), Waiting::Release);
 }
 
-/// Readings of two channels at 100 Hz with a standard deviation of 1, after a course in seconds.
+/// Readings of two channels at 100 Hz with a standard deviation of 1 about a mean that is a function of the time in seconds.
 fn course(seed: u64, seconds: f64, mean: impl Fn(f64) -> [f64; 2]) -> Vec<(Duration, [f64; 2])> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut noisy =
@@ -274,7 +274,7 @@ fn a_firm_press_replaces_a_light_touch_before_it() {
 #[test]
 fn a_press_that_grows_and_is_lifted_at_once_is_taken_back() {
     let mut guide = Guide::new(presses_at(2));
-    // A finger rests lightly, presses for 0.3 s and lifts; then it does so again, and holds.
+    // A finger rests lightly, presses for 0.3 s and lifts; then it does so again, and keeps pressing.
     let force = |s: f64| match s {
         2.0..2.7 | 5.0..5.7 => 0.05,
         2.7..3.0 | 5.7..8.0 => 1.0,

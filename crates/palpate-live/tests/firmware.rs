@@ -1,4 +1,4 @@
-//! The sender in C against the encoder of the library.
+//! The sender in C, compared with the encoder of the library.
 
 use palpate_live::frame::encode_into;
 use palpate_testing::skip::skip;

@@ -1,4 +1,5 @@
-//! Hands of all kinds press a board that has hysteresis, creep, residue, drift and a converter: every recorded press has a touch, and nobody waits for ever.
+//! Hands of all kinds press a board with hysteresis, creep, residue, drift and a converter. Every recorded press has a touch, and every calibration
+//! ends.
 
 use palpate_estimators::estimator::{Locator, Status};
 use palpate_estimators::fit::Fit;
@@ -23,15 +24,15 @@ use std::time::Duration;
 /// Largest reading of a press, in standard deviations of the noise.
 const LARGEST_SD: f64 = 3455.0;
 
-/// Reading of a force that is felt, in standard deviations of the noise: single readings show a touch from 8 on.
+/// Reading of a detectable force, in standard deviations of the noise: single readings show a touch from 8 on.
 const FELT_SD: f64 = 10.0;
 
-/// What came of a calibration.
+/// Outcome of a calibration.
 #[derive(Debug, Default, PartialEq)]
 struct Outcome {
     /// Presses recorded while the force was below nine tenths of that of a press.
     without_touch: usize,
-    /// Untouched rows recorded while a force was felt.
+    /// Untouched rows recorded during a detectable force.
     touched: usize,
     presses: usize,
     asked_again: usize,
@@ -42,7 +43,7 @@ struct Outcome {
     is_finished: bool,
 }
 
-/// The rig, with noise such that the largest press reads [`LARGEST_SD`] of it.
+/// The rig, with noise such that the largest press reads [`LARGEST_SD`] standard deviations.
 fn rig() -> (Rig, f64) {
     let rig = Rig::from_toml(CLAMPED_STRIP).unwrap();
     let bench = SimulatedBench::new(&rig.setup, 0).unwrap();
@@ -58,12 +59,12 @@ fn rig() -> (Rig, f64) {
     (Rig::from_toml(&clamped_strip(1e6 * noise)).unwrap(), noise)
 }
 
-/// Drift of each channel by a line of this slope.
+/// Linear drift of each channel with this slope.
 fn line(per_s: f64) -> OffsetDrift {
     OffsetDrift { line_per_s: Amount::Value(per_s), ..OffsetDrift::default() }
 }
 
-/// Creep of one share.
+/// Creep with one share.
 fn creep(share: f64, time_s: f64) -> [Relaxation; 2] {
     [Relaxation { share, time_s }, Relaxation::default()]
 }
@@ -73,7 +74,7 @@ fn imperfect(imperfections: Imperfections) -> FaultConfig {
     FaultConfig { imperfections, ..FaultConfig::default() }
 }
 
-/// A board that a hand presses.
+/// A board under a hand.
 struct Bench<'a> {
     rig: &'a Rig,
     board: SimulatedBoard<'a>,
@@ -91,7 +92,7 @@ impl<'a> Bench<'a> {
         Self { rig, board, hand, start: HostClock::new().now() }
     }
 
-    /// The next frame, and the contact under which it is read.
+    /// The next frame, and the contact during its reading.
     fn next(&mut self, instruction: Instruction) -> (Arrived, Option<Contact>) {
         let elapsed = self.board.next_at();
         let contact = self.hand.contact_at(elapsed.as_secs_f64(), instruction);
@@ -100,7 +101,7 @@ impl<'a> Bench<'a> {
         (Arrived { at: Stamp { elapsed, ..self.start }, arrival }, contact)
     }
 
-    /// A guided calibration; with what came of it, and the contact at every reading, by the time that the rows carry.
+    /// A guided calibration, with its outcome, and the contact at every reading, on the time scale of the rows.
     fn calibrate(&mut self) -> (Calibration, Outcome, Vec<Option<Contact>>) {
         let folder = tempfile::tempdir().unwrap();
         let (setup, presses) = (&self.rig.setup, folder.path().join("presses.csv"));
@@ -266,7 +267,7 @@ fn presses_on_slow_boards_and_on_boards_that_repeat_readings_have_a_touch() {
 /// Touches in the course of a session.
 #[derive(Debug, Default, PartialEq)]
 struct Tally {
-    /// Touches after which all is `no_contact` from a second on.
+    /// Touches with `no_contact` for all readings from one second after their end on.
     ended: usize,
     touch_downs: usize,
     lift_offs: usize,
@@ -290,11 +291,11 @@ impl Tally {
 /// Number of touches of a session.
 const TOUCHES: usize = 4;
 
-/// The locator of a setup that learns from the presses of a calibration.
+/// The locator of a setup, fitted to the presses of a calibration.
 fn fit(rig: &Rig, setup: &Setup, calibration: &Calibration) -> Locator {
     let mut rows = calibration.journal().rows().to_vec();
     if setup.surface().model().is_none() {
-        // Raw channels have the numbers of the frames.
+        // Readings of raw channels are the numbers of the frames.
         let factors: Vec<f64> =
             Channel::all_of(&rig.setup).iter().map(|channel| channel.unit.factor()).collect();
         let values = rows.iter_mut().flat_map(|row| row.reading.iter_mut().zip(&factors));
@@ -316,7 +317,7 @@ fn a_session_after_a_drifting_calibration_begins_untouched() {
         let mut bench = Bench::new(&rig, HandStyle::default(), faults.clone(), 100.0, 7);
         let (calibration, ..) = bench.calibrate();
         let locator = fit(&rig, &setup, &calibration);
-        // Half a minute goes by.
+        // Half a minute passes.
         for _ in 0..3000 {
             bench.next(Instruction::Lift);
         }
@@ -329,7 +330,7 @@ fn a_session_after_a_drifting_calibration_begins_untouched() {
     assert!(contacts_of_unaware > 500, "{contacts_of_unaware}");
 }
 
-/// Readings of a session that are no `no_contact`.
+/// Readings of a session with another status than `no_contact`.
 fn contacts_of(locator: &Locator, arrived: &[Arrived]) -> usize {
     let mut session = Session::new(locator, &SessionConfig::default()).unwrap();
     let mut out = Vec::new();
@@ -403,8 +404,8 @@ fn every_touch_ends_within_a_second_of_the_lift() {
                 (TOUCHES, 0, touch_downs),
                 "{name}, {hysteresis}: {tally:?}"
             );
-            // Creep and hysteresis change the gain. A model with a known force, or by 3 %, may not explain a touch: it is `outside_model`, which has
-            // events of its own.
+            // Creep and hysteresis change the gain. If the force is known, or the hysteresis is 3 %, the model may not explain a touch: its status is
+            // `outside_model`, which has separate events.
             let is_explained = setup.surface().model().is_none() || (!is_force_known && hysteresis <= 0.01);
             assert!(touch_downs >= TOUCHES || !is_explained, "{name}, {hysteresis}: {tally:?}");
         }

@@ -1,4 +1,4 @@
-//! Recordings: what a session says is read again from the file, whole, cut off, or written on a disk that is full.
+//! Recordings: the outputs of a session are read back from a file that is whole, cut off, or written on a full disk.
 
 use palpate_estimators::estimate_record::EstimateRecord;
 use palpate_estimators::estimator::Locator;
@@ -19,7 +19,7 @@ use std::time::Duration;
 const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
 const START_NS: u64 = 1_800_000_000_000_000_000;
 
-/// A folder of a test, empty.
+/// An empty folder for a test.
 fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_dir_all(&folder);
@@ -39,7 +39,7 @@ fn switch(locator: &Locator) -> (RecordingSwitch, Receiver<Input>) {
     (RecordingSwitch::new(locator, Estimation::Single, "simulated:rig.toml", to).unwrap(), from)
 }
 
-/// Takes so many readings of a simulated board through a session and into a sink, and returns the samples.
+/// Passes readings of a simulated board through a session into a sink, and returns the samples.
 fn session(rig: &Rig, locator: &Locator, frames: u64, sink: &mut impl Sink) -> Vec<Sample> {
     let config = BoardConfig { rate_hz: 200.0, seed: 3, ..BoardConfig::default() };
     let mut board = SimulatedBoard::new(&rig.setup, &config, Finger::random(rig, 3)).unwrap();
@@ -155,7 +155,7 @@ fn a_file_that_is_cut_off_anywhere_is_read_up_to_there() {
                 last = summary.readings;
                 opened += 1;
             }
-            // Of a file of a few bytes nothing says that it is MCAP.
+            // A file of a few bytes is not recognized as MCAP.
             Err(RecordingError::NotMcap { .. }) if step < 8 => {}
             Err(error) => assert!(matches!(error, RecordingError::NotOurs { .. }), "{error}"),
         }
@@ -215,7 +215,7 @@ fn a_file_that_is_taken_away_ends_the_recording_in_words() {
     assert!(status.problem.is_some());
 }
 
-/// A disk of 6 MB; `None` where this user may not mount one.
+/// A disk of 6 MB; `None` if the user has no permission to mount one.
 #[cfg(target_os = "linux")]
 struct SmallDisk(PathBuf);
 
@@ -265,7 +265,7 @@ fn a_full_disk_is_told_and_the_recording_goes_on_when_there_is_room() {
     assert_eq!(recording::summary(&path).unwrap().readings, samples.len() as u64);
 }
 
-/// MCAP's reader subtracts the length of a record in a chunk from what is left of the chunk.
+/// MCAP's reader subtracts the length of a record in a chunk from the remaining length of the chunk.
 #[test]
 fn a_record_that_reaches_beyond_its_chunk_is_damage() {
     let record = |kind: u8, body: &[u8]| [&[kind], &(body.len() as u64).to_le_bytes()[..], body].concat();
@@ -273,7 +273,7 @@ fn a_record_that_reaches_beyond_its_chunk_is_damage() {
     let mut reaches_beyond = record(5, &[]);
     reaches_beyond[1..9].copy_from_slice(&20u64.to_le_bytes());
     let data = [&(reaches_beyond.len() as u64).to_le_bytes()[..], &reaches_beyond].concat();
-    // What lies behind the data of the chunk is within its record.
+    // The bytes behind the data of the chunk are within its record.
     let chunk = [&header[..], &data, &[0; 40]].concat();
     let path = folder("recording-beyond").join("beyond.mcap");
     std::fs::write(&path, [mcap::MAGIC, &record(6, &chunk)].concat()).unwrap();

@@ -1,6 +1,6 @@
-//! Messages of ROS 2, to the byte: what a session publishes, held to a file that `rosbags` reads in python/tests/test_ros_messages.py.
+//! ROS 2 messages of a session, compared byte by byte with a file that `rosbags` reads in python/tests/test_ros_messages.py.
 //!
-//! `PALPATE_WRITE_GOLDEN=1 cargo test -p palpate-live --test ros_messages` writes the file anew.
+//! `PALPATE_WRITE_GOLDEN=1 cargo test -p palpate-live --test ros_messages` rewrites the file.
 
 use palpate_core::{ContactEstimate, Estimate, Position, Status};
 use palpate_live::event::{Event, EventRecord};
@@ -57,7 +57,7 @@ fn vector(x: f64, y: f64, z: f64) -> Value {
     json!({ "x": x, "y": y, "z": z })
 }
 
-/// A session's output, the frame, and the topics and fields that follow.
+/// An output of a session, the frame, and the expected topics and fields.
 type Case = (Output, &'static str, Vec<(Topic, Value)>);
 
 fn cases() -> Vec<Case> {
@@ -69,7 +69,7 @@ fn cases() -> Vec<Case> {
     let estimate = |data: &str| (Topic::Estimate, json!({ "data": data }));
     let none = vector(0.0, 0.0, 0.0);
     let mut cases = Vec::new();
-    // Frames of all lengths up to 9, as what follows is aligned to 8.
+    // Frames of all lengths up to 9, because the following field is aligned to 8.
     for frame in ["s", "su", "sur", "surf", "surfa", "surfac", "surface", "surface1", "surface/1"] {
         let head = header(1_800_000_000, 1, frame);
         cases.push((
@@ -84,7 +84,7 @@ fn cases() -> Vec<Case> {
             ],
         ));
     }
-    // The forces of two contacts add up, and their torques; the point is that of the stronger.
+    // The forces and torques of two contacts add up; the point is that of the stronger contact.
     let head = header(1_800_000_000, 1, "surface");
     cases.push((
         sample(UNIX_NS, located(contact(0.25, 0.125, Some(4.0)), &[contact(0.0625, 0.5, Some(1.0))])),
@@ -97,7 +97,7 @@ fn cases() -> Vec<Case> {
             ),
         ],
     ));
-    // A force that is not known: no wrench.
+    // An unknown force: no wrench.
     cases.push((
         sample(UNIX_NS, located(contact(0.25, 0.125, None), &[])),
         "surface",
@@ -108,7 +108,7 @@ fn cases() -> Vec<Case> {
             ),
         ],
     ));
-    // Nothing touches: a wrench of zero, and no point.
+    // An untouched surface: a wrench of zero, and no point.
     cases.push((
         sample(UNIX_NS, Estimate::of_contact(contact(0.25, 0.125, Some(0.5)), Status::NoContact)),
         "surface",
@@ -119,7 +119,7 @@ fn cases() -> Vec<Case> {
             ),
         ],
     ));
-    // What is not sure is in the estimate alone.
+    // Unreliable estimates are in the topic `estimate` alone.
     for status in [Status::Ambiguous, Status::OutsideModel, Status::OutsideSurface] {
         let data = format!(
             r#"{{"number":7,"time_s":1800000000.0,"reading":[1.5,-2.0],"x_mm":250.0,"y_mm":125.0,"force_n":0.5,"status":"{}"}}"#,

@@ -1,4 +1,4 @@
-//! A simulated board through a session: what the finger does is what the session says.
+//! A simulated board through a session: the estimates and events match the finger.
 
 use palpate_core::Status;
 use palpate_estimators::estimator::Locator;
@@ -64,7 +64,7 @@ fn a_finger_is_followed_from_touch_down_to_lift_off() {
     let median_m = errors_m[errors_m.len() / 2];
     assert!(median_m < 0.3e-3, "{median_m}");
     assert_eq!(session.counters().readings, 8000);
-    // 5 µm, learnt while nothing touches.
+    // 5 µm, estimated while the surface is untouched.
     for channel in session.health() {
         assert!((4e-6..6e-6).contains(&channel.noise_sd), "{channel:?}");
     }
@@ -98,7 +98,7 @@ fn a_board_that_repeats_its_readings_is_named_once_and_its_noise_learnt_from_eac
     }
 }
 
-/// A board whose clock is fast, and frames that arrive up to 5 ms late: times are the host's.
+/// A board with a fast clock, and frames that arrive up to 5 ms late: the times are those of the host.
 #[test]
 fn binary_frames_keep_the_hosts_time_whatever_the_boards_clock_does() {
     let rig = Rig::from_toml(RIG).unwrap();
@@ -118,20 +118,20 @@ fn binary_frames_keep_the_hosts_time_whatever_the_boards_clock_does() {
         for output in out.drain(..) {
             let Output::Sample(sample) = output else { continue };
             let off_s = (sample.unix_ns as f64 - (start_ns + taken.as_nanos() as u64) as f64) * 1e-9;
-            // Without the drift it would be off by 18 ms after a minute. The first seconds learn it.
+            // Without a correction of the drift the error would be 18 ms after a minute. The drift is estimated in the first seconds.
             assert!(frame < 1000 || off_s.abs() < 1e-3, "frame {frame}: {off_s} s");
         }
     }
-    // A stream is known to be binary once a frame has ended.
+    // A stream is recognized as binary once a frame has ended.
     assert!(session.counters().readings >= 5998, "{:?}", session.counters());
     assert_eq!(session.counters().lost_frames, 0);
 }
 
-/// A session on the rig's bench, whose finger does what it is told, or goes its own way.
+/// A session on the bench of a rig, with a finger that follows commands or moves at random.
 struct Bench<'a> {
     session: Session<'a>,
     board: SimulatedBoard<'a>,
-    /// Time for which the board is silent, all in all.
+    /// Total time of silence of the board.
     silent: Duration,
 }
 
@@ -147,14 +147,14 @@ impl<'a> Bench<'a> {
         self.board.finger_mut().obey(line).unwrap();
     }
 
-    /// Lets the surface alone at first, so that the baseline is known before anything touches.
+    /// Leaves the surface untouched at first, so the baseline is known before the first contact.
     fn untouched_first(mut self) -> Self {
         self.finger("lift");
         self.take(200);
         self
     }
 
-    /// The next so many samples, and the events with them.
+    /// Samples and events of the next frames.
     fn take(&mut self, frames: usize) -> (Vec<Sample>, Vec<Event>) {
         let mut out = Vec::new();
         for _ in 0..frames {
@@ -220,12 +220,12 @@ fn a_tracked_contact_is_closer_than_single_readings_and_its_intervals_hold_it() 
     assert_eq!(downs, single_downs);
 }
 
-/// A contact held for a minute on a surface that creeps, at a board that drifts: by the tracker's state it is where it is, within its interval; by that
-/// of a tracker that takes nothing off, what creeps is a contact that wanders, and stays when it has gone.
+/// A contact of one minute on a creeping surface and a drifting board. The tracker with creep in its state stays at the true position, within its
+/// interval. Without creep in the state the estimate wanders, and a contact remains after the true one has ended.
 #[test]
 fn drift_and_creep_are_followed_by_the_trackers_state() {
     let rig = Rig::from_toml(RIG).unwrap();
-    // Calibrated by fresh presses, of which a share of the reading has not come yet.
+    // Calibrated by fresh presses: a share of their readings has not yet crept.
     let mut presses = rig.simulate(0).unwrap();
     presses.rows.iter_mut().flat_map(|row| &mut row.reading).for_each(|value| *value *= 0.95);
     let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &presses)).unwrap();
@@ -257,7 +257,7 @@ fn drift_and_creep_are_followed_by_the_trackers_state() {
         (mean_m, covered as f64 / errors_m.len() as f64, gone)
     };
     let (without_m, _, ghosts) = held(None);
-    // 95 % of a reading are fresh, and 5 % come.
+    // 95 % of a reading are immediate, and 5 % creep.
     let (with_m, covered, gone) = held(Some(CreepConfig { share: 0.05 / 0.95, time_s: 20.0 }));
     assert!(with_m < 2e-4 && without_m > 10.0 * with_m, "{with_m} {without_m}");
     assert!(covered > 0.85, "{covered}");
@@ -273,7 +273,7 @@ fn a_tracker_is_carried_over_gaps_and_immense_readings() {
     bench.finger("finger 120 0 3");
     let sd_m = |sample: &Sample| sample.estimate.contact.uncertainty.unwrap().covariance[0].sqrt();
     let (before, _) = bench.take(500);
-    // Ten seconds, and four months: what was known is worth ever less, and readings are as good as before.
+    // Ten seconds, and four months: the earlier state loses weight, and new readings are as informative as before.
     for silent_s in [10.0, 1e7] {
         bench.silent += Duration::from_secs_f64(silent_s);
         bench.finger("finger 280 0 3");
@@ -297,7 +297,7 @@ fn a_tracker_is_carried_over_gaps_and_immense_readings() {
     assert!((after[499].estimate.contact.position.x_m - 0.28).abs() < 2e-4);
 }
 
-/// α/(2 − α) of the variance of single readings is left.
+/// α/(2 − α) of the variance of single readings remains.
 #[test]
 fn a_low_pass_leaves_the_noise_that_it_should_and_is_reset_by_silence() {
     let rig = Rig::from_toml(RIG).unwrap();
@@ -315,7 +315,7 @@ fn a_low_pass_leaves_the_noise_that_it_should_and_is_reset_by_silence() {
     let ratio = filtered_m / single_m;
     assert!((ratio / expected - 1.0).abs() < 0.15, "{ratio}, {expected} expected");
     assert!((mean_m - 0.12).abs() < 2e-4, "{mean_m}");
-    // Within a stream the filter is late; after a silence the first reading stands for itself.
+    // Within a stream the filter lags; after a silence the first reading passes unfiltered.
     bench.finger("finger 280 0 3");
     let (late, _) = bench.take(2);
     assert!((late[1].estimate.contact.position.x_m - 0.28).abs() > 0.01, "{:?}", late[1].estimate.contact);
@@ -349,7 +349,7 @@ fn a_session_that_cannot_be_had_is_refused_with_the_reason() {
     assert!(kind.contains("influence locator"), "{kind}");
 }
 
-/// A session and the watch over its feed, by virtual time.
+/// A session and the monitor of its feed, in virtual time.
 struct FeedBench<'a> {
     session: Session<'a>,
     feed: FeedWatch,
@@ -383,7 +383,7 @@ fn a_feed_without_readings_is_reported_once_and_with_its_cause() {
     let report = bench.report_at(3000).unwrap();
     assert!(report.contains("sends nothing"), "{report}");
     assert_eq!(bench.report_at(9000), None, "it is reported once");
-    // A board that starts prints some lines first.
+    // A starting board prints some lines first.
     assert_eq!(bench.report_after(10_000, Arrival::Joined("board".to_owned())), None);
     assert_eq!(bench.report_after(10_500, bytes("boot\nboot\nboot\nboot\nboot\nboot\n")), None);
     assert_eq!(bench.report_after(10_900, bytes("0,0,0,0,0,0,0,0\n")), None);
@@ -397,7 +397,7 @@ fn a_feed_without_readings_is_reported_once_and_with_its_cause() {
     assert!(
         bench.feed.fault(bench.session.frames()).unwrap().contains("the readings ended early: 52 frames")
     );
-    // It comes back, and the baud rate changes.
+    // The channel returns, and the baud rate changes.
     assert_eq!(bench.report_after(13_000, bytes("0,0,0,0,0,0,0,0\n")), None);
     assert_eq!(bench.report_after(13_100, bytes(&"\u{7F}~".repeat(60))), None);
     assert_eq!(bench.report_at(16_000), None, "readings came every 2 s");

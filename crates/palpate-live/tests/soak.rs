@@ -1,6 +1,6 @@
 //! A simulated board with faults every few seconds: every line is accounted for, and memory stays flat.
 //!
-//! `PALPATE_SOAK_MINUTES=60 cargo test -p palpate-live --test soak -- --nocapture` takes an hour of readings, as fast as they are located.
+//! `PALPATE_SOAK_MINUTES=60 cargo test -p palpate-live --test soak -- --nocapture` processes an hour of readings, as fast as they are located.
 
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation};
@@ -17,7 +17,7 @@ use std::time::Duration;
 
 const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
 const RATE_HZ: f64 = 1000.0;
-/// Seconds between two times that the cable is pulled, and those it is out.
+/// Seconds between two disconnections of the cable, and seconds of each disconnection.
 const PULLED_EVERY: u64 = 7;
 const PULLED_MS: u64 = 800;
 
@@ -76,7 +76,7 @@ fn every_line_is_accounted_for_and_memory_stays_flat() {
         match frame {
             Some(_) if is_away => away_frames += 1,
             Some(bytes) => {
-                // Of a frame that lost all but its line end an empty line is left, which says nothing.
+                // A frame that lost all but its line end is an empty line, which is ignored.
                 let is_empty = line_is_ended && bytes == b"\n";
                 lines += bytes.iter().filter(|byte| **byte == b'\n').count() as u64 - u64::from(is_empty);
                 line_is_ended = bytes.ends_with(b"\n");
@@ -87,7 +87,7 @@ fn every_line_is_accounted_for_and_memory_stays_flat() {
         if !outputs.is_empty() {
             recorder.batch(&Arc::new(Batch { outputs }));
         }
-        // The recorder gets the time that a real session leaves it.
+        // The recorder gets as much time as in a real session.
         if ms.is_multiple_of(500) {
             std::thread::sleep(Duration::from_millis(15));
         }
@@ -110,14 +110,14 @@ fn every_line_is_accounted_for_and_memory_stays_flat() {
         status.lost,
         status.bytes as f64 / 1e6
     );
-    // A torn frame that lost its line end is one line with the next; those that are cut by the cable end nowhere.
+    // A torn frame that lost its line end is one line with the next frame. Frames that the disconnection cuts have no end.
     assert_eq!(lines, counters.readings + bad);
     assert_eq!((status.readings, status.lost, status.problem), (counters.readings, 0, None));
     assert_eq!(counters.gaps, pulls - u64::from(was_away), "each pull is a gap, and nothing else is");
     assert!(bad > 0 && sent.torn > bad / 3, "{bad}");
     if let (Some(before), Some(after)) = (settled_kb, resident_kb()) {
         println!("memory: {before} kB after a quarter, {after} kB at the end");
-        // The index of the recording grows by some 20 bytes a reading; nothing else does.
+        // Only the index of the recording grows, by about 20 bytes per reading.
         let most = before + before / 10 + counters.readings * 3 / 4 * 20 / 1000;
         assert!(after <= most, "{after} kB, at most {most}");
     }

@@ -1,4 +1,4 @@
-//! A machine that presses by itself: lines of G-code, its faults, and a calibration with no hand on it.
+//! A machine that presses by itself: lines of G-code, faults, and a calibration without a user.
 
 use palpate_estimators::evaluation::{Evaluation, limit_ratio};
 use palpate_estimators::fit::{Fit, FitTask};
@@ -80,7 +80,7 @@ fn finger_is_where_lines_send_it_of_either_firmware() {
     }
 }
 
-/// Machines that are slow or quiet, and still do every move when they are asked for it.
+/// Slow or quiet machines still execute every move when it is requested.
 #[test]
 fn slow_and_quiet_machines_stay_in_step() {
     let seconds = Duration::from_secs;
@@ -105,7 +105,7 @@ fn slow_and_quiet_machines_stay_in_step() {
     }
 }
 
-/// The line at which a fault comes, in either dialect.
+/// The lines at which a fault occurs, in the dialect of the firmware.
 fn lines_of(firmware: Firmware) -> [(&'static str, u32); 6] {
     match firmware {
         // A travel, a press, the lift after it, the wait of a travel, the wait of a press, homing.
@@ -114,7 +114,7 @@ fn lines_of(firmware: Firmware) -> [(&'static str, u32); 6] {
     }
 }
 
-/// Every fault, at every kind of line, of either firmware: no move but a lift follows, the machine is halted, and the finger is up where the words say so.
+/// Every fault, at every kind of line, of either firmware: only a lift follows, the machine is halted, and the finger is up if the message states it.
 #[test]
 fn any_fault_stops_the_machine_with_its_finger_up_or_says_why_not() {
     use FaultKind::*;
@@ -123,7 +123,7 @@ fn any_fault_stops_the_machine_with_its_finger_up_or_says_why_not() {
         for (line, nth) in lines_of(firmware) {
             for kind in kinds {
                 for is_paced in [false, true] {
-                    // Only Marlin has one.
+                    // Only Marlin has an emergency parser.
                     for emergency_parser in
                         [true, false].into_iter().take(1 + usize::from(firmware == Firmware::Marlin))
                     {
@@ -220,7 +220,7 @@ fn clamped_position_is_no_place() {
     }
 }
 
-/// A link at which somebody asks for a stop at some time.
+/// A link that requests a stop at the time `at`.
 struct StopAt {
     link: SimulatedLink,
     machine: SimulatedMachine,
@@ -263,7 +263,7 @@ impl StageLink for StopAt {
     }
 }
 
-/// A stop in the middle of a move, `at` an instant of the machine's time; the time from then until it takes effect.
+/// Stops in the middle of a move, at the instant `at` of the machine's time. Returns the delay until the stop takes effect.
 fn stop_during_a_move(
     firmware: Firmware,
     emergency_parser: bool,
@@ -289,11 +289,11 @@ fn stop_during_a_move(
     }
     assert!(matches!(outcome, Err(StageError::Stopped)), "{outcome:?}");
     assert!(!machine.is_moving() && matches!(stage.lift(), Err(StageError::Stopped)));
-    // The stop is asked for at the first read of a move from then on.
+    // The stop is requested at the first read of a move after `at`.
     (stopping, machine.stopped_at().unwrap().saturating_sub(at))
 }
 
-/// Stops at a hundred instants of moves of each machine, in the machine's own time: within 50 ms also where its firmware reads none during a move.
+/// Stops at a hundred instants of moves of each machine, in the machine's own time: within 50 ms even if its firmware reads no stop during a move.
 #[test]
 fn stop_takes_effect_within_50_ms_at_any_time_of_a_move() {
     const STOPS: u64 = 100;
@@ -325,7 +325,7 @@ fn stop_takes_effect_within_50_ms_at_any_time_of_a_move() {
     }
 }
 
-/// Jogs stay at the height of travel or above, and nothing goes below the deepest press.
+/// Jogs stay at the height of travel or above, and no move goes below the deepest press.
 #[test]
 fn jogs_and_touch_offs_keep_their_heights() {
     for firmware in FIRMWARES {
@@ -348,7 +348,7 @@ fn jogs_and_touch_offs_keep_their_heights() {
     }
 }
 
-/// Faults of jogs and of a finger that goes down in search of the touch: the same doubt, and the same way out.
+/// Faults of jogs and of the descent of a touch-off are handled as those of presses.
 #[test]
 fn any_fault_of_a_jog_or_a_touch_off_stops_the_machine() {
     use FaultKind::*;
@@ -413,7 +413,7 @@ fn rejects_descriptions_of_machines_with_the_parts_that_there_are() {
     }
 }
 
-/// From nothing to a locator that is near what physics allows, by machine.
+/// A calibration by machine gives a locator with errors near the Cramér–Rao bound.
 #[test]
 fn a_machine_calibrates_by_itself_to_the_limit() {
     let rig = rig();

@@ -1,4 +1,4 @@
-//! Contacts, positions, and the extent of a surface. Contact and position are those of the microcontroller.
+//! Contacts, positions, and the extent of a surface. Contact and position are the types of the microcontroller crate.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +7,7 @@ pub use palpate_core::{Contact, Position};
 use crate::units::format_length_mm;
 use palpate_numerics::OutOfRange;
 
-/// A position beside the surface.
+/// A position off the surface.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "{what} {number} is at {}, off the surface; it must be within {}",
@@ -15,21 +15,21 @@ use palpate_numerics::OutOfRange;
     extent.bounds_in_words()
 )]
 pub struct OffSurface {
-    /// Name of what lies there.
+    /// Name of the object at that position.
     pub what: &'static str,
     /// Number in its list, from 1.
     pub number: usize,
     /// Position.
     pub position: Position,
-    /// The surface.
+    /// Extent of the surface.
     pub extent: Extent,
 }
 
 impl OffSurface {
-    /// Checks that all of a list of positions lie on a surface.
+    /// Checks that all positions of a list lie on a surface.
     ///
     /// # Errors
-    /// [`OffSurface`] for the first that does not.
+    /// [`OffSurface`] for the first position off the surface.
     pub fn check(what: &'static str, positions: &[Position], extent: Extent) -> Result<(), Self> {
         match positions.iter().position(|position| !extent.contains(*position)) {
             Some(i) => Err(Self { what, number: i + 1, position: positions[i], extent }),
@@ -51,7 +51,7 @@ impl OffSurface {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked", into = "Unchecked")]
 pub enum Extent {
-    /// A line along x, on which y is 0.
+    /// A line along x, with y = 0.
     Line {
         /// Length along x.
         length: Side,
@@ -69,7 +69,7 @@ pub enum Extent {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Side(f64);
 
-/// An extent as files have it.
+/// An extent as in files.
 #[derive(Serialize, Deserialize)]
 struct Unchecked {
     length_m: f64,
@@ -91,7 +91,7 @@ impl From<Extent> for Unchecked {
 }
 
 impl Extent {
-    /// A plane where there is a width, else a line; lengths in metres.
+    /// A plane when a width is given, otherwise a line; lengths in metres.
     ///
     /// # Errors
     /// [`OutOfRange`] for a length or width that is not greater than 0 and finite.
@@ -120,17 +120,17 @@ impl Extent {
         Self::new(length_m, Some(width_m))
     }
 
-    /// A line whose length is checked already.
+    /// A line of a checked length.
     pub(crate) const fn checked_line(length_m: f64) -> Self {
         Self::Line { length: Side(length_m) }
     }
 
-    /// A plane whose sides are checked already.
+    /// A plane with checked sides.
     pub(crate) const fn checked_plane(length_m: f64, width_m: f64) -> Self {
         Self::Plane { length: Side(length_m), width: Side(width_m) }
     }
 
-    /// The line along x, as long as this.
+    /// The line along x of this length.
     #[must_use]
     pub fn along_x(&self) -> Self {
         Self::checked_line(self.length_m())
@@ -151,7 +151,7 @@ impl Extent {
         }
     }
 
-    /// Number of coordinates of a position on it: 1 on a line, 2 on a plane.
+    /// Number of coordinates of a position: 1 on a line, 2 on a plane.
     pub fn dimensions(&self) -> usize {
         match self {
             Self::Line { .. } => 1,
@@ -159,12 +159,12 @@ impl Extent {
         }
     }
 
-    /// Sides, in metres: the length, and the width of a plane; as many as a contact has coordinates.
+    /// Sides, in metres: the length, and the width of a plane; one for each coordinate of a contact.
     pub fn sides_m(&self) -> impl Iterator<Item = f64> + use<> {
         std::iter::once(self.length_m()).chain(self.width_m())
     }
 
-    /// A value that a plane has across its width; `None` on a line.
+    /// `value` on a plane; `None` on a line.
     pub fn if_plane<T>(&self, value: T) -> Option<T> {
         match self {
             Self::Line { .. } => None,
@@ -172,12 +172,12 @@ impl Extent {
         }
     }
 
-    /// The coordinates of a position on it, in metres: x, and y on a plane.
+    /// The coordinates of a position, in metres: x, and y on a plane.
     pub fn coordinates_m(&self, position: Position) -> impl Iterator<Item = f64> + use<> {
         std::iter::once(position.x_m).chain(self.if_plane(position.y_m))
     }
 
-    /// A position in words: "75 mm", or "75 mm, 40 mm" on a plane, and of what is beside a line.
+    /// A position as text: "75 mm", or "75 mm, 40 mm" on a plane or for a position off a line.
     pub fn place_in_words(&self, position: Position) -> String {
         let x = format_length_mm(position.x_m);
         match self {
@@ -186,8 +186,8 @@ impl Extent {
         }
     }
 
-    /// Positions in millimetres with two decimals at most: "35, 40 mm"; on a plane "(10, 20), (10, 180) mm", and where they
-    /// are a grid, at least two by three, "x 10, 20, 30 with y 50, 100 mm each".
+    /// Positions as text, in millimetres with two decimals at most: "35, 40 mm"; on a plane "(10, 20), (10, 180) mm", and for a
+    /// grid of at least two by three "x 10, 20, 30 with y 50, 100 mm each".
     pub fn places_in_words(&self, positions: &[Position]) -> String {
         let listed = |place: &dyn Fn(&Position) -> String| {
             format!("{} mm", positions.iter().map(place).collect::<Vec<_>>().join(", "))
@@ -203,7 +203,7 @@ impl Extent {
         }
     }
 
-    /// Bounds of positions, in words: "0 and 400 mm", or "0 and 300 mm along, 0 and 200 mm across" on a plane.
+    /// Bounds of positions as text: "0 and 400 mm", or "0 and 300 mm along, 0 and 200 mm across" on a plane.
     pub fn bounds_in_words(&self) -> String {
         let along = format!("0 and {}", format_length_mm(self.length_m()));
         match self.width_m() {
@@ -212,9 +212,9 @@ impl Extent {
         }
     }
 
-    /// Whether `position` lies on it, the boundary included.
+    /// True for a position on the extent, its boundary included.
     ///
-    /// Positions are forgiven a rounding error of 10⁻⁹ of the length.
+    /// The tolerance is a rounding error of 10⁻⁹ of the length.
     pub fn contains(&self, position: Position) -> bool {
         let slack_m = 1e-9 * self.length_m();
         let within = |value: f64, size: f64| value >= -slack_m && value <= size + slack_m;
@@ -227,7 +227,7 @@ fn mm(length_m: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// The columns and rows of a grid whose positions go row by row, as they are written.
+/// Texts of the columns and rows of a grid with its positions row by row.
 fn grid(positions: &[Position]) -> Option<(Vec<String>, Vec<String>)> {
     let first = mm(positions.first()?.y_m);
     let columns: Vec<String> =

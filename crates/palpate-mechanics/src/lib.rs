@@ -1,9 +1,9 @@
-//! Readings of sensors on an elastic surface that a contact touches, and the limit of what can be told from them.
+//! Readings of sensors on an elastic surface under a contact, and the resulting limit of contact location.
 //!
-//! [`surface`] has the surfaces (beams, plates, the digit) and answers one question: what does this sensor read when a
-//! force acts there. [`sensing`] says what is measured where and how well, [`limit`] which error no estimator can beat, and
-//! [`units`] turns "400 mm" into 0.4 m and back. Lengths are in metres, forces in newtons, moduli in pascals; forces are
-//! positive downward, deflections upward.
+//! [`surface`] contains the surfaces (beams, plates, the digit) and computes the reading of a sensor for a
+//! force at a position. [`sensing`] describes the measured quantities, positions and faults of sensors. [`limit`] is the bound on the
+//! error of any unbiased estimator. [`units`] turns "400 mm" into 0.4 m and back. Lengths are in metres, forces in newtons, moduli in
+//! pascals; forces are positive downward, deflections upward.
 //!
 //! ```
 //! use palpate_mechanics::contact::{Contact, Position};

@@ -14,7 +14,7 @@ use palpate_numerics::OutOfRange;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorKind {
-    /// Displacement of the surface across itself, in metres, positive upward.
+    /// Displacement normal to the surface, in metres, positive upward.
     Deflection,
     /// The deflection's derivative along the length, in radians.
     Slope,
@@ -22,12 +22,12 @@ pub enum SensorKind {
     Strain,
     /// Force of a support on the surface, in newtons, positive upward.
     Reaction,
-    /// A channel in units of its own, which no model explains.
+    /// A channel in its own unit, without a model.
     Raw,
 }
 
 impl SensorKind {
-    /// Every kind, in the order of their declaration, by which tables over kinds are indexed and messages list them.
+    /// Every kind, in the order of declaration, for the index of tables and the order in messages.
     pub const ALL: [Self; 5] = [Self::Deflection, Self::Slope, Self::Strain, Self::Reaction, Self::Raw];
 
     /// Name in a rig.
@@ -41,7 +41,7 @@ impl SensorKind {
         }
     }
 
-    /// Dimension of its readings.
+    /// Dimension of the readings.
     pub const fn dimension(self) -> Dimension {
         match self {
             Self::Deflection => Dimension::Length,
@@ -52,7 +52,7 @@ impl SensorKind {
         }
     }
 
-    /// The unit in which recordings are written: mm, mrad, ue (microstrain), N, or none.
+    /// The unit in recordings: mm, mrad, ue (microstrain), N, or none.
     pub fn unit(self) -> Unit {
         let symbol = match self {
             Self::Deflection => "mm",
@@ -71,16 +71,16 @@ impl fmt::Display for SensorKind {
     }
 }
 
-/// One sensor: what it measures, where, and how well. Plain data, which [`Layout::new`] checks.
+/// One sensor: measured quantity, position, and channel. Plain data, which [`Layout::new`] checks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensor {
-    /// Quantity that it measures.
+    /// Measured quantity.
     pub kind: SensorKind,
     /// Position on the surface; without meaning for a raw channel.
     pub position: Position,
-    /// Name, unique in the layout: "deflection_1", or what the recording calls its channel.
+    /// Name, unique in the layout: "deflection_1", or the name of the recording's channel.
     pub name: String,
-    /// The faults of its channel.
+    /// The faults of the channel.
     pub channel: ChannelModel,
 }
 
@@ -91,19 +91,19 @@ pub struct Layout {
     sensors: Vec<Sensor>,
 }
 
-/// A layout as a file has it.
+/// A layout as in a file.
 #[derive(Deserialize)]
 struct Unchecked {
     sensors: Vec<Sensor>,
 }
 
-/// A sensor of a layout with a number out of its range.
+/// A sensor of a layout with a number out of range.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("sensor {number}: {fault}")]
 pub struct LayoutError {
-    /// Which sensor, from 1.
+    /// Number of the sensor, from 1.
     pub number: usize,
-    /// Which number, with its bound.
+    /// The number, with its bound.
     pub fault: OutOfRange,
 }
 
@@ -119,7 +119,7 @@ impl Layout {
     /// A layout of these sensors.
     ///
     /// # Errors
-    /// [`LayoutError`], for the first sensor with a number out of its range.
+    /// [`LayoutError`] for the first sensor with a number out of range.
     ///
     /// ```
     /// use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -161,12 +161,12 @@ impl Layout {
         &self.sensors
     }
 
-    /// The sensors, to make another layout of.
+    /// The sensors, as the start of another layout.
     pub fn into_sensors(self) -> Vec<Sensor> {
         self.sensors
     }
 
-    /// Changes the sensors; the layout stays as it was where they are then refused.
+    /// Changes the sensors; on an error the layout stays unchanged.
     ///
     /// # Errors
     /// [`LayoutError`] as for [`Layout::new`].
@@ -177,7 +177,7 @@ impl Layout {
         Ok(())
     }
 
-    /// The same layout with every sensor where `position` says; one that this has no finite place for stays where it is.
+    /// This layout with every sensor moved to its `position`; a sensor stays where that is not finite.
     #[must_use]
     pub fn with_positions(mut self, mut position: impl FnMut(&Sensor) -> Position) -> Self {
         for sensor in &mut self.sensors {
@@ -189,7 +189,7 @@ impl Layout {
         self
     }
 
-    /// Says whether the channel of a sensor, by its index from 0, is dead; nothing where there is no such sensor.
+    /// Sets the channel of a sensor, by its index from 0, dead or not; no effect where no such sensor exists.
     pub fn set_dead(&mut self, sensor: usize, dead: bool) {
         if let Some(sensor) = self.sensors.get_mut(sensor) {
             sensor.channel.dead = dead;
@@ -201,12 +201,12 @@ impl Layout {
         self.sensors.len()
     }
 
-    /// Whether there are none.
+    /// True for a layout without sensors.
     pub fn is_empty(&self) -> bool {
         self.sensors.is_empty()
     }
 
-    /// Positions of the sensors of each kind, in words, in millimetres with two decimals at most: "deflection 35, 40 mm; strain 200 mm", and
+    /// Positions of the sensors of each kind as text, in millimetres with two decimals at most: "deflection 35, 40 mm; strain 200 mm", and
     /// "reaction (10, 20), (10, 180) mm" on a plane.
     pub fn places_in_words(&self, extent: Extent) -> String {
         let of = |kind: SensorKind| {
@@ -222,15 +222,15 @@ impl Layout {
         self.sensors.iter().map(|sensor| sensor.kind).collect()
     }
 
-    /// Each sensor's name.
+    /// Name of each sensor.
     pub fn names(&self) -> Vec<String> {
         self.sensors.iter().map(|sensor| sensor.name.clone()).collect()
     }
 
-    /// [`ChannelModel::reading_sd`] of each sensor; `None` for those that are dead.
+    /// [`ChannelModel::reading_sd`] of each sensor; `None` for dead ones.
     ///
     /// # Errors
-    /// [`NoiseError`] for the first live sensor without noise, or when none is alive.
+    /// [`NoiseError`] for the first active sensor without noise, or when no sensor is active.
     pub fn reading_sds(&self) -> Result<Vec<Option<f64>>, NoiseError> {
         let sds = self.sensors.iter().enumerate().map(|(i, sensor)| {
             let ChannelModel { noise_sd, resolution, dead, .. } = sensor.channel;
@@ -249,12 +249,12 @@ impl Layout {
     }
 }
 
-/// x_i = i·l/(count + 1) for i = 1…count.
+/// `count` positions x_i = i·l/(count + 1) for i = 1…count.
 pub fn even_positions(count: usize, length_m: f64) -> impl Iterator<Item = Position> {
     (1..=count).map(move |i| Position::along(i as f64 * length_m / (count + 1) as f64))
 }
 
-/// Sensors of one kind with the same channel model, for a surface that is yet to be named.
+/// Sensors of one kind with one channel model, for a surface that is not yet chosen.
 ///
 /// ```
 /// use palpate_mechanics::sensing::SensorKind;
@@ -265,18 +265,18 @@ pub fn even_positions(count: usize, length_m: f64) -> impl Iterator<Item = Posit
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorGroup {
-    /// Quantity that they measure.
+    /// Measured quantity.
     pub kind: SensorKind,
-    /// Their positions.
+    /// Positions of the sensors.
     pub placement: Placement,
-    /// The faults that each of them has.
+    /// The faults of each channel.
     pub channel: ChannelModel,
 }
 
 /// Placement of the sensors of a group.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Placement {
-    /// So many along the length l, at i·l/(count + 1) for i = 1…count.
+    /// This number of sensors along the length l, at i·l/(count + 1) for i = 1…count.
     Evenly(usize),
     /// At the inner crossings of a grid of columns × rows: x = i·length/(columns + 1), y = j·width/(rows + 1).
     Grid(usize, usize),
@@ -311,14 +311,14 @@ impl SensorKind {
 }
 
 impl SensorGroup {
-    /// The same with Gaussian noise of this standard deviation, in the SI unit of the kind; at least 0.
+    /// This group with Gaussian noise of standard deviation `sd`, in the SI unit of the kind; at least 0.
     #[must_use]
     pub fn noise(mut self, sd: f64) -> Self {
         self.channel.noise_sd = sd;
         self
     }
 
-    /// The same with this channel model: noise, resolution, gain and offset errors, range.
+    /// This group with this channel model: noise, resolution, gain and offset errors, range.
     #[must_use]
     pub fn channel(mut self, channel: ChannelModel) -> Self {
         self.channel = channel;
@@ -328,8 +328,8 @@ impl SensorGroup {
 
 /// The faults of one channel, in the SI unit of its sensor (or raw). The default channel is perfect.
 ///
-/// reading = saturate(quantise((1 + g)·value + o + noise)), and 0 always when the channel is dead. Plain data: what takes it
-/// into a layout, [`Layout::new`] and a setup's `sensors`, refuses a number out of its range.
+/// reading = saturate(quantise((1 + g)·value + o + noise)), and always 0 for a dead channel. Plain data: [`Layout::new`] and a
+/// setup's `sensors` refuse a number out of range.
 ///
 /// ```
 /// use palpate_mechanics::sensing::ChannelModel;
@@ -341,21 +341,21 @@ impl SensorGroup {
 pub struct ChannelModel {
     /// Standard deviation of the Gaussian noise of a reading; at least 0.
     pub noise_sd: f64,
-    /// Quantisation step; 0 where there is none.
+    /// Quantisation step; 0 for none.
     pub resolution: f64,
-    /// Gain errors g lie uniformly within ± this; at least 0 and below 1.
+    /// Bound of gain errors g, which are uniform within ± this; at least 0 and below 1.
     pub gain_error: f64,
-    /// Offset errors o lie uniformly within ± this; at least 0.
+    /// Bound of offset errors o, which are uniform within ± this; at least 0.
     pub offset_error: f64,
-    /// The sensor sits within ± this of its place, uniformly, along each side of the surface, in metres; at least 0.
+    /// Bound of position errors, which are uniform within ± this along each side of the surface, in metres; at least 0.
     pub position_error_m: f64,
-    /// Lowest and highest value that it can report, where it saturates.
+    /// Lowest and highest value that the channel can report; `None` for a channel that does not saturate.
     pub range: Option<(f64, f64)>,
-    /// Whether it reports 0 whatever happens.
+    /// True for a channel that always reports 0.
     pub dead: bool,
 }
 
-/// The gains and offsets that one simulated bench happens to have, a value per sensor.
+/// Gain and offset errors of one simulated bench, one value for each sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelErrors {
     /// g of each sensor.
@@ -381,11 +381,11 @@ impl ChannelErrors {
     }
 }
 
-/// Readings of faulty channels: what the sensors of `layout` report when the true values are `clean_reading`: gains and offsets `errors`, fresh noise
-/// from `rng`, quantisation, saturation.
+/// Readings of faulty channels: the sensors of `layout` at the true values `clean_reading`, with gain and offset `errors`, fresh noise
+/// from `rng`, quantisation and saturation.
 ///
-/// One normal number is drawn per sensor whatever its faults, so a fault of one channel leaves the noise of the others
-/// as it was. Values without a sensor are left out.
+/// One normal number is drawn for every sensor, independent of its faults, so a fault of one channel does not change the noise of the
+/// others. Values without a sensor are ignored.
 pub fn measure(
     layout: &Layout,
     clean_reading: &[f64],
@@ -396,7 +396,7 @@ pub fn measure(
     measure_with_noise(layout, clean_reading, errors, &noise)
 }
 
-/// Readings of faulty channels as [`measure`] makes them, with this noise of variance 1, a value a sensor.
+/// Readings of faulty channels as in [`measure`], with given noise of variance 1, one value for each sensor.
 pub fn measure_with_noise(
     layout: &Layout,
     clean_reading: &[f64],
@@ -415,10 +415,10 @@ pub fn measure_with_noise(
 }
 
 impl ChannelModel {
-    /// Checks that every number is in its range.
+    /// Checks that every number is in range.
     ///
     /// # Errors
-    /// [`OutOfRange`], for the first that is not.
+    /// [`OutOfRange`] for the first number out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         OutOfRange::check_not_negative([
             ("the noise", self.noise_sd),
@@ -439,7 +439,7 @@ impl ChannelModel {
         self.noise_sd.hypot(self.resolution / 12f64.sqrt())
     }
 
-    /// Quantises and saturates the analogue `value`; 0 when dead.
+    /// Quantises and saturates the analogue `value`; 0 for a dead channel.
     fn report(&self, value: f64) -> f64 {
         if self.dead {
             return 0.0;
@@ -453,18 +453,18 @@ impl ChannelModel {
     }
 }
 
-/// A layout whose noise does not say how closely its readings are to be followed.
+/// Error of a layout without usable noise for the weights of its readings.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoiseError {
-    /// A live sensor has neither noise nor resolution: the noise is singular.
+    /// An active sensor has neither noise nor resolution: the noise is singular.
     #[error(
         "sensor {number} ({kind}) has noise {noise_sd} and resolution {resolution}; one of them must be greater than 0, or \
          nothing limits what it tells"
     )]
     Singular {
-        /// Which sensor, from 1.
+        /// Number of the sensor, from 1.
         number: usize,
-        /// Quantity that it measures.
+        /// Measured quantity.
         kind: SensorKind,
         /// Standard deviation of its noise, in its SI unit.
         noise_sd: f64,
@@ -480,7 +480,7 @@ pub enum NoiseError {
 }
 
 impl NoiseError {
-    /// Advice on what to change in a rig.
+    /// Advice on changes to a rig.
     pub const fn help(&self) -> &'static str {
         match self {
             Self::Singular { .. } => "add `noise = \"5 um\"` to [sensors], in the unit of the readings",

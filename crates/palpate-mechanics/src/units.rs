@@ -1,6 +1,6 @@
-//! Units of measure: "400 mm" becomes 0.4 m, and back for people.
+//! Units of measure: "400 mm" becomes 0.4 m, and back in text.
 //!
-//! Everything inside palpate is SI; a number meets its unit only here, in files and in messages.
+//! All values inside palpate are in SI units; other units appear only here, in files and in messages.
 
 use std::fmt;
 use std::str::FromStr;
@@ -17,7 +17,7 @@ pub const fn um(length: f64) -> f64 {
     length * 1e-6
 }
 
-/// Newtons; says what the number is.
+/// Newtons; the name documents the number's unit.
 pub const fn newtons(force: f64) -> f64 {
     force
 }
@@ -37,9 +37,9 @@ pub const fn microstrain(strain: f64) -> f64 {
     strain * 1e-6
 }
 
-/// A finite value and what it measures.
+/// A finite value and its dimension.
 ///
-/// Parsed from "400 mm", "200GPa", "5 µm", "5 %" or a plain number; shown with the prefix that keeps it readable.
+/// Parsed from "400 mm", "200GPa", "5 µm", "5 %" or a plain number; displayed with a readable prefix.
 ///
 /// ```
 /// use palpate_mechanics::units::{Dimension, Quantity};
@@ -58,10 +58,10 @@ pub struct Quantity {
     pub dimension: Dimension,
 }
 
-/// Error of a text that is not the quantity that was wanted.
+/// Error of a text that is not the expected quantity.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UnitError {
-    /// There is no text.
+    /// The text is empty.
     #[error("empty; write a number and a unit, as in `400 mm`")]
     Empty,
     /// The text does not start with a decimal number.
@@ -76,29 +76,29 @@ pub enum UnitError {
         /// The text.
         text: String,
     },
-    /// No unit has this symbol, whatever it was to measure.
+    /// No unit of any dimension has this symbol.
     #[error("unknown unit `{unit}`; known are {}", Symbols(None))]
     UnknownUnit {
         /// Text in the place of the unit.
         unit: String,
     },
-    /// The unit is unknown, or measures something else than was wanted.
+    /// The unit is unknown, or its dimension is not the expected one.
     #[error("{} `{unit}`; {} is one of {}", complaint(unit), wanted.noun(), Symbols(Some(*wanted)))]
     WrongUnit {
         /// Text in the place of the unit.
         unit: String,
-        /// Dimension that was wanted.
+        /// Expected dimension.
         wanted: Dimension,
     },
-    /// A plain number stands where a unit is needed.
+    /// A plain number without the required unit.
     #[error("`{text}` has no unit; {} is one of {}", wanted.noun(), Symbols(Some(*wanted)))]
     MissingUnit {
         /// The text.
         text: String,
-        /// Dimension that was wanted.
+        /// Expected dimension.
         wanted: Dimension,
     },
-    /// A unit stands where a plain number is wanted.
+    /// A unit after an expected plain number.
     #[error("`{text}` has a unit where a plain number is wanted")]
     UnwantedUnit {
         /// The text.
@@ -125,12 +125,12 @@ impl fmt::Display for Symbols {
 }
 
 impl Quantity {
-    /// Reads `text` as a quantity of the dimension `wanted` and returns its SI value.
+    /// Parses `text` as a quantity of the dimension `wanted` and returns its SI value.
     ///
     /// A ratio may be a plain number (0.05) or a percentage ("5 %"); every other dimension needs its unit.
     ///
     /// # Errors
-    /// [`UnitError`], with the text or unit and the units that would do.
+    /// [`UnitError`], with the text or unit and the accepted units.
     pub fn parse_as(text: &str, wanted: Dimension) -> Result<f64, UnitError> {
         match text.parse::<Self>() {
             Ok(quantity) if quantity.dimension == wanted => Ok(quantity.value),
@@ -149,7 +149,7 @@ impl Quantity {
         }
     }
 
-    /// Reads the two ends of a span, either of which may be empty, as quantities of the dimension `wanted`: a plain number at the
+    /// Parses the two ends of an interval as quantities of the dimension `wanted`; either end may be empty. A plain number at the
     /// beginning has the unit of the end.
     ///
     /// ```
@@ -160,7 +160,7 @@ impl Quantity {
     /// ```
     ///
     /// # Errors
-    /// [`UnitError`] of the end that is wrong.
+    /// [`UnitError`] of the faulty end.
     pub fn parse_span([from, to]: [&str; 2], wanted: Dimension) -> Result<[Option<f64>; 2], UnitError> {
         let end = |text: &str| -> Result<Option<f64>, UnitError> {
             if text.is_empty() { Ok(None) } else { Self::parse_as(text, wanted).map(Some) }
@@ -203,7 +203,7 @@ impl FromStr for Quantity {
     }
 }
 
-/// The longest decimal number at the head of `text`, and what follows it without the space between.
+/// The longest decimal number at the beginning of `text`, and the rest without the space between them.
 fn split(text: &str) -> (&str, &str) {
     let bytes = text.as_bytes();
     let digits_from = |from: usize| bytes[from..].iter().take_while(|b| b.is_ascii_digit()).count();
@@ -229,7 +229,7 @@ fn split(text: &str) -> (&str, &str) {
     (number, rest.trim_start())
 }
 
-/// A count with separators of thousands: "26,850".
+/// A count with thousands separators: "26,850".
 pub fn format_count(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::new();
@@ -242,12 +242,12 @@ pub fn format_count(count: u64) -> String {
     text
 }
 
-/// A length in metres as people read it: millimetres with at most four decimals, "44.4444 mm", and scientific from 10¹⁵ mm on.
+/// A length in metres as text: millimetres with at most four decimals, "44.4444 mm", and scientific from 10¹⁵ mm on.
 pub fn format_length_mm(length_m: f64) -> String {
     format!("{} mm", rounded(length_m * 1e3, 4))
 }
 
-/// Decimal notation with at most `decimals` decimals and no trailing zeros; scientific where that would be a row of zeros.
+/// Decimal notation with at most `decimals` decimals and no trailing zeros; scientific for large values.
 fn rounded(value: f64, decimals: usize) -> String {
     if value.abs() >= 1e15 {
         return format!("{value:.decimals$e}");
@@ -258,7 +258,7 @@ fn rounded(value: f64, decimals: usize) -> String {
 }
 
 impl fmt::Display for Quantity {
-    /// Six significant digits in the largest unit that keeps the number at 1 or above; of a plain number all digits before the point.
+    /// Six significant digits in the largest unit that keeps the number at 1 or above; for a plain number all digits before the point.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let whole = self.value.abs() >= 1e5 && self.value.abs() < 1e15 && self.dimension == Dimension::None;
         let rounded = if whole {
@@ -271,7 +271,7 @@ impl fmt::Display for Quantity {
 }
 
 impl Quantity {
-    /// All digits in the largest unit that keeps the number at 1 or above, for values that a file says.
+    /// All digits in the largest unit that keeps the number at 1 or above, for values from a file.
     ///
     /// ```
     /// use palpate_mechanics::units::{Dimension, Quantity};
@@ -291,7 +291,7 @@ impl Quantity {
     }
 }
 
-/// The largest unit that keeps the number at 1 or above. Some units are read but never chosen, and lengths below 10 m
+/// The largest unit that keeps the number at 1 or above. Some units are parsed but never chosen, and lengths below 10 m
 /// stay in millimetres.
 fn readable_unit(quantity: Quantity) -> Option<Unit> {
     let magnitude = quantity.value.abs() * (1.0 + 1e-9);
@@ -302,7 +302,7 @@ fn readable_unit(quantity: Quantity) -> Option<Unit> {
         "m" => magnitude >= 10.0,
         symbol => !["cm", "deg", "um/m", "mm/m", "g/cm3", "min", "h"].contains(&symbol),
     };
-    // Units go from the smallest to the largest.
+    // Units are in ascending order.
     let fits = |unit: &Unit| magnitude >= unit.factor();
     let units = || quantity.dimension.units().filter(chosen);
     units().filter(fits).last().or(units().next())
@@ -323,13 +323,13 @@ pub enum Dimension {
     Angle,
     /// Strain, metres per metre.
     Strain,
-    /// A share, as a number where 1 is the whole.
+    /// A ratio; 1 is the whole.
     Ratio,
     /// Mass per volume, in kg/m³.
     Density,
-    /// Force per length that a spring gives way by, in N/m.
+    /// Stiffness of a spring, force per length, in N/m.
     Stiffness,
-    /// Couple per angle that a spring turns by, in N·m/rad.
+    /// Stiffness of a rotational spring, couple per angle, in N·m/rad.
     RotationalStiffness,
     /// Length per time, in m/s.
     Speed,
@@ -340,7 +340,7 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    /// The word for it in messages, with its article.
+    /// The noun for the dimension in messages, with its article.
     pub const fn noun(self) -> &'static str {
         match self {
             Self::None => "a plain number",
@@ -359,7 +359,7 @@ impl Dimension {
         }
     }
 
-    /// The units it can be written in, ASCII spellings only, smallest first.
+    /// The units of the dimension, ASCII spellings only, smallest first.
     pub fn units(self) -> impl Iterator<Item = Unit> {
         Unit::in_ascii().filter(move |unit| unit.dimension() == self)
     }
@@ -368,13 +368,13 @@ impl Dimension {
 /// Factor from a unit to the SI unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Scale {
-    /// 10 to this power; scaling moves the decimal point, so nothing is lost.
+    /// 10 to this power; scaling moves the decimal point, so no digit is lost.
     Power(i32),
     /// Any other factor.
     Factor(f64),
 }
 
-/// Symbol, dimension and scale. Where several spellings mean one unit, palpate writes the first.
+/// Symbol, dimension and scale. Where a unit has several spellings, palpate writes the first.
 const UNITS: &[(&str, Dimension, Scale)] = &[
     ("", Dimension::None, Scale::Power(0)),
     ("nm", Dimension::Length, Scale::Power(-9)),
@@ -454,7 +454,7 @@ impl Unit {
         UNITS.iter().position(|(known, ..)| *known == symbol).map(Self)
     }
 
-    /// All units with a symbol in ASCII, as the table has them.
+    /// All units with a symbol in ASCII, in the order of the table.
     fn in_ascii() -> impl Iterator<Item = Self> {
         let written = |unit: &Self| unit.symbol().is_ascii() && !unit.symbol().is_empty();
         (0..UNITS.len()).map(Self).filter(written)
@@ -465,7 +465,7 @@ impl Unit {
         self.entry().0
     }
 
-    /// Dimension of the quantities that it measures.
+    /// Dimension of the unit.
     pub fn dimension(self) -> Dimension {
         self.entry().1
     }
@@ -478,9 +478,9 @@ impl Unit {
         }
     }
 
-    /// Reads a decimal number in this unit as SI: "1.2" in mm is exactly the number that 0.0012 is.
+    /// Parses a decimal number in this unit as an SI value: "1.2" in mm is exactly the number 0.0012.
     ///
-    /// `None` unless `number` is a decimal number; infinities and NaN, as the text has them or by overflow, are
+    /// `None` unless `number` is a decimal number. Infinities and NaN, from the text or by overflow, are
     /// passed on.
     pub fn parse_si(self, number: &str) -> Option<f64> {
         match self.entry().2 {
@@ -490,7 +490,7 @@ impl Unit {
         }
     }
 
-    /// Writes an SI value as the shortest decimal number in this unit that `parse_si` reads back: exactly, where
+    /// Formats an SI value as the shortest decimal number in this unit that `parse_si` parses to it: exactly, where
     /// the unit is a power of ten of the SI unit.
     pub fn format_si(self, value_si: f64) -> String {
         match self.entry().2 {
@@ -544,7 +544,7 @@ fn parse_shifted(number: &str, power: i32) -> Option<f64> {
     format!("{mantissa}e{}", exponent.saturating_add(power)).parse().ok()
 }
 
-/// The shortest digits of `value`, the decimal point moved `power` places to the right.
+/// The shortest digits of `value`, with the decimal point moved `power` places to the right.
 fn format_shifted(value: f64, power: i32) -> String {
     let scientific = format!("{value:e}");
     let Some((mantissa, exponent)) = scientific.split_once('e') else { return scientific };
@@ -557,7 +557,7 @@ fn format_shifted(value: f64, power: i32) -> String {
     place_point(sign, &digits, exponent + power)
 }
 
-/// Plain decimal notation where that stays short, scientific elsewhere; `exponent` is that of the first digit.
+/// Decimal notation where it is short, scientific elsewhere; `exponent` is that of the first digit.
 fn place_point(sign: &str, digits: &str, exponent: i32) -> String {
     let count = digits.len();
     match usize::try_from(exponent) {

@@ -1,21 +1,21 @@
 //! Cholesky factorisation A = L·Lᵀ of a symmetric positive definite matrix.
 //!
-//! What bounds it: the trailing update of the blocked algorithm (Golub and Van Loan, *Matrix Computations*, 4.2.5) is
-//! nearly all of the n³/3 multiply-adds, and is a matrix product, which ndarray hands to a tuned kernel.
+//! Performance: the trailing update of the blocked algorithm (Golub and Van Loan, *Matrix Computations*, 4.2.5) takes
+//! nearly all of the n³/3 multiply-adds. It is a matrix product, which ndarray passes to a tuned kernel.
 
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut2, Axis, s};
 
-/// Rows of a product that are computed at once, from the columns that differ from 0.
+/// Number of rows of a product that are computed together, from the columns that differ from 0.
 const BLOCK: usize = 64;
 
-/// Columns that are factored, and rows that are solved for, one after the other; more are halved.
+/// Largest number of columns that are factored, and of rows that are solved for, one after the other; more are halved.
 const NARROW: usize = 16;
 
-/// Rows that are solved for side by side.
+/// Number of rows that are solved for side by side.
 const LANES: usize = 8;
 
-/// Columns of a triangle that are updated as a rectangle, what is above the diagonal in vain.
+/// Columns of a triangle that are updated as a rectangle; the part above the diagonal is unused.
 const GRAM: usize = 48;
 
 /// The factor L of A = L·Lᵀ, lower triangular.
@@ -36,20 +36,20 @@ pub struct Cholesky {
     lower: Array2<f64>,
 }
 
-/// A matrix that has no Cholesky factor.
+/// Error of a matrix without a Cholesky factor.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("the matrix is not positive definite: pivot {row} of {size} is {pivot:e}")]
 pub struct NotPositiveDefinite {
-    /// Which pivot failed, from 1.
+    /// Index of the failed pivot, from 1.
     pub row: usize,
-    /// Rows of the matrix.
+    /// Number of rows of the matrix.
     pub size: usize,
     /// Value, which must be greater than 0.
     pub pivot: f64,
 }
 
 impl Cholesky {
-    /// Factors a square matrix, of which only the lower triangle is read.
+    /// Factors a square matrix; only its lower triangle is read.
     ///
     /// # Errors
     /// [`NotPositiveDefinite`], with the pivot that is not greater than 0 or not finite.
@@ -69,7 +69,7 @@ impl Cholesky {
         Ok(Self { lower: matrix })
     }
 
-    /// The factor whose L is given, its diagonal greater than 0.
+    /// The factorisation with this L, which must have a positive diagonal.
     ///
     /// # Panics
     /// When the matrix is not square.
@@ -83,7 +83,7 @@ impl Cholesky {
         self.lower.view()
     }
 
-    /// Rows of the matrix.
+    /// Number of rows of the matrix.
     pub fn size(&self) -> usize {
         self.lower.nrows()
     }
@@ -100,7 +100,7 @@ impl Cholesky {
         Array1::from(x)
     }
 
-    /// L⁻¹·b in the place of b.
+    /// Replaces b by L⁻¹·b.
     ///
     /// # Panics
     /// When b is shorter than the matrix.
@@ -132,7 +132,7 @@ impl Cholesky {
     /// L⁻¹·B, in blocks that are matrix products.
     ///
     /// # Panics
-    /// When B has not as many rows as the matrix.
+    /// When the number of rows of B differs from that of the matrix.
     pub fn solve_lower_matrix(&self, mut b: Array2<f64>) -> Array2<f64> {
         assert_eq!(b.nrows(), self.size(), "a right side has as many rows as the matrix");
         let columns = b.ncols();
@@ -143,7 +143,7 @@ impl Cholesky {
     /// A⁻¹·B.
     ///
     /// # Panics
-    /// When B has not as many rows as the matrix.
+    /// When the number of rows of B differs from that of the matrix.
     pub fn solve_matrix(&self, b: Array2<f64>) -> Array2<f64> {
         self.solve_upper_matrix(self.solve_lower_matrix(b))
     }
@@ -151,7 +151,7 @@ impl Cholesky {
     /// L⁻ᵀ·B, in blocks that are matrix products.
     ///
     /// # Panics
-    /// When B has not as many rows as the matrix.
+    /// When the number of rows of B differs from that of the matrix.
     pub fn solve_upper_matrix(&self, mut b: Array2<f64>) -> Array2<f64> {
         assert_eq!(b.nrows(), self.size(), "a right side has as many rows as the matrix");
         self.substitute_backward(b.view_mut(), 0);
@@ -171,8 +171,8 @@ impl Cholesky {
         inverse
     }
 
-    /// Solves for the rows of B from `start` on, from which those before have been taken off: one half after the other. Rows before `end` differ from
-    /// 0 in their first `columns(end)` columns at most.
+    /// Solves for the rows of B from `start` on, with the earlier rows already eliminated: one half after the other. In rows before `end`
+    /// at most the first `columns(end)` columns differ from 0.
     fn substitute_forward(&self, mut b: ArrayViewMut2<f64>, start: usize, columns: &impl Fn(usize) -> usize) {
         let size = b.nrows();
         if size > NARROW {
@@ -197,7 +197,7 @@ impl Cholesky {
         }
     }
 
-    /// Solves with Lᵀ for the rows of B from `start` on, from which those behind have been taken off: one half after the other.
+    /// Solves with Lᵀ for the rows of B from `start` on, with the later rows already eliminated: one half after the other.
     fn substitute_backward(&self, mut b: ArrayViewMut2<f64>, start: usize) {
         let size = b.nrows();
         if size > NARROW {
@@ -220,7 +220,7 @@ impl Cholesky {
         }
     }
 
-    /// Mᵀ·M for a lower triangular M: A⁻¹ where M = L⁻¹.
+    /// Mᵀ·M for a lower triangular M: A⁻¹ for M = L⁻¹.
     pub fn gram_of_lower(lower: &Array2<f64>) -> Array2<f64> {
         let size = lower.nrows();
         let mut gram = Array2::zeros((size, size));
@@ -236,7 +236,7 @@ impl Cholesky {
     }
 }
 
-/// Factors the first `columns` of a matrix of which only the lower triangle is read, and takes L₂₁·L₂₁ᵀ off that of the rest.
+/// Factors the first `columns` of a matrix, and subtracts L₂₁·L₂₁ᵀ from the lower triangle of the rest. Only the lower triangle is read.
 pub(super) fn factor_leading(
     matrix: ArrayViewMut2<'_, f64>,
     columns: usize,
@@ -278,7 +278,7 @@ fn factor_narrow(panel: ArrayViewMut2<'_, f64>) -> Result<(), NotPositiveDefinit
         }
     }
     for mut rows in below.axis_chunks_iter_mut(Axis(0), LANES) {
-        // A column each.
+        // One column for each row of B.
         let mut x = [[0.0; LANES]; NARROW];
         for (lane, row) in rows.outer_iter().enumerate() {
             x.iter_mut().zip(row).for_each(|(x, value)| x[lane] = *value);
@@ -299,7 +299,7 @@ fn factor_narrow(panel: ArrayViewMut2<'_, f64>) -> Result<(), NotPositiveDefinit
     Ok(())
 }
 
-/// Takes A·Aᵀ off the lower triangle of a matrix, A having as many rows; or off its first columns.
+/// Subtracts A·Aᵀ from the lower triangle of a matrix with as many rows as A, or from its first columns.
 #[expect(clippy::needless_pass_by_value, reason = "a view is handed on as the matrix is")]
 fn subtract_gram(mut matrix: ArrayViewMut2<'_, f64>, a: ArrayView2<'_, f64>) {
     let columns = matrix.ncols();

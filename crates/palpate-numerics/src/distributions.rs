@@ -1,8 +1,8 @@
-//! Distribution functions of statistics.
+//! Distribution functions.
 
-/// Half the width of a normal distribution's 95 % interval, in standard deviations.
+/// Half-width of a normal distribution's 95 % interval, in standard deviations.
 pub const NORMAL_95: f64 = 1.959_963_984_540_054;
-/// The same of 99 %.
+/// Half-width of a normal distribution's 99 % interval, in standard deviations.
 pub const NORMAL_99: f64 = 2.575_829_303_548_900_4;
 
 /// 95 % quantile of χ² with two degrees of freedom, −2·ln 0.05: the squared size, in standard
@@ -15,25 +15,25 @@ pub fn normal_interval_95(mean: f64, sd: f64) -> (f64, f64) {
     (mean - NORMAL_95 * sd, mean + NORMAL_95 * sd)
 }
 
-/// The least interval that holds two.
+/// The smallest interval that contains two others.
 #[inline]
 pub fn hull(one: (f64, f64), other: (f64, f64)) -> (f64, f64) {
     (one.0.min(other.0), one.1.max(other.1))
 }
 
-/// An interval with a value added.
+/// The smallest interval that contains an interval and a value.
 #[inline]
 pub fn holding(interval: (f64, f64), value: f64) -> (f64, f64) {
     hull(interval, (value, value))
 }
 
-/// An interval without what of it is below 0 or above `size`.
+/// The part of an interval from 0 to `size`.
 #[inline]
 pub fn clamped_interval((low, high): (f64, f64), size: f64) -> (f64, f64) {
     (low.max(0.0), high.min(size))
 }
 
-/// Root by bisection, where a rising function reaches a value: the end of what `is_below` holds for, from a range that is halved so many times.
+/// Root of a rising function by bisection: the end of the range where `is_below` is true, after this number of halvings.
 #[inline]
 pub fn bisect((mut low, mut high): (f64, f64), halvings: usize, is_below: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..halvings {
@@ -48,24 +48,24 @@ pub fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// Part of a standard normal distribution between two ends.
+/// A standard normal distribution truncated at two ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalPart {
-    /// ln of its probability, also where that is no number any more.
+    /// ln of its probability, also where the probability itself underflows.
     pub ln_share: f64,
-    /// Mean of the distribution that is cut off at both ends.
+    /// Mean of the truncated distribution.
     pub mean: f64,
-    /// Variance.
+    /// Variance of the truncated distribution.
     pub variance: f64,
 }
 
-/// The part of a standard normal distribution from `from` to a greater `to`, however far out or narrow.
+/// The standard normal distribution truncated to `from` … `to`, with `to` > `from`, for any distance from 0 and any width.
 pub fn normal_between(from: f64, to: f64) -> NormalPart {
-    /// From here on the tail is that of its continued fraction.
+    /// Beyond this value the tail is computed from its continued fraction.
     const TAIL: f64 = 6.0;
-    /// Beyond this nothing is left.
+    /// Beyond this value the tail is negligible.
     const ALL: f64 = 9.0;
-    /// In a part that is narrower, and not far out, the density is even.
+    /// Largest width of a part with uniform density, not far out.
     const NARROW: f64 = 1e-4;
     if from > TAIL {
         return upper_tail(from, to);
@@ -95,10 +95,10 @@ pub fn normal_between(from: f64, to: f64) -> NormalPart {
 
 const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 
-/// The part from `from`, far above 0, to `to`: with m(z) = Φ(−z)/φ(z) (Mills' ratio) the share is φ(from)·(m(from) − r·m(to)),
+/// The part from `from`, far above 0, to `to`. With Mills' ratio m(z) = Φ(−z)/φ(z) the share is φ(from)·(m(from) − r·m(to)),
 /// r = φ(to)/φ(from).
 fn upper_tail(from: f64, to: f64) -> NormalPart {
-    // The density falls by the factor e over 1/from: a part that is narrow beside that is even.
+    // The density falls by the factor e over 1/from, so it is uniform over a much narrower part.
     let fall = (to - from) * from;
     if fall < 1e-3 {
         let (width, mean) = (to - from, 0.5 * (from + to));
@@ -108,7 +108,7 @@ fn upper_tail(from: f64, to: f64) -> NormalPart {
     let ratio = (-0.5 * (to - from) * (to + from)).exp();
     let left = mills_ratio(from) - if ratio > 0.0 { ratio * mills_ratio(to) } else { 0.0 };
     let mean = (1.0 - ratio) / left;
-    // Cut off far out it is an exponential one, whose deviation is its mean less its start.
+    // Far out, the truncated distribution is exponential: its standard deviation is its mean minus its start.
     let above = mean - from;
     let variance = if from > 1e3 && ratio == 0.0 {
         above * above
@@ -125,15 +125,15 @@ fn mills_ratio(z: f64) -> f64 {
     1.0 / (1..=LEVELS).rev().fold(z, |below, level| z + level as f64 / below)
 }
 
-/// The z with Φ(z) = `share`, for a share between 0 and 1, by bisection to the last bits.
+/// The z with Φ(z) = `share`, for `share` between 0 and 1, by bisection to the last bits.
 pub fn normal_quantile(share: f64) -> f64 {
     bisect((-39.0, 39.0), 80, |z| normal_cdf(z) < share)
 }
 
-/// The probability that a χ² variable of `freedom` degrees of freedom exceeds `value`, for `value` ≥ 0; one of no freedom is 0.
+/// The probability that a χ² variable with `freedom` degrees of freedom exceeds `value`, for `value` ≥ 0. A variable with no degrees of freedom is 0.
 ///
-/// With x = value/2 it is Σ e⁻ˣ·xʲ/Γ(j + 1) over j = 0, 1, … < freedom/2 for an even number of degrees, and erfc(√x) plus the
-/// same over j = ½, 3/2, … < freedom/2 for an odd one (Abramowitz and Stegun, 26.4.4 and 26.4.5).
+/// With x = value/2 it is Σ e⁻ˣ·xʲ/Γ(j + 1) over j = 0, 1, … < freedom/2 for an even number of degrees. For an odd one it is erfc(√x) plus
+/// that sum over j = ½, 3/2, … < freedom/2 (Abramowitz and Stegun, 26.4.4 and 26.4.5).
 pub fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
     let x = 0.5 * value;
     let odd = freedom % 2 == 1;
@@ -145,7 +145,7 @@ pub fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
     if count == 0 {
         return start;
     }
-    // From the largest term, at j near x, its neighbours follow by their ratios j/x and x/(j + 1); few of many are not negligible.
+    // From the largest term, at j near x, the other terms follow by the ratios j/x and x/(j + 1); most of them are negligible.
     let least = if odd { 0.5 } else { 0.0 };
     let largest = (x - least).clamp(0.0, (count - 1) as f64).floor();
     let at = least + largest;
@@ -155,7 +155,7 @@ pub fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
     start + term + sum_of_products(term, below) + sum_of_products(term, above)
 }
 
-/// The sum of a first term times a ratio, times the next ratio too, and so on, until what is left is negligible. Ratios do not grow.
+/// Sum of a first term and its products with successive ratios, until the remainder is negligible. Ratios do not grow.
 fn sum_of_products(first: f64, ratios: impl Iterator<Item = f64>) -> f64 {
     let mut sum = 0.0;
     let mut term = first;
@@ -179,7 +179,7 @@ pub fn chi_squared_critical_value(tail: f64, freedom: usize) -> f64 {
     bisect((low, high), 60, |value| chi_squared_survival(value, freedom) > tail)
 }
 
-/// ln of the density of Student's t distribution with ν > 0 degrees of freedom, which need not be a whole number.
+/// ln of the density of Student's t distribution with ν > 0 degrees of freedom, not necessarily an integer.
 pub fn student_ln_density(t: f64, freedom: f64) -> f64 {
     let constant = libm::lgamma(0.5 * (freedom + 1.0))
         - libm::lgamma(0.5 * freedom)
@@ -191,7 +191,7 @@ pub fn student_ln_density(t: f64, freedom: f64) -> f64 {
 ///
 /// With x = π/2 − arctan(t/√ν) it is the integral of sin^(ν−1) from 0 to x over that from 0 to π/2, each by Simpson's rule.
 pub fn student_survival(t: f64, freedom: f64) -> f64 {
-    /// Halves of the intervals: the integrand is a power at 0, and smooth elsewhere.
+    /// Number of half-intervals of Simpson's rule: the integrand is a power at 0, and smooth elsewhere.
     const HALVES: usize = 400;
     let integral = |to: f64| {
         let step = to / HALVES as f64;
@@ -209,7 +209,7 @@ pub fn student_critical_value(tail: f64, freedom: f64) -> f64 {
     bisect((0.0, MOST), 80, |t| student_survival(t, freedom) > tail)
 }
 
-/// Probability of at least `least` of so many independent events, each of probability `share`.
+/// Probability of at least `least` of `trials` independent events, each of probability `share`.
 pub fn binomial_tail(trials: usize, least: usize, share: f64) -> f64 {
     let mut term = (trials as f64 * (-share).ln_1p()).exp();
     let mut fewer = 0.0;

@@ -2,7 +2,8 @@
 
 use crate::small::{add_multiple, dot};
 
-/// Pushes the part of a vector that lies across a basis of unit vectors, at unit length; nothing where that is no more than the share `least` of the vector.
+/// Pushes the normalised component of a vector orthogonal to a basis of unit vectors. A component of at most the share `least` of the vector's
+/// length is ignored.
 ///
 /// ```
 /// use palpate_numerics::push_rest;

@@ -1,6 +1,6 @@
-//! Numbers checked against their bounds.
+//! Checks of numbers against their bounds.
 
-/// A number that is not in its range.
+/// Error of a number out of range.
 ///
 /// ```
 /// use palpate_numerics::OutOfRange;
@@ -11,7 +11,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{what} is {value}; it must be {bound}")]
 pub struct OutOfRange {
-    /// Which number.
+    /// Name of the number.
     pub what: &'static str,
     /// Value.
     pub value: f64,
@@ -23,7 +23,7 @@ impl OutOfRange {
     /// Checks that numbers, each with its name, are greater than 0 and finite.
     ///
     /// # Errors
-    /// The first that is not.
+    /// [`OutOfRange`] for the first number that fails.
     pub fn check_positive(numbers: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(), Self> {
         Self::check("greater than 0 and finite", numbers, |value| value > 0.0 && value.is_finite())
     }
@@ -31,15 +31,15 @@ impl OutOfRange {
     /// Checks that numbers, each with its name, are at least 0 and finite.
     ///
     /// # Errors
-    /// The first that is not.
+    /// [`OutOfRange`] for the first number that fails.
     pub fn check_not_negative(numbers: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(), Self> {
         Self::check("at least 0 and finite", numbers, |value| value >= 0.0 && value.is_finite())
     }
 
-    /// Checks that numbers, each with its name, are `good`, as `bound` says.
+    /// Checks that numbers, each with its name, are `good`; `bound` is the text of the condition.
     ///
     /// # Errors
-    /// The first that is not.
+    /// [`OutOfRange`] for the first number that fails.
     pub fn check(
         bound: &'static str,
         numbers: impl IntoIterator<Item = (&'static str, f64)>,

@@ -1,4 +1,4 @@
-//! A random order that a seed fixes.
+//! A random order determined by a seed.
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;

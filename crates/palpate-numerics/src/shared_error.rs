@@ -1,4 +1,4 @@
-//! Covariances of many errors and one that all of them share, V = D + g·gᵀ with D diagonal.
+//! Covariances of independent errors and one shared error, V = D + g·gᵀ with D diagonal.
 
 /// aᵀ·V⁻¹·b from `ab` = aᵀ·D⁻¹·b, `ga` = gᵀ·D⁻¹·a, `gb` = gᵀ·D⁻¹·b and `gg` = gᵀ·D⁻¹·g (Sherman and Morrison, Annals of Mathematical
 /// Statistics 21, 1950).
@@ -15,7 +15,7 @@ pub fn with_shared_error(ab: f64, ga: f64, gb: f64, gg: f64) -> f64 {
     ab - ga * gb / (1.0 + gg)
 }
 
-/// Whitening of values of unit variance that share an error γ besides: V = I + γ·γᵀ.
+/// Whitening of values with independent errors of unit variance and a shared error γ: V = I + γ·γᵀ.
 ///
 /// ```
 /// use palpate_numerics::SharedError;
@@ -33,7 +33,7 @@ pub struct SharedError {
 }
 
 impl SharedError {
-    /// The shared error γ of each value, over the standard deviation that the value has for itself.
+    /// The shared error γ of each value, over the standard deviation of the value's independent error.
     pub fn new(gamma: Vec<f64>) -> Self {
         Self { square: gamma.iter().map(|error| error * error).sum(), gamma }
     }
@@ -73,7 +73,7 @@ mod tests {
             let [ab, ga, gb, gg] =
                 [dot(&a, &b), dot(&gamma, &a), dot(&gamma, &b), dot(&gamma, &gamma)];
             let told = with_shared_error(ab, ga, gb, gg);
-            // V times V⁻¹·b, told one row at a time, is b.
+            // V times V⁻¹·b, computed row by row, is b.
             let inverse_b: Vec<f64> = (0..4).map(|i| with_shared_error(b[i], gamma[i], gb, gg)).collect();
             let along = dot(&gamma, &inverse_b);
             for i in 0..4 {

@@ -1,21 +1,21 @@
-//! Algebra of small matrices whose size the compiler knows, without allocation: factors, solutions, inverses and
-//! determinants of symmetric ones, principal axes, and the solution of a general system.
+//! Algebra of small matrices of a size known at compile time, without allocation: factors, solutions, inverses and
+//! determinants of symmetric matrices, principal axes, and the solution of a general system.
 
 /// A matrix by rows.
 pub type Matrix<const N: usize> = [[f64; N]; N];
 
-/// A pivot of at most this share of the diagonal entry that it began as is taken for rounding.
+/// A pivot of at most this share of its original diagonal entry counts as rounding error.
 ///
 /// The matrices here have at most ten rows, and their entries are sums over some tens of channels. Each addition on the
-/// way to a pivot errs by up to ε/2 = 1.1·10⁻¹⁶ of the diagonal entry, 45·ε together at the worst (Higham, *Accuracy and
-/// Stability of Numerical Algorithms*, 3.1 and 10.1), so of a smaller remainder no digit is right. As a share, it does not
+/// way to a pivot errs by up to ε/2 = 1.1·10⁻¹⁶ of the diagonal entry, in the worst case 45·ε together (Higham, *Accuracy and
+/// Stability of Numerical Algorithms*, 3.1 and 10.1). A smaller remainder has no correct digit. As a share, the bound does not
 /// depend on the units of the unknowns.
 pub const ROUNDING: f64 = 1e-14;
 
 /// The factors of A = L·D·Lᵀ for a symmetric positive semidefinite matrix A: L lower triangular with a diagonal of ones,
-/// D diagonal. Of A, only the lower triangle is read.
+/// D diagonal. Only the lower triangle of A is read.
 ///
-/// An unknown that is held has no pivot. Its row and column count for nothing, and it is 0 in every solution and inverse.
+/// An unknown can be fixed at 0: it then has no pivot. The factors ignore its row and column, and it is 0 in every solution and inverse.
 ///
 /// ```
 /// use palpate_numerics::small::Ldl;
@@ -29,22 +29,22 @@ pub const ROUNDING: f64 = 1e-14;
 pub struct Ldl<const N: usize> {
     /// L below its diagonal; zeros above it.
     lower: Matrix<N>,
-    /// D; 0 for what is held.
+    /// D; 0 for a fixed unknown.
     pivots: [f64; N],
-    /// 1/D; 0 for what is held.
+    /// 1/D; 0 for a fixed unknown.
     inverse_pivots: [f64; N],
 }
 
 #[expect(clippy::needless_range_loop, reason = "as the formulas have their indices")]
 impl<const N: usize> Ldl<N> {
-    /// The factors of a positive definite matrix; `None` where it is not so, or only by [`ROUNDING`].
+    /// The factors of a positive definite matrix; `None` where it is not positive definite, or only by [`ROUNDING`].
     #[inline]
     pub fn new(a: &Matrix<N>) -> Option<Self> {
         Self::of_free(a, [true; N])
     }
 
-    /// The factors of the rows and columns that are `free`, which must be positive definite, the other unknowns being
-    /// held; `None` where they are not so, or only by [`ROUNDING`].
+    /// The factors of the rows and columns that are `free`, with the other unknowns fixed. The free part must be positive definite;
+    /// `None` where it is not, or only by [`ROUNDING`].
     #[inline]
     pub fn of_free(a: &Matrix<N>, free: [bool; N]) -> Option<Self> {
         let factors =
@@ -52,13 +52,13 @@ impl<const N: usize> Ldl<N> {
         (0..N).all(|k| !free[k] || factors.pivots[k] > 0.0).then_some(factors)
     }
 
-    /// The factors of a positive semidefinite matrix; what it says nothing of, to [`ROUNDING`], is held.
+    /// The factors of a positive semidefinite matrix; an unknown that the matrix does not determine, to [`ROUNDING`], is fixed.
     #[inline]
     pub fn semidefinite(a: &Matrix<N>) -> Self {
         Self::factor(a, |_, pivot, rounding| if pivot > rounding { pivot } else { 0.0 })
     }
 
-    /// The factors of a matrix that is positive definite but for rounding: no pivot is below [`ROUNDING`].
+    /// The factors of a matrix that is positive definite except for rounding: every pivot is raised to at least [`ROUNDING`].
     #[inline]
     pub fn regularised(a: &Matrix<N>) -> Self {
         Self::factor(a, |_, pivot, rounding| pivot.max(rounding))
@@ -72,13 +72,13 @@ impl<const N: usize> Ldl<N> {
         Self { lower, pivots, inverse_pivots: pivots.map(f64::recip) }
     }
 
-    /// Row by row (Golub and Van Loan, *Matrix Computations*, 4.1.2). `pivot_of` is told which pivot it is, what elimination
-    /// leaves of it, and what of that is rounding; it says which pivot to use, 0 to hold the unknown.
+    /// Factors row by row (Golub and Van Loan, *Matrix Computations*, 4.1.2). The arguments of `pivot_of` are the index of the pivot, its value
+    /// after elimination, and the rounding error of that value. It returns the pivot to use, or 0 to fix the unknown.
     #[inline(always)]
     fn factor(a: &Matrix<N>, pivot_of: impl Fn(usize, f64, f64) -> f64) -> Self {
         let mut factors = Self { lower: [[0.0; N]; N], pivots: [0.0; N], inverse_pivots: [0.0; N] };
         for i in 0..N {
-            // L·D of this row, of which D is taken off afterwards.
+            // L·D of this row; the division by D follows afterwards.
             let mut row = [0.0; N];
             let mut left = a[i][i];
             for j in 0..i {
@@ -97,13 +97,13 @@ impl<const N: usize> Ldl<N> {
         factors
     }
 
-    /// 1/D, 0 for what is held.
+    /// 1/D; 0 for a fixed unknown.
     #[inline]
     pub fn inverse_pivots(&self) -> &[f64; N] {
         &self.inverse_pivots
     }
 
-    /// R = L·√D, for which A = R·Rᵀ; a column of zeros for what is held.
+    /// R = L·√D, so that A = R·Rᵀ; a column of zeros for a fixed unknown.
     #[inline]
     pub fn root(&self) -> Matrix<N> {
         let roots = self.pivots.map(f64::sqrt);
@@ -163,13 +163,13 @@ impl<const N: usize> Ldl<N> {
         inverse
     }
 
-    /// det A, without what is held.
+    /// det A over the unknowns that are not fixed.
     #[inline]
     pub fn determinant(&self) -> f64 {
         self.pivots.iter().filter(|pivot| **pivot != 0.0).product()
     }
 
-    /// ln det A, without what is held.
+    /// ln det A over the unknowns that are not fixed.
     #[inline]
     pub fn log_determinant(&self) -> f64 {
         self.pivots.iter().filter(|pivot| **pivot != 0.0).map(|pivot| pivot.ln()).sum()
@@ -218,10 +218,10 @@ pub fn principal_direction([xx, xy, yy]: [f64; 3]) -> [f64; 2] {
     [cos, sin]
 }
 
-/// The solution of A·x = b for any matrix A; not finite where there is none.
+/// The solution of A·x = b for any matrix A; not finite for a singular one.
 ///
-/// Corrected once by what is left over, elimination answers to rounding for equations near those given, entry by entry,
-/// whatever the size of each (Skeel, Math. Comp. 35, 1980).
+/// One correction from the residual makes elimination exact for equations near the given ones: to rounding, entry by entry,
+/// for any size of each entry (Skeel, Math. Comp. 35, 1980).
 pub fn solve_general<const N: usize>(a: &Matrix<N>, b: &[f64; N]) -> [f64; N] {
     let solution = eliminated(*a, *b);
     let left_over = std::array::from_fn(|i| b[i] - dot(&a[i], &solution));
@@ -229,7 +229,7 @@ pub fn solve_general<const N: usize>(a: &Matrix<N>, b: &[f64; N]) -> [f64; N] {
     std::array::from_fn(|i| solution[i] + correction[i])
 }
 
-/// By elimination with the largest pivot of rows of equal size.
+/// The solution by elimination with the largest pivot, after scaling the rows to equal size.
 fn eliminated<const N: usize>(mut a: Matrix<N>, mut b: [f64; N]) -> [f64; N] {
     for (row, right) in a.iter_mut().zip(&mut b) {
         let size = row.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
@@ -318,7 +318,7 @@ mod tests {
 
     #[test]
     fn a_matrix_that_is_singular_to_rounding_is_not_positive_definite() {
-        // Of the second unknown (1 + share)·10⁻⁶ − 10⁻⁶ is left, in other units than the first.
+        // The remainder of the second unknown is (1 + share)·10⁻⁶ − 10⁻⁶, in other units than the first.
         let a = |share: f64| [[1e6, 1.0], [1.0, (1.0 + share) * 1e-6]];
         assert!(
             Ldl::new(&a(2e-14)).is_some() && Ldl::new(&a(0.0)).is_none() && Ldl::new(&a(-1e-3)).is_none()

@@ -2,12 +2,12 @@
 //! *The multifrontal solution of indefinite sparse symmetric linear equations*, 1983; Liu, *The multifrontal method for sparse
 //! matrix solution: theory and practice*, 1992).
 //!
-//! Columns of L that follow each other and have nearly the same pattern are a supernode. It is eliminated in a small dense
-//! matrix, its front, whose rows and columns are that pattern: its columns of A, to which the update matrices of its children
-//! are added; of which the first columns are factored; what they take off the others is the update matrix for the parent, the
-//! supernode of the first row that is left. So nearly all multiply-adds are in products of dense matrices.
+//! Consecutive columns of L with nearly the same pattern are a supernode. It is eliminated in a small dense matrix, its front, with that pattern
+//! for rows and columns. The front is the sum of its columns of A and the update matrices of its children. The first columns are factored.
+//! The effect of these columns on the other ones is the update matrix for the parent, the supernode of the first remaining row. So nearly all
+//! multiply-adds are in products of dense matrices.
 //!
-//! Columns are eliminated in their order in A. One that keeps L sparse, such as nested dissection, is the caller's to choose.
+//! Columns are eliminated in their order in A. The caller chooses an order that keeps L sparse, such as nested dissection.
 
 use std::mem;
 use std::ops::Range;
@@ -18,24 +18,24 @@ use ndarray::{ArrayView2, ArrayViewMut2};
 use super::cholesky::factor_leading;
 use super::watch::{Cancelled, Watch};
 
-/// Columns of L that are stored side by side, at most.
+/// Largest number of columns of L in one panel.
 const PANEL: usize = 64;
 
-/// Supernodes of fewer columns take in their parent's next one though up to [`MOST_ZEROS`] of what is stored becomes zeros:
-/// larger fronts are worth that.
+/// A supernode with fewer columns merges with its parent's next column even when a share of up to [`MOST_ZEROS`] of the stored entries
+/// becomes zeros: larger fronts are worth that.
 const SMALL: usize = 48;
 const MOST_ZEROS: f64 = 0.2;
 
-/// As [`MOST_ZEROS`], in supernodes that are large enough.
+/// Largest share of zeros in larger supernodes, as [`MOST_ZEROS`].
 const FEW_ZEROS: f64 = 0.02;
 
-/// Stage of the work, for the watch.
+/// Name of the stage, for the watch.
 const STAGE: &str = "factoring the equations";
-/// Columns whose patterns are found, and multiply-adds of a solution, between two looks whether to go on: some milliseconds.
+/// Columns in the search for patterns, and multiply-adds of a solution, between two checks of the watch: some milliseconds.
 const COLUMNS_EACH: usize = 1 << 10;
 const PRODUCTS_EACH: usize = 1 << 23;
 
-/// A symmetric matrix, which grows by columns: its elements on and below the diagonal.
+/// A symmetric matrix that grows by columns: its elements on and below the diagonal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SparseSymmetric {
     column_starts: Vec<usize>,
@@ -43,11 +43,11 @@ pub struct SparseSymmetric {
     values: Vec<f64>,
 }
 
-/// The factor L of A = L·Lᵀ, lower triangular and sparse. It is computed by one thread.
+/// The factor L of A = L·Lᵀ, lower triangular and sparse, computed by one thread.
 pub struct SparseCholesky {
     size: usize,
     panels: Vec<Panel>,
-    /// The panels' numbers, one panel after the other.
+    /// The entries of the panels, one panel after the other.
     values: Vec<f64>,
 }
 
@@ -55,28 +55,28 @@ pub struct SparseCholesky {
 struct Panel {
     columns: Range<usize>,
     below: Vec<usize>,
-    /// Index of its first number.
+    /// Index of the panel's first entry.
     start: usize,
 }
 
 /// Columns that are eliminated together.
 struct Supernode {
     columns: Range<usize>,
-    /// Rows and columns of its front, ascending: the supernode's own, then those below.
+    /// Rows and columns of the front, ascending: the supernode's own, then those below.
     pattern: Vec<usize>,
-    /// Elements below the diagonal of its columns of L that are known to be 0 and stored nevertheless.
+    /// Stored elements below the diagonal of the supernode's columns of L that are known to be 0.
     zeros: usize,
 }
 
-/// The update matrices that wait for the fronts of their parents.
+/// The update matrices for fronts that are not yet assembled.
 struct Fronts<'a> {
-    /// By the first row of their pattern.
+    /// Updates by the first row of their pattern.
     waiting: Vec<Vec<Update<'a>>>,
-    /// Of each row of the matrix, where it is in the present front.
+    /// The place of each row of the matrix in the present front.
     places: Vec<usize>,
 }
 
-/// Update of rows and columns further on by the elimination of a supernode.
+/// Update of later rows and columns by the elimination of a supernode.
 struct Update<'a> {
     pattern: &'a [usize],
     /// The lower triangle, row by row.
@@ -98,7 +98,7 @@ pub enum SparseCholeskyError {
         /// Rows of the matrix.
         size: usize,
     },
-    /// Whoever watched the work stopped it.
+    /// The watch stopped the work.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
@@ -113,7 +113,7 @@ impl SparseSymmetric {
         }
     }
 
-    /// Adds the next column: row and value of its elements. Those above the diagonal are left out, for their mirror images
+    /// Adds the next column: row and value of its elements. Elements above the diagonal are ignored, because their mirror images
     /// are in earlier columns.
     pub fn push_column(&mut self, elements: impl IntoIterator<Item = (usize, f64)>) {
         let column = self.size();
@@ -141,15 +141,15 @@ impl SparseCholesky {
     /// [`SparseCholeskyError`] when it is not positive definite, or too large.
     ///
     /// # Panics
-    /// When an element's row is beyond the last column.
+    /// When the row of an element is beyond the last column.
     pub fn new(matrix: &SparseSymmetric) -> Result<Self, SparseCholeskyError> {
         Self::new_watched(matrix, Watch::NONE)
     }
 
-    /// The same, watched: from one supernode to the next it may be stopped.
+    /// Factors `matrix`, watched: the watch can stop the work after each supernode.
     ///
     /// # Errors
-    /// Those of [`SparseCholesky::new`], and [`SparseCholeskyError::Cancelled`].
+    /// The errors of [`SparseCholesky::new`], and [`SparseCholeskyError::Cancelled`].
     ///
     /// # Panics
     /// As [`SparseCholesky::new`].
@@ -177,17 +177,17 @@ impl SparseCholesky {
         Ok(factor)
     }
 
-    /// The solution x of A·x = b in the place of b; or of several b, one after the other, in one sweep through the factor,
-    /// whose reading from memory bounds a sweep for one.
+    /// Replaces b by the solution x of A·x = b. Several b, one after the other, are solved in one sweep through the factor: the time of
+    /// a sweep for one b is that of reading the factor from memory.
     ///
     /// # Panics
-    /// When b is not as long as the matrix, or a multiple of that.
+    /// When the length of b is not a multiple of the matrix size.
     pub fn solve_in_place(&self, b: &mut [f64]) {
         let done = self.solve_in_place_watched(b, Watch::NONE);
         debug_assert_eq!(done, Ok(()), "nobody watches");
     }
 
-    /// The same, watched; where it was stopped, b is left unsolved.
+    /// Solves as [`SparseCholesky::solve_in_place`], watched; b is not a solution after a stop.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch stopped it.
@@ -201,7 +201,7 @@ impl SparseCholesky {
         }
         let count = b.len() / self.size;
         let mut b = ArrayViewMut2::from_shape((count, self.size), b).expect("whole right-hand sides");
-        // The numbers of one row, of all right-hand sides, side by side.
+        // For each row, the entries of all right-hand sides side by side.
         let mut x: Vec<f64> = b.t().iter().copied().collect();
         let mut products = 0;
         let mut look = |panel: &Panel| {
@@ -225,7 +225,7 @@ impl SparseCholesky {
         Ok(())
     }
 
-    /// Number of stored entries of L, some zeros among them.
+    /// Number of stored entries of L, including some zeros.
     pub fn stored_numbers(&self) -> usize {
         self.values.len()
     }
@@ -245,7 +245,7 @@ impl SparseCholesky {
         }
     }
 
-    /// The square of a panel, and what is below it.
+    /// The square on the diagonal of a panel, and the rows below it.
     fn blocks(&self, panel: &Panel) -> (&[f64], ArrayView2<'_, f64>) {
         let (width, height) = (panel.columns.len(), panel.below.len());
         let (square, below) = self.values[panel.start..].split_at(width * width);
@@ -253,10 +253,10 @@ impl SparseCholesky {
         (square, below.expect("rows as long as the panel is wide"))
     }
 
-    /// The panel's columns of L⁻¹·x, in place.
+    /// Computes the panel's columns of L⁻¹·x, in place.
     fn solve_lower(&self, panel: &Panel, count: usize, x: &mut [f64]) {
         let own = &mut x[panel.columns.start * count..panel.columns.end * count];
-        // A load at a few places concerns few of the panels.
+        // A load at a few places affects few of the panels.
         if own.iter().all(|x| *x == 0.0) {
             return;
         }
@@ -278,7 +278,7 @@ impl SparseCholesky {
         }
     }
 
-    /// The panel's rows of L⁻ᵀ·x, in place.
+    /// Computes the panel's rows of L⁻ᵀ·x, in place.
     fn solve_upper(&self, panel: &Panel, count: usize, x: &mut [f64]) {
         let width = panel.columns.len();
         let (square, below) = self.blocks(panel);
@@ -302,12 +302,12 @@ impl SparseCholesky {
 }
 
 impl Supernode {
-    /// Rows below its columns.
+    /// Rows below the supernode's columns.
     fn below(&self) -> &[usize] {
         &self.pattern[self.columns.len()..]
     }
 
-    /// Takes in the next column, which brings `rows` that its pattern lacks, unless too much of it became zeros.
+    /// Merges the next column, which adds `rows` to the pattern, unless too many stored entries would be zeros.
     fn take_in(&mut self, rows: &[usize]) -> bool {
         let width = self.columns.len();
         let zeros = self.zeros + width * rows.len();
@@ -324,7 +324,7 @@ impl Supernode {
         taken
     }
 
-    /// Its own columns in the front, in panels.
+    /// The supernode's columns in the front, in panels.
     fn panels(&self) -> impl Iterator<Item = Range<usize>> {
         let width = self.columns.len();
         (0..width).step_by(PANEL).map(move |start| start..width.min(start + PANEL))
@@ -335,14 +335,14 @@ impl Supernode {
     }
 }
 
-/// The supernodes of a matrix. A supernode takes in the column behind it when that is the first row below it, and when it then
+/// The supernodes of a matrix. A supernode merges with the next column when that is the first row below it, and when it then
 /// stores few zeros (relaxed supernodes: Ashcraft and Grimes, *The influence of relaxed supernode partitions on the multifrontal
 /// method*, 1989).
 fn supernodes(matrix: &SparseSymmetric, watch: Watch) -> Result<Vec<Supernode>, Cancelled> {
     let mut supernodes: Vec<Supernode> = Vec::new();
-    // Of each column, its children: the supernodes of which it is the first row below.
+    // The children of each column: the supernodes with it as their first row below.
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); matrix.size()];
-    // Of each row, the last supernode that was found to have it in its pattern.
+    // The last supernode so far with each row in its pattern.
     let mut owner = vec![usize::MAX; matrix.size()];
     for column in 0..matrix.size() {
         if column % COLUMNS_EACH == 0 {
@@ -380,7 +380,7 @@ impl<'a> Fronts<'a> {
         Self { waiting: (0..size).map(|_| Vec::new()).collect(), places: vec![0; size] }
     }
 
-    /// Writes the lower triangle of a supernode's front before its elimination: its columns of the matrix, and the update
+    /// Writes the lower triangle of a supernode's front before its elimination: the sum of its columns of the matrix and the update
     /// matrices of its children.
     fn assemble(&mut self, matrix: &SparseSymmetric, node: &Supernode, front: &mut [f64]) {
         let size = node.pattern.len();
@@ -414,7 +414,7 @@ impl<'a> Fronts<'a> {
         }
     }
 
-    /// Keeps what the elimination of a supernode left of its front; `None` when there is no memory for it.
+    /// Keeps the update that remains after the elimination of a supernode; `None` when memory is insufficient.
     fn keep_update(&mut self, node: &'a Supernode, front: &[f64]) -> Option<()> {
         let (size, width) = (node.pattern.len(), node.columns.len());
         let Some(parent) = node.below().first() else { return Some(()) };
@@ -451,7 +451,7 @@ mod tests {
     use super::*;
     use crate::Cholesky;
 
-    /// A symmetric matrix with a heavy diagonal, of which about one element in `rarity` is not 0, sparse and dense.
+    /// A symmetric matrix with a dominant diagonal, sparse and dense; about one element in `rarity` is not 0.
     fn matrices(elements: &[f64], rarity: usize) -> (SparseSymmetric, Array2<f64>) {
         let size = elements.len();
         let element = |i: usize, j: usize| match (i.min(j), i.max(j)) {
@@ -573,7 +573,7 @@ mod tests {
 
     #[test]
     fn a_factor_too_large_for_memory_is_refused() {
-        // An arrow whose shaft is eliminated last fills nothing, one whose shaft is eliminated first fills everything.
+        // An arrow matrix fills completely when its shaft is eliminated first, and not at all when it is eliminated last.
         let size = 3_000_000;
         let mut matrix = SparseSymmetric::with_capacity(2 * size);
         matrix.push_column((0..size).map(|row| (row, 1.0)));

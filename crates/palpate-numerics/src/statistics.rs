@@ -1,18 +1,18 @@
 //! Means, variances, percentiles.
 
-/// The mean; NaN of nothing.
+/// The mean; NaN for no values.
 pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = values.into_iter().fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
     sum / count
 }
 
-/// The mean, and the mean square of the differences to it.
+/// The mean, and the mean square of the differences from it.
 pub fn mean_and_variance<I: Iterator<Item = f64> + Clone>(values: I) -> (f64, f64) {
     let middle = mean(values.clone());
     (middle, mean(values.map(|value| (value - middle).powi(2))))
 }
 
-/// The standard error of the mean, √(Σ(v − mean)²/(n − 1)/n); 0 of a single value.
+/// The standard error of the mean, √(Σ(v − mean)²/(n − 1)/n); 0 for a single value.
 pub fn standard_error(values: &[f64]) -> f64 {
     let (_, variance) = mean_and_variance(values.iter().copied());
     (variance / (values.len() as f64 - 1.0).max(1.0)).sqrt()
@@ -23,7 +23,7 @@ pub fn root_mean_square(values: &[f64]) -> f64 {
     mean(values.iter().map(|value| value * value)).sqrt()
 }
 
-/// The `percent`-th percentile of values in rising order, linear between them; `None` of nothing.
+/// The `percent`-th percentile of ascending values, with linear interpolation; `None` for no values.
 pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let place = percent.clamp(0.0, 100.0) / 100.0 * last as f64;
@@ -32,16 +32,16 @@ pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
     Some(low + (high - low) * place.fract())
 }
 
-/// The middle one of values in any order, or the mean of the two middle ones; `None` of nothing.
+/// The median of values in any order; `None` for no values.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     percentile(&values, 50.0)
 }
 
-/// Fewest errors that bound a 95 % interval: of fewer, [`conformal_95`] has none.
+/// Smallest number of errors that bound a 95 % interval: [`conformal_95`] is `None` for fewer.
 pub const FEWEST_FOR_95: usize = 19;
 
-/// Number ⌈0.95·(n + 1)⌉ of n sizes of errors in rising order, which a further one like them does not exceed with probability at least 0.95; `None` of
+/// The ⌈0.95·(n + 1)⌉-th smallest of n absolute errors: a further exchangeable one does not exceed it with probability at least 0.95. `None` for
 /// fewer than [`FEWEST_FOR_95`]. Vovk, Gammerman and Shafer, *Algorithmic Learning in a Random World* (2005).
 pub fn conformal_95(mut sizes: Vec<f64>) -> Option<f64> {
     sizes.sort_by(f64::total_cmp);
@@ -49,13 +49,14 @@ pub fn conformal_95(mut sizes: Vec<f64>) -> Option<f64> {
     sizes.get(number.checked_sub(1)?).copied()
 }
 
-/// Bound of the sizes of errors that come in groups: one of a further group does not exceed it with a probability of about 0.95. `None` of fewer than
-/// [`FEWEST_FOR_95`] groups, and of an empty one.
+/// Bound of absolute errors that come in groups: an error of a further group does not exceed it with a probability of about 0.95. `None` for
+/// fewer than [`FEWEST_FOR_95`] groups, and for an empty group.
 ///
-/// Every group has the same weight, and shares it between its sizes: their distribution is the mean of the groups' (Dunn, Wasserman and Ramdas, *Journal of the American
-/// Statistical Association* 118, 2023: pooled CDFs). Of n independent sizes the bound is their quantile at 0.95·(n + 1)/n, as in [`conformal_95`]. Sizes of one
-/// group may be alike; n is the number of independent ones whose mean would scatter as the mean of the groups does (Kish, *Survey Sampling*, 1965: the
-/// effective sample size), at least the number of groups. Quantiles are interpolated between sizes (Hutson, *Statistics and Probability Letters* 42, 1999).
+/// Every group has the same weight, and shares it between its errors: their distribution is the mean of the groups' distributions (Dunn,
+/// Wasserman and Ramdas, *Journal of the American Statistical Association* 118, 2023: pooled CDFs). For n independent errors the bound is their
+/// quantile at 0.95·(n + 1)/n, as in [`conformal_95`]. Errors of one group may be correlated. Therefore n is the effective sample size: the mean of
+/// n independent errors would scatter as the mean of the groups does (Kish, *Survey Sampling*, 1965). It is at least the number of groups.
+/// Quantiles are interpolated between errors (Hutson, *Statistics and Probability Letters* 42, 1999).
 pub fn conformal_95_of_groups(groups: &[&[f64]]) -> Option<f64> {
     const SHARE: f64 = 0.95;
     if groups.len() < FEWEST_FOR_95 || groups.iter().any(|group| group.is_empty()) {
@@ -76,13 +77,13 @@ pub fn conformal_95_of_groups(groups: &[&[f64]]) -> Option<f64> {
     Some(weighted_quantile(&sizes, SHARE * (1.0 + 1.0 / independent)))
 }
 
-/// Quantile of values in rising order with weights that add up to 1, by straight lines between the cumulated weights.
+/// Quantile of ascending values with weights that add up to 1, by linear interpolation between the cumulated weights.
 fn weighted_quantile(values: &[(f64, f64)], share: f64) -> f64 {
     let (mut cumulated, mut below) = (0.0, f64::NAN);
     for (value, weight) in values {
         if cumulated + weight >= share {
             let part = (share - cumulated) / weight;
-            // Immense values that are one have no difference.
+            // Equal values, also immense ones, need no interpolation.
             return if *value > below { below + part * (value - below) } else { *value };
         }
         (cumulated, below) = (cumulated + weight, *value);
@@ -104,7 +105,7 @@ mod tests {
         let repeated: Vec<Vec<f64>> = sizes.iter().map(|size| vec![*size; 7]).collect();
         let repeated: Vec<&[f64]> = repeated.iter().map(Vec::as_slice).collect();
         assert!((bound(&repeated) - bound(&single)).abs() < 1.0);
-        // The sizes of like groups are independent.
+        // The errors of groups with the same values are independent.
         let thousand: Vec<f64> = (1..=1000).map(f64::from).collect();
         assert!((bound(&[thousand.as_slice(); 20]) - 950.0).abs() < 1.0);
         assert_eq!(conformal_95_of_groups(&single[..18]), None);

@@ -1,37 +1,37 @@
-//! Watching long work: progress out, cancellation in.
+//! Progress and cancellation of long work.
 
 /// Progress that long work reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Progress {
     /// One more round of an iteration: an epoch, a step, a fold.
     Round,
-    /// A stage of the work, and the share of it that is done, 0 to 1.
+    /// A stage of the work, and its completed share, 0 to 1.
     Stage {
-        /// The stage, in words.
+        /// Name of the stage.
         name: &'static str,
-        /// The share that is done; NaN where nobody can tell.
+        /// The completed share; NaN where it is unknown.
         share: f64,
     },
-    /// A stage that goes through many of something, so that its rate can be told.
+    /// A stage that counts items, so that a rate can be shown.
     Counted {
-        /// The stage, in words.
+        /// Name of the stage.
         name: &'static str,
-        /// What it goes through, in words and in the plural: "positions".
+        /// Name of the items, in the plural: "positions".
         unit: &'static str,
-        /// How many of them are done.
+        /// Number of completed items.
         done: usize,
-        /// How many there are.
+        /// Number of all items.
         of: usize,
     },
 }
 
-/// Work that was stopped by the one who watched it; what was finished before is kept where the caller keeps it.
+/// Error of work that the watch stopped; a caller may keep the results up to then.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stopped before it was finished")]
 pub struct Cancelled;
 
 impl Cancelled {
-    /// Whether an error says that work was stopped, whatever it is wrapped in.
+    /// True when an error comes from stopped work, at any depth of its chain of sources.
     pub fn caused(error: &(dyn std::error::Error + 'static)) -> bool {
         let mut causes = std::iter::successors(Some(error), |error| error.source());
         causes.any(|error| error.is::<Self>())
@@ -54,10 +54,10 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// Nobody watches: the work goes on to its end.
+    /// No observer: the work runs to its end.
     pub const NONE: Watch<'static> = Watch { observe: None };
 
-    /// Calls `observe` often with the progress; on `false` the work stops.
+    /// Calls `observe` often with the progress; the work stops when it returns `false`.
     pub fn new(observe: &'a (dyn Fn(Progress) -> bool + Sync)) -> Self {
         Self { observe: Some(observe) }
     }
@@ -70,7 +70,7 @@ impl<'a> Watch<'a> {
         self.report(Progress::Round)
     }
 
-    /// Reports the share of a stage that is done.
+    /// Reports the completed share of a stage.
     ///
     /// # Errors
     /// [`Cancelled`] when the work is to stop.
@@ -78,7 +78,7 @@ impl<'a> Watch<'a> {
         self.report(Progress::Stage { name, share })
     }
 
-    /// Reports how many of something a stage has gone through: `watch.counted("all over the surface", "positions", done, of)`.
+    /// Reports the number of completed items of a stage: `watch.counted("all over the surface", "positions", done, of)`.
     ///
     /// # Errors
     /// [`Cancelled`] when the work is to stop.

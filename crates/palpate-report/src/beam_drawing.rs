@@ -9,9 +9,9 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Beam, BeamSection, BeamSupportKind, SupportedBeam, Surface};
 
-/// Position of the drawn load, as a share of the length: off the middle, so that the shape is seen to be askew.
+/// Position of the drawn load, as a share of the length: off the middle, so that the shape is visibly asymmetric.
 const DRAWN_LOAD: f64 = 0.35;
-/// Positions of the drawn load on a beam on any supports: of these, the one where it bends the beam most.
+/// Positions of the drawn load on a beam on any supports; the one where it bends the beam most is used.
 const DRAWN_LOADS: [f64; 5] = [DRAWN_LOAD, 0.2, 0.5, 0.65, 0.8];
 /// Points of the drawn shape.
 const SHAPE_STEPS: u32 = 200;
@@ -24,15 +24,15 @@ const ARROW_TAIL_Y: f64 = 34.0;
 /// Middle of the undeflected beam.
 const BEAM_Y: f64 = 92.0;
 const BEAM_HALF_THICKNESS: f64 = 3.0;
-/// Half the drawn thickness of the thickest stretch of a stepped beam, and of any stretch at least.
+/// Half the drawn thickness of the thickest stretch of a stepped beam, and the least for any stretch.
 const STEPPED_HALF_THICKNESS: (f64, f64) = (5.5, 1.2);
 /// Room beneath the beam for the deflected shape, at its deepest.
 const DEFLECTION_ROOM: f64 = 56.0;
-/// Exaggerations are one of these times a power of ten.
+/// Exaggeration factors are one of these times a power of ten.
 const ROUND: [f64; 10] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
 const SUPPORT_HEIGHT: f64 = 22.0;
 const SUPPORT_HALF_WIDTH: f64 = 12.0;
-/// Ground that springs stand on: beneath the beam at its deepest.
+/// Height of the ground of springs: beneath the beam at its deepest.
 const SPRING_GROUND_Y: f64 = BEAM_Y + DEFLECTION_ROOM + 10.0;
 const PROBE_TOP: f64 = 164.0;
 const PROBE_HEIGHT: f64 = 18.0;
@@ -44,14 +44,14 @@ const NUMBER_SIZE: f64 = 11.0;
 const DIMENSION_LINE: f64 = 30.0;
 const REMARK_LINE: f64 = 26.0;
 
-/// The beam bent by `force_n` newtons, its supports and sensors; and where the force is drawn.
+/// The beam bent by `force_n` newtons, its supports and sensors; and the position of the drawn force.
 pub(super) fn beam_drawing(beam: &Beam, layout: &Layout, force_n: f64) -> (BeamDrawing, Position) {
     let supports = [0.0, beam.length_m()].map(|at_m| (at_m * 1e3, BeamSupportKind::Simple)).to_vec();
     let load = Position::along(DRAWN_LOAD * beam.length_m());
     (BeamDrawing { supports, ..BeamDrawing::new(beam, layout, load, force_n) }, load)
 }
 
-/// The beam on any supports, bent by `force_n` newtons; and where the force is drawn.
+/// The beam on any supports, bent by `force_n` newtons; and the position of the drawn force.
 pub(super) fn supported_beam_drawing(
     beam: &SupportedBeam,
     layout: &Layout,
@@ -70,14 +70,14 @@ pub(super) fn supported_beam_drawing(
     (drawing, load)
 }
 
-/// Drawing of a loaded beam. Positions are from the left end of the beam; one that a rounding error puts beyond an end is drawn at
+/// Drawing of a loaded beam. Positions are from the left end of the beam; a position beyond an end, by a rounding error, is drawn at
 /// the end.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct BeamDrawing {
     pub length_mm: f64,
     /// Position and kind of each support.
     pub supports: Vec<(f64, BeamSupportKind)>,
-    /// End and thickness, in millimetres, of each stretch, from left to right; empty for a beam that has one thickness.
+    /// End and thickness, in millimetres, of each stretch, from left to right; empty for a beam with one thickness.
     pub steps: Vec<(f64, f64)>,
     /// Position of each sensor; they are numbered from 1 in this order.
     pub sensors_mm: Vec<f64>,
@@ -136,7 +136,7 @@ struct Frame {
     length_mm: f64,
     px_per_mm: f64,
     exaggeration: f64,
-    /// The point of the largest deflection in millimetres; none for a beam that is not deflected.
+    /// The point of the largest deflection in millimetres; `None` for a beam without deflection.
     deepest: Option<(f64, f64)>,
     /// The deflected shape in pixels.
     shape: Vec<Point>,
@@ -166,7 +166,7 @@ impl Frame {
         (self.across(position_mm), BEAM_Y - deflection_mm * self.px_per_mm * self.exaggeration)
     }
 
-    /// Height of the deflected shape there, or of the straight beam where no shape is given.
+    /// Height of the deflected shape at `across`, or of the straight beam if no shape is given.
     fn surface_y(&self, across: f64) -> f64 {
         let around = self.shape.windows(2).find(|ends| (ends[0].0..=ends[1].0).contains(&across));
         around.map_or(BEAM_Y, |ends| {
@@ -190,7 +190,7 @@ fn round_below(most: f64) -> f64 {
     ROUND.into_iter().rev().map(|factor| factor * decade).find(|&factor| factor <= most).unwrap_or(decade)
 }
 
-/// The sensors' numbers, in as many rows as keep them apart; and how many rows.
+/// The sensors' numbers, in as many rows as keep them apart; and the number of rows.
 fn number_labels(drawing: &BeamDrawing, frame: &Frame) -> (Vec<Label>, usize) {
     let mut rows = text::Rows::default();
     let label = |(index, &position_mm): (usize, &f64)| {
@@ -205,7 +205,7 @@ fn number_labels(drawing: &BeamDrawing, frame: &Frame) -> (Vec<Label>, usize) {
     (labels, rows.count())
 }
 
-/// Probes that stand beneath the beam and touch it.
+/// Draws the probes, which stand beneath the beam and touch it.
 fn draw_sensors(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     let colour = palette(2);
     for &position_mm in &drawing.sensors_mm {
@@ -216,7 +216,7 @@ fn draw_sensors(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     }
 }
 
-/// Half the drawn thickness of the stretch that holds a position.
+/// Half the drawn thickness of the stretch that contains a position.
 fn half_thickness(drawing: &BeamDrawing, position_mm: f64) -> f64 {
     let thickest_mm = drawing.steps.iter().map(|step| step.1).fold(0.0, f64::max);
     let (largest, least) = STEPPED_HALF_THICKNESS;
@@ -226,7 +226,7 @@ fn half_thickness(drawing: &BeamDrawing, position_mm: f64) -> f64 {
     }
 }
 
-/// The beam as it is without a load.
+/// Draws the beam without a load.
 fn draw_beam(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     let mut left = MARGIN;
     let ends_mm = drawing.steps.iter().map(|step| step.0);
@@ -237,7 +237,7 @@ fn draw_beam(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     }
 }
 
-/// One support, where the beam rests on it.
+/// Draws one support at its position on the beam.
 fn draw_support(
     svg: &mut Svg,
     drawing: &BeamDrawing,
@@ -253,7 +253,7 @@ fn draw_support(
             svg.polygon(&[(across, top), feet[0], feet[1]], QUIET_INK);
         }
         BeamSupportKind::Clamped => {
-            // An end is held from beyond it, the beam between its ends from both sides.
+            // An end is clamped from its outer side, and a place between the ends from both sides.
             let (left, right) = if position_mm <= 0.0 {
                 (across - SUPPORT_HALF_WIDTH, across)
             } else if position_mm >= drawing.length_mm {
@@ -279,7 +279,7 @@ fn draw_support(
     }
 }
 
-/// A zigzag that stands on the ground and carries the point.
+/// Draws a zigzag that stands on the ground and carries the point.
 fn draw_spring(svg: &mut Svg, (across, top): Point) {
     const TURNS: usize = 6;
     let foot = SPRING_GROUND_Y;
@@ -296,7 +296,7 @@ fn draw_spring(svg: &mut Svg, (across, top): Point) {
     svg.line(&[(across - SUPPORT_HALF_WIDTH, foot), (across + SUPPORT_HALF_WIDTH, foot)], 2.0, QUIET_INK);
 }
 
-/// The deflected shape and its largest deflection.
+/// Draws the deflected shape and its largest deflection.
 fn draw_deflection(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     let colour = palette(0);
     svg.line(&frame.shape, 2.5, colour);
@@ -319,7 +319,7 @@ fn draw_load(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     svg.text(&frame.centred(&drawing.load_label, (across, LOAD_LABEL_Y), FONT_SIZE + 1.0, colour));
 }
 
-/// The beam's length between two ticks.
+/// Draws the beam's length between two ticks.
 fn draw_dimension(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame, y: f64) {
     let middle = frame.width / 2.0;
     let text = format!("{} mm", plain(drawing.length_mm));
@@ -341,7 +341,7 @@ fn draw_remark(svg: &mut Svg, frame: &Frame, y: f64) {
     svg.text(&frame.centred(&remark, (frame.width / 2.0, y), FONT_SIZE - 1.0, QUIET_INK));
 }
 
-/// A vertical line between two points with a head at each end, where it is long enough for them.
+/// Draws a vertical line between two points, with a head at each end if it is long enough for them.
 fn double_arrow(svg: &mut Svg, start: Point, end: Point, colour: Colour) {
     svg.line(&[start, end], 1.0, colour);
     let downward = (end.1 - start.1).signum();
@@ -351,14 +351,14 @@ fn double_arrow(svg: &mut Svg, start: Point, end: Point, colour: Colour) {
     }
 }
 
-/// A filled triangle with its tip at the point, pointing along the unit vector.
+/// Draws a filled triangle with its tip at the point, pointing along the unit vector.
 fn arrow_head(svg: &mut Svg, tip: Point, along: Point, length: f64, colour: Colour) {
     let back = (tip.0 - along.0 * length, tip.1 - along.1 * length);
     let aside = (-along.1 * length * 0.4, along.0 * length * 0.4);
     svg.polygon(&[tip, (back.0 + aside.0, back.1 + aside.1), (back.0 - aside.0, back.1 - aside.1)], colour);
 }
 
-/// Three significant digits.
+/// A number with three significant digits.
 fn rounded(value: f64) -> String {
     let unit = 10_f64.powf(value.abs().log10().floor() - 2.0);
     plain((value / unit).round() * unit)

@@ -1,4 +1,4 @@
-//! The bench drawn, and where layouts have their sensors.
+//! Drawings of the bench, and of the sensors of layouts.
 
 use maud::html;
 
@@ -10,7 +10,7 @@ use super::{Axis, Chart, Mark, Marker, Series};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::SurfaceSpec;
 
-/// `what` ("The bench") with these sensors and its surface bent by `force_n` newtons; nothing where it cannot be drawn.
+/// `what` ("The bench") with these sensors and its surface bent by `force_n` newtons; `None` if it cannot be drawn.
 pub(super) fn bench_figure(
     what: &str,
     surface: &SurfaceSpec,
@@ -35,7 +35,7 @@ pub(super) fn bench_figure(
     Some(Figure::beam(format!("{what}: beam, supports, sensors and load"), &drawing, caption))
 }
 
-/// Chart of the sensors of some layouts: a named row each, the first uppermost; a marker for each kind of sensor.
+/// Chart of the sensors of some layouts: a named row for each, the first uppermost; a marker for each kind of sensor.
 pub(super) fn sites_chart(layouts: &[(String, &Layout)], length_m: f64, marks: Vec<Mark>) -> Chart {
     let kinds = SensorKind::ALL.into_iter().enumerate().filter_map(|(colour, kind)| {
         let of_row = |(row, (_, layout)): (usize, &(String, &Layout))| -> Vec<(f64, f64)> {
@@ -59,7 +59,7 @@ pub(super) fn row_axis(names: &[&str]) -> Axis {
     Axis::default().from_to(0.4, rows as f64 + 0.6).named(named.collect())
 }
 
-/// Height of a row on such an axis.
+/// Height of a row on an axis of [`row_axis`].
 pub(super) fn row_height(rows: usize, row: usize) -> f64 {
     (rows - row) as f64
 }

@@ -12,9 +12,9 @@ use palpate_estimators::evaluation::{ErrorSummary, Evaluation, limit_ratio, perc
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::surface::Extent;
 
-/// Stretches of the surface over which errors are summed up.
+/// Number of stretches of the surface for which errors are averaged.
 const STRETCHES: usize = 40;
-/// Maps that fit beside each other; estimators beyond them are in the table alone.
+/// Greatest number of maps beside each other; further estimators are only in the table.
 const MOST_MAPS: usize = 9;
 
 /// Contents of a comparison's report.
@@ -24,13 +24,13 @@ pub struct ComparisonReport<'a> {
     pub title: &'a str,
     /// The surface and its sensors.
     pub setup: &'a Setup,
-    /// Trials that the estimators are compared on, in words.
+    /// Trials by which the estimators are compared, in words.
     pub trials: &'a str,
     /// The estimators, best first.
     pub comparisons: &'a [Comparison],
-    /// Kinds that do not suit the rig or the recording, and why.
+    /// Kinds that do not suit the rig or the recording, with the reasons.
     pub left_out: &'a [(&'static str, String)],
-    /// Errors up to this are good enough for the effective length, in metres.
+    /// Largest error in metres that counts for the effective length.
     pub tolerance_m: f64,
     /// Seed of simulation and fits.
     pub seed: u64,
@@ -145,9 +145,9 @@ impl ComparisonReport<'_> {
         }
     }
 
-    /// A line an estimator.
+    /// One line for each estimator.
     fn series(&self, points: impl Fn(&Evaluation) -> Vec<(f64, f64)>) -> Vec<Series> {
-        // The last colour is black, which the limit has.
+        // The last colour is black, which is that of the limit.
         const COLOURS: usize = 6;
         let series = |(i, comparison): (usize, &Comparison)| {
             let (label, points) = (comparison.estimator.name(), points(&comparison.tried.evaluation));

@@ -1,4 +1,4 @@
-//! The report of a sensor design: layouts by several methods, judged alike.
+//! The report of a sensor design: layouts by several methods, all judged in the same way.
 
 use maud::{Markup, html};
 
@@ -19,7 +19,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::LimitCurve;
 use palpate_mechanics::surface::Extent;
 
-/// Cells of a map, about, and the least and the most of them along each side.
+/// Approximate number of cells of a map, and the least and greatest number along each side.
 const CELLS: f64 = 1600.0;
 const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=160;
 
@@ -36,7 +36,7 @@ pub struct SensorDesignReport<'a> {
     pub designed: &'a [Designed],
     /// Errors of simulated calibrations, for some of the layouts.
     pub verified: &'a [(Method, Verification)],
-    /// Layouts of other numbers of sensors; empty where none were asked for.
+    /// Layouts of other numbers of sensors; empty if none were requested.
     pub counts: &'a [CountPoint],
     /// The seed of searches and simulations.
     pub seed: u64,
@@ -61,12 +61,12 @@ pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
         section.text(report.counts_in_words()).figure(figure)
     }));
     sections.push(Section::new("given", "What was given").text(report.given()));
-    sections.push(Section::new("meaning", "How layouts are found and judged").text(meaning()));
+    sections.push(Section::new("meaning", "Search and scores of layouts").text(meaning()));
     Page::new(report.title, report.summary(), sections).with_source(html! { ", seed " (report.seed) }).files()
 }
 
 impl<'a> SensorDesignReport<'a> {
-    /// The even layout, or today's where its sensors are kept.
+    /// The even layout, or the present one if its sensors are kept.
     fn even(&self) -> Option<&'a Designed> {
         self.problem.reference(self.designed)
     }
@@ -175,7 +175,7 @@ impl<'a> SensorDesignReport<'a> {
         Figure::chart(&chart, html! { "The sensors of every layout, a row each." })
     }
 
-    /// The limit along the surface, even and best, and where their sensors are.
+    /// The limit along the surface for the even and the best layout, and the positions of their sensors.
     fn limit_figure(&self) -> Option<Figure> {
         let (even, best) = (self.even(), self.best()?);
         let name = |designed: &Designed| format!("limit, {} layout", designed.method.name());
@@ -331,7 +331,7 @@ impl<'a> SensorDesignReport<'a> {
                     ", " (stated(self.problem.force_n())) " N, force " (self.problem.force().name())
                     @let left_out = self.problem.contacts_over_supports().len();
                     @if left_out > 0 {
-                        ", of which those over supports (" (left_out) "), where no layout tells a force that is not known, are left out of scores and limits"
+                        ", of which those over supports (" (left_out) "), where no layout determines an unknown force, are left out of scores and limits"
                     }
                     @if !design.contacts.weights.is_empty() { ", some stretches touched more often than others" }
                     "."
@@ -355,10 +355,10 @@ impl<'a> SensorDesignReport<'a> {
 fn score_in_words(criterion: DesignCriterion) -> &'static str {
     match criterion {
         DesignCriterion::MeanLimit => {
-            "the mean limit in mm, each contact's combined with what the surface's size tells"
+            "the mean limit in mm, each contact's combined with the size of the surface"
         }
-        DesignCriterion::WorstLimit => "the largest limit in mm, combined with what the surface's size tells",
-        DesignCriterion::WithinTolerance => "the share of contacts whose limit exceeds the tolerance, in %",
+        DesignCriterion::WorstLimit => "the largest limit in mm, combined with the size of the surface",
+        DesignCriterion::WithinTolerance => "the share of contacts with a limit above the tolerance, in %",
         DesignCriterion::DOptimality => "the mean of ½·ln det of a contact's least covariance",
     }
 }

@@ -1,4 +1,4 @@
-//! Figures of a flexible digit: its shapes, the limit of the force, and what the linear theory would answer.
+//! Figures of a flexible digit: its shapes, the limit of the force, and the errors of the linear theory.
 
 use maud::html;
 
@@ -15,16 +15,16 @@ use palpate_mechanics::surface::{Digit, ForceDirection};
 
 /// Positions of the drawn contacts, as shares of the length.
 const DRAWN_CONTACTS: [f64; 3] = [0.5, 0.75, 1.0];
-/// Positions where the linear theory is judged, as shares of the length: clear of the tip, which an estimate cannot pass.
+/// Positions where the linear theory is judged, as shares of the length: away from the tip, which an estimate cannot pass.
 const JUDGED_CONTACTS: [f64; 3] = [0.45, 0.6, 0.8];
 /// Points of a drawn finger.
 const SHAPE_STEPS: u32 = 120;
-/// Forces of a curve, from a hundredth of the largest load to all of it.
+/// Number of forces of a curve, from a hundredth of the largest load to all of it.
 const FORCES: u32 = 60;
 /// Margin of a chart around the finger, as a share of its length.
 const MARGIN: f64 = 0.06;
 
-/// `what` ("The bench"), the finger as it is and bent by `force_n` newtons at three places; x and y have the same scale.
+/// `what` ("The bench"), the straight finger and its shape under `force_n` newtons at three places; x and y have the same scale.
 pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n: f64) -> Figure {
     let l = digit.length_m();
     let points = |contact: Contact| {
@@ -58,7 +58,7 @@ pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n:
     Figure::chart(&chart, caption)
 }
 
-/// The least standard deviation of the force along the finger.
+/// The limit of the standard deviation of the force along the finger.
 pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
     let points = in_milli(unknown.by_x(|bound| bound.sd_force_n.unwrap_or(f64::NAN)));
     let chart = Chart::new(
@@ -74,8 +74,8 @@ pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
     Figure::chart(&chart, caption)
 }
 
-/// Errors of the linear theory on clean readings: of position and of force by the force, each against the limit of
-/// the exact one. Empty where no estimator suits the bench.
+/// Errors of the linear theory on readings without noise: of position and of force by the force, each against the limit of
+/// the exact theory. Empty if no estimator suits the bench.
 pub(super) fn linear_theory_figures(setup: &Setup, limit: &CramerRaoBound, digit: &Digit) -> Vec<Figure> {
     let Some(theory) = LinearTheory::new(setup, digit) else { return Vec::new() };
     let at_limit = |contact: Contact| {
@@ -83,7 +83,7 @@ pub(super) fn linear_theory_figures(setup: &Setup, limit: &CramerRaoBound, digit
         bound.map_or([f64::NAN; 2], |bound| [bound.sd_position_m, bound.sd_force_n.unwrap_or(f64::NAN)])
     };
     let most_n = Digit::MOST_LOAD * digit.characteristic_force_n();
-    // Contacts at a share of the length, by force; and there a value by force.
+    // Contacts at a share of the length, by force, each with a value.
     let curve = |share: f64, value: &dyn Fn(Contact) -> f64| {
         let contact = |i| {
             let force_n = most_n * 10f64.powf(2.0 * f64::from(i) / f64::from(FORCES) - 2.0);

@@ -1,4 +1,4 @@
-//! Errors along a surface as lines: medians with their bands, the tolerance, and the limit for the eye to compare with.
+//! Errors along a surface as lines: medians with their bands, the tolerance, and the limit for comparison.
 
 use super::numbers::mm;
 use super::{BandPoint, Chart, Mark, Series};
@@ -7,13 +7,13 @@ use palpate_estimators::setup::Setup;
 use palpate_mechanics::limit::{Bound, CramerRaoBound, Force, LimitCurve, LimitError};
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor, SensorKind};
 
-/// The founding paper's readings are clean, and without noise there is no limit. Its errors are drawn against the limit of
-/// the noise that a plain displacement sensor has, as in `examples/paper.toml`.
+/// The founding paper's readings have no noise, and without noise there is no limit. Therefore the figures of its errors show the limit
+/// for the noise of a common displacement sensor, as in `examples/paper.toml`.
 const ASSUMED_NOISE_M: f64 = 5e-6;
 /// Beginning of the line's name in a legend.
 const LABEL: &str = "limit";
 
-/// A line along the medians of some spreads and, where `with_band`, a band from the 5th to the 95th percentile under it.
+/// A line along the medians of some quantiles and, with `with_band`, a band from the 5th to the 95th percentile under it.
 pub(super) fn banded(label: &str, colour: usize, along: &[(f64, Quantiles)], with_band: bool) -> Vec<Series> {
     let line = Series::line(label, colour, along.iter().map(|&(x, spread)| (x, spread.median)).collect());
     let band = along.iter().map(|&(x, spread)| BandPoint { x, low: spread.p05, high: spread.p95 });
@@ -21,18 +21,18 @@ pub(super) fn banded(label: &str, colour: usize, along: &[(f64, Quantiles)], wit
     band.into_iter().chain([line]).collect()
 }
 
-/// The tolerance among errors in mm.
+/// The tolerance as a mark among errors in mm.
 pub(super) fn tolerance_mark(tolerance_m: f64) -> Mark {
     Mark::HorizontalLine { y: tolerance_m * 1e3, label: format!("tolerance, {} mm", mm(tolerance_m)) }
 }
 
-/// The mean error of the best unbiased estimator along a bench's surface, in mm, dashed in black; `None` where there is
-/// none: a surface without a model, clean sensors, a force that is not known.
+/// The mean error of the best unbiased estimator along a bench's surface, in mm, dashed in black; `None` without a
+/// limit: for a surface without a model, sensors without noise, or an unknown force.
 pub(super) fn limit_line(setup: &Setup) -> Option<Series> {
     Some(line(&curve(setup, setup.layout()).ok()?, 6, format!("{LABEL}: what physics allows")))
 }
 
-/// The limit as [`limit_line`] has it; where deflection sensors are clean, the limit for a noise that the legend states.
+/// The limit as of [`limit_line`]; for deflection sensors without noise, the limit for a noise that the legend states.
 pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
     let clean = |sensor: &Sensor| sensor.kind == SensorKind::Deflection && sensor.channel.noise_sd == 0.0;
     match curve(setup, setup.layout()) {
@@ -46,8 +46,8 @@ pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
     }
 }
 
-/// The mean error of the best unbiased estimator of an arm, in mm, dashed; `None` where there is none. The locator knows the force,
-/// or does not; contacts have `force_n` newtons either way.
+/// The mean error of the best unbiased estimator of an arm, in mm, dashed; `None` without a limit. The force is known or unknown,
+/// as for the locator; contacts have `force_n` newtons in both cases.
 pub(super) fn limit_line_of_arm(setup: &Setup, force_n: f64, colour: usize, label: &str) -> Option<Series> {
     let limit = setup.cramer_rao_bound().ok()?;
     let force = setup.force();

@@ -18,7 +18,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_rig::Rig;
 
-/// Greatest number of positions that are drawn as markers; of more, markers would hide each other, and a line is drawn.
+/// Greatest number of positions that are drawn as markers; more markers would cover each other, so a line is drawn.
 const MOST_MARKERS: usize = 80;
 
 /// Contents of an evaluation's report.
@@ -26,30 +26,30 @@ const MOST_MARKERS: usize = 80;
 pub struct EvaluationReport<'a> {
     /// The page's title.
     pub title: &'a str,
-    /// The locator, or the locators, whose answers are judged.
+    /// The locator, or the locators, that made the estimates.
     pub judged: Judged<'a>,
-    /// The answers.
+    /// The estimates.
     pub evaluation: &'a Evaluation,
-    /// The recording that was located.
+    /// The recording with the located readings.
     pub recording: &'a Provenance,
     /// Portions of the surface that are also judged by themselves.
     pub portions: &'a [Portion],
-    /// An error up to this, in metres, is good enough for the effective length.
+    /// Largest error in metres that counts for the effective length.
     pub tolerance_m: f64,
 }
 
-/// Origin of an evaluation's answers.
+/// Origin of the estimates.
 #[derive(Clone, Copy, Debug)]
 pub enum Judged<'a> {
-    /// Answers of a locator.
+    /// Estimates of one locator.
     Locator(&'a Locator),
-    /// Answers of locators of one rig, each fitted without the positions that it was asked for.
+    /// Estimates of several locators of one rig, each fitted without the positions that it located.
     CrossValidated {
         /// The rig.
         rig: &'a Rig,
         /// Number of locators.
         folds: usize,
-        /// The seed of their fits.
+        /// The seed of the fits.
         seed: u64,
     },
 }
@@ -212,8 +212,8 @@ impl EvaluationReport<'_> {
         Axis::linear(label).from_to(0.0, self.evaluation.extent.length_m() * 1e3)
     }
 
-    /// A marker a reading, of where the contact was and where it was seen; where that would be too many, the median of the readings
-    /// at a position and their band.
+    /// The estimated against the true position, with one marker for each reading; for many readings the median at each position and
+    /// its band.
     fn estimates(
         &self,
         label: &str,

@@ -29,8 +29,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Beneath them lie charts and maps, which know nothing of what is drawn: a [`Chart`] is plain data that the caller fills in.
-//! No function touches a file, the clock or the fonts of the machine, so the same data give the same bytes everywhere.
+//! The reports are built from charts and maps, which are independent of their subject: a [`Chart`] is plain data from the caller.
+//! No function reads a file, the clock or the fonts of the machine, so the same data give the same bytes everywhere.
 //!
 //! ```
 //! use palpate_report::{Axis, Chart, Series, chart_to_svg};

@@ -1,4 +1,4 @@
-//! The report of a bench's limit: what physics allows, position by position.
+//! The report of a bench's limit: the least possible error, position by position.
 
 use maud::{Markup, html};
 
@@ -18,9 +18,9 @@ use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve, LimitWarning};
 use palpate_mechanics::sensing::{Sensor, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 
-/// Errors end where the surface does: limits beyond this many lengths are cut off.
+/// Limits beyond this many lengths of the surface are cut off: an error cannot exceed the surface.
 const MOST_LENGTHS: f64 = 10.0;
-/// Cells of a map, about, and the least and the most of them along each side.
+/// Approximate number of cells of a map, and the least and greatest number along each side.
 const CELLS: f64 = 2000.0;
 const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=200;
 
@@ -37,13 +37,13 @@ pub struct LimitReport<'a> {
     pub known: &'a LimitCurve,
     /// The limit all over the surface for an unknown force.
     pub unknown: &'a LimitCurve,
-    /// Knowledge of the force on this bench, which the warnings are about.
+    /// Whether the force is known on this bench; the warnings are about this case.
     pub force: Force,
     /// Warnings of the limit.
     pub warnings: &'a [LimitWarning],
     /// Positions for the table.
     pub listed: &'a [Position],
-    /// The lightest touch that is distinguished from noise.
+    /// The smallest detectable force.
     pub touch: &'a LightestTouch<'a>,
 }
 
@@ -91,14 +91,14 @@ pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
         Section::new("lightest-touch", "The lightest touch")
             .text(report.lightest_touch_in_words())
             .figure(report.touch_figure()),
-        Section::new("warnings", "What this bench cannot tell").text(report.warnings_in_words()),
+        Section::new("warnings", "What this bench cannot determine").text(report.warnings_in_words()),
         Section::new("meaning", "What the limit means").text(meaning()),
     ];
     Page::new(report.title, report.summary(), sections).files()
 }
 
 impl LimitReport<'_> {
-    /// The curve that holds for this bench.
+    /// The curve that is valid for this bench.
     fn curve(&self) -> &LimitCurve {
         match self.force {
             Force::Known => self.known,
@@ -123,11 +123,11 @@ impl LimitReport<'_> {
                     " % of the length; mean " (number(summary.mean_m * 1e3)) " mm, smallest " (at(summary.best))
                     ", largest " (at(summary.worst)) "."
                     @if let Some(words) = self.curve().not_told_in_words() {
-                        " Left out, because the readings do not tell the position there: " (words) "."
+                        " Left out, because the readings do not determine the position there: " (words) "."
                     }
                 }
             } @else {
-                li { "With this knowledge of the force the readings do not tell the position anywhere." }
+                li { "With this knowledge of the force the readings do not determine the position anywhere." }
             }
             @if let Some(surely) = self.surely() {
                 li {
@@ -168,7 +168,7 @@ impl LimitReport<'_> {
         Figure::chart(&chart, caption)
     }
 
-    /// The zones of the warnings, and the length of the surface where limits reach `beyond` it, which means "anywhere".
+    /// The zones of the warnings; and for limits `beyond` the length of the surface a line at that length, which means "anywhere".
     fn marks(&self, beyond: bool) -> Vec<Mark> {
         let length_m = self.known.extent.length_m();
         let label = format!("length of the surface, {} mm", mm(length_m));
@@ -216,12 +216,12 @@ impl LimitReport<'_> {
              along and across. No unbiased estimator has a smaller one."
             @if !map.dots_mm.is_empty() { " Dots: the sensors." }
             @if cut_off { " Limits above the length of the surface have its colour: contacts there cannot be located." }
-            @if nowhere { " Grey: the readings do not tell the position." }
+            @if nowhere { " Grey: the readings do not determine the position." }
         };
         Figure::map(&map, caption)
     }
 
-    /// Figures of a digit alone: the limit of the force, and how far the linear theory goes.
+    /// Figures for a digit only: the limit of the force, and the range of the linear theory.
     fn digit_figures(&self) -> Vec<Figure> {
         let SurfaceSpec::Digit(digit) = self.setup.surface() else { return Vec::new() };
         let force_limit = force_limit_figure(self.unknown);
@@ -247,7 +247,7 @@ impl LimitReport<'_> {
             .caption(caption)
     }
 
-    /// The lightest touch that is hardly ever missed, over the surface.
+    /// Summary over the surface of the touch that is missed only rarely.
     fn surely(&self) -> Option<TouchSummary> {
         let positions: Vec<Position> = self.known.points.iter().map(|point| point.position).collect();
         let [_, surely] = self.touch.summaries(&positions);
@@ -261,7 +261,7 @@ impl LimitReport<'_> {
                 "Below some force a reading is " code { "no_contact" } ": it can come from noise alone, or from the scatter of the untouched \
                  rows of a locator. The bound is such that an untouched surface gives a contact in " (self.touch.rate().to_string())
                 " of its readings (" code { "false_alarm_rate" } " in the rig). The smallest detectable force (lightest touch) is detected in "
-                (half) " % and in " (surely) " % of its readings, by a locator that does not know the force."
+                (half) " % and in " (surely) " % of its readings, by a locator without knowledge of the force."
             }
             @if let Some(TouchSummary { without: without @ 1.., .. }) = self.surely() {
                 p { "At " (counted(without, "position", "positions")) " no force is found." }
@@ -317,7 +317,7 @@ impl LimitReport<'_> {
             .short("sensor", |(_, number)| number.to_string())
             .words("measures", |(sensor, _)| sensor.kind.name())
             .numeric("position, mm", |(sensor, _)| match sensor.kind {
-                // Raw channels have no place that anybody stated.
+                // The place of a raw channel is unknown.
                 SensorKind::Raw => "–".to_owned(),
                 _ => place(sensor.position, self.known.extent),
             })

@@ -1,14 +1,14 @@
-//! Numbers as people read them.
+//! Numbers in a form for readers.
 
 use palpate_estimators::evaluation::{Portion, Quantiles};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_count};
 
-/// Placeholder where there is no number.
+/// Placeholder for a missing number.
 pub(crate) const NOTHING: &str = "–";
 
-/// About three significant digits: "63.5", "2.46", "−0.044", "1,250". "–" for what is not finite.
+/// About three significant digits: "63.5", "2.46", "−0.044", "1,250". "–" for a value that is not finite.
 pub(crate) fn number(value: f64) -> String {
     let size = value.abs();
     if !value.is_finite() {
@@ -29,7 +29,7 @@ pub(crate) fn number(value: f64) -> String {
     signed(value, text)
 }
 
-/// The size of a number with a minus sign before it where it is negative.
+/// The size of a number, with a minus sign if the number is negative.
 fn signed(value: f64, size: String) -> String {
     if value < 0.0 { format!("−{size}") } else { size }
 }
@@ -39,7 +39,7 @@ pub(crate) fn decimals(value: f64, count: usize) -> String {
     signed(value, format!("{:.count$}", value.abs()))
 }
 
-/// An SI value with its unit, in print: "5 µm" where files and the terminal have "5 um".
+/// An SI value with its unit, in print: "5 µm" for "5 um" in files and on the terminal.
 pub(crate) fn quantity(value: f64, dimension: Dimension) -> String {
     let text = Quantity { value, dimension }.to_string();
     match text.split_once(" u") {
@@ -63,7 +63,7 @@ pub(crate) fn as_written(value: f64) -> String {
     if value.abs() >= 1e3 { whole(value) } else { format!("{value}") }
 }
 
-/// A length in millimetres without its unit, no more decimals than it has, and two at most: "33.33", "20".
+/// A length in millimetres without its unit, with as few decimals as possible and at most two: "33.33", "20".
 pub(crate) fn mm(length_m: f64) -> String {
     let text = format!("{:.2}", length_m * 1e3);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
@@ -79,13 +79,13 @@ pub(crate) fn stretch(portion: Portion) -> String {
     format!("{}–{} mm", mm(portion.from_m), mm(portion.to_m))
 }
 
-/// A number as a rig states it, freed of rounding errors: "3", "200", "0.25".
+/// A number in the form of a rig file, without rounding errors: "3", "200", "0.25".
 pub(crate) fn stated(value: f64) -> String {
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// Median with the range from the 5th to the 95th percentile: "2.38 (2.26–2.73)"; the median alone where they all read
+/// Median with the range from the 5th to the 95th percentile: "2.38 (2.26–2.73)"; the median alone if all three read
 /// the same.
 pub(crate) fn spread(spread: Quantiles, shown: fn(f64) -> String) -> String {
     let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);

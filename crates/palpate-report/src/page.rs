@@ -1,4 +1,4 @@
-//! Self-contained HTML pages: what a page holds is inside it, and a browser asks nobody for anything.
+//! Self-contained HTML pages: a page includes all its content, so a browser loads nothing else.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -18,7 +18,7 @@ pub struct ReportFile {
     pub bytes: Vec<u8>,
 }
 
-/// A page. Its figures and its tables are numbered as they come.
+/// A page; figures and tables are numbered in their order.
 pub(crate) struct Page {
     title: String,
     lead: Markup,
@@ -27,7 +27,7 @@ pub(crate) struct Page {
     source: Markup,
 }
 
-/// A headed part of a page, which links can lead to.
+/// A part of a page with a heading and an address for links.
 pub(crate) struct Section {
     id: &'static str,
     heading: &'static str,
@@ -74,17 +74,17 @@ impl Section {
 
 /// A figure with its caption.
 pub(crate) struct Figure {
-    /// Alternative text: what it shows, in a few words, for readers who cannot see it.
+    /// Alternative text: the content in a few words, for readers who cannot see the figure.
     alternative: String,
     svg: String,
-    /// The same for a screen as narrow as a phone's.
+    /// The drawing for a screen as narrow as a phone's.
     narrow_svg: String,
     caption: Markup,
 }
 
 /// Width of a drawing on a phone, in pixels.
 const NARROW_PX: u32 = 360;
-/// Greatest height of a chart there.
+/// Greatest height of a chart on a phone.
 const NARROW_HEIGHT_PX: u32 = 420;
 
 impl Figure {
@@ -108,7 +108,7 @@ impl Figure {
         Self::new(alternative, [drawing, &narrow].map(BeamDrawing::svg), caption)
     }
 
-    /// The drawings stand in the page as they are: they hold no ids that could meet those of another.
+    /// The figure as HTML, with both drawings. They contain no ids, so ids of several drawings cannot collide.
     fn markup(&self, number: usize) -> Markup {
         let [wide, narrow] =
             [("wide-drawing", &self.svg), ("narrow", &self.narrow_svg)].map(|(class, svg)| {
@@ -134,7 +134,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// A table with a row for each of some things; its first column heads the rows.
+    /// A table with a row for each item; the first column heads the rows.
     pub fn from_rows<R>(rows: impl IntoIterator<Item = R>) -> Columns<R> {
         let rows: Vec<R> = rows.into_iter().collect();
         Columns { cells: rows.iter().map(|_| Vec::new()).collect(), columns: Vec::new(), rows }
@@ -169,7 +169,7 @@ pub(crate) struct Column {
     class: &'static str,
 }
 
-/// A table that is made column by column, with a cell for every row.
+/// A table that is built column by column, with a cell for every row.
 pub(crate) struct Columns<R> {
     rows: Vec<R>,
     columns: Vec<Column>,
@@ -182,32 +182,32 @@ impl<R> Columns<R> {
         self.column("text", heading, |row| text(cell(row)))
     }
 
-    /// A column of words that are not broken over lines.
+    /// A column of words without line breaks.
     pub fn short<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("short", heading, |row| text(cell(row)))
     }
 
-    /// A column of sentences, which needs room.
+    /// A wide column of sentences.
     pub fn wide<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("wide", heading, |row| text(cell(row)))
     }
 
-    /// A column of numbers that are written already.
+    /// A column of numbers given as text.
     pub fn numeric<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("number", heading, |row| text(cell(row)))
     }
 
-    /// A column of numbers with about three digits; a dash for none.
+    /// A column of numbers with about three digits; a dash for a missing one.
     pub fn number<T: Into<Option<f64>>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("number", heading, |row| text(number(cell(row).into().unwrap_or(f64::NAN))))
     }
 
-    /// A column of lengths in metres, shown in millimetres; a dash for none.
+    /// A column of lengths in metres, shown in millimetres; a dash for a missing one.
     pub fn mm<T: Into<Option<f64>>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.number(heading, |row| cell(row).into().map(|length_m| length_m * 1e3))
     }
 
-    /// A column of cells of this CSS class.
+    /// A column of cells with this CSS class.
     pub fn column(
         mut self,
         class: &'static str,
@@ -219,7 +219,7 @@ impl<R> Columns<R> {
         self
     }
 
-    /// The whole table.
+    /// Completes the table with its caption.
     pub fn caption(self, caption: Markup) -> Table {
         Table { caption, columns: self.columns, rows: self.cells }
     }
@@ -239,7 +239,7 @@ pub(crate) fn verdict(good: bool, yes: &str, no: &str) -> Markup {
     }
 }
 
-/// Style of drawings in the dark: each of their colours is replaced.
+/// Style of drawings on a dark page: each of their colours is replaced.
 fn dark_drawings() -> String {
     let rule = |(light, dark): &(Colour, Colour)| {
         format!(
@@ -261,7 +261,7 @@ impl Page {
         Self { lead, ..self }
     }
 
-    /// Adds the source of the page, as it goes on after "Made by palpate 1.2.3".
+    /// Adds the source of the page, which follows "Made by palpate 1.2.3".
     pub fn with_source(self, source: Markup) -> Self {
         Self { source, ..self }
     }

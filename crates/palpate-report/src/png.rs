@@ -1,13 +1,13 @@
-//! SVG to PNG with a font of our own, so that a figure is the same on every machine.
+//! SVG to PNG with a built-in font, so that a figure is the same on every machine.
 
 use super::ReportFile;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{self, fontdb};
 use std::sync::{Arc, LazyLock};
 
-/// Name of the font that stands for every generic family.
+/// Name of the font that replaces every generic family.
 const FONT_FAMILY: &str = "Noto Sans";
-/// Pixels of a figure's copy for one of its SVG.
+/// Pixels of a figure's PNG copy for each pixel of its SVG.
 const COPY_SCALE: f32 = 2.0;
 /// Longest side of a PNG in pixels.
 const MAX_SIDE_PX: u32 = 16_384;
@@ -18,17 +18,17 @@ pub enum PngError {
     /// The text is not an SVG document.
     #[error("not an SVG document: {0}")]
     Svg(#[from] usvg::Error),
-    /// The scale does not leave at least one pixel, or leaves more than an image can hold.
+    /// The scale gives less than one pixel, or a side longer than the greatest one.
     #[error(
         "scale {scale} gives {width_px} × {height_px} pixels; each side needs 1 to {max}",
         max = MAX_SIDE_PX
     )]
     Size {
-        /// The scale that was asked for.
+        /// The requested scale.
         scale: f32,
-        /// Width that it would give.
+        /// Resulting width.
         width_px: f32,
-        /// Height that it would give.
+        /// Resulting height.
         height_px: f32,
     },
     /// The pixels could not be compressed.
@@ -36,10 +36,10 @@ pub enum PngError {
     Encoding(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// The files of a report, each figure followed by a copy of it as PNG.
+/// The files of a report, each figure followed by its PNG copy.
 ///
 /// # Errors
-/// As [`svg_to_png`].
+/// As for [`svg_to_png`].
 pub fn with_png_copies(files: Vec<ReportFile>) -> Result<Vec<ReportFile>, PngError> {
     let mut all = Vec::new();
     for file in files {
@@ -55,7 +55,7 @@ pub fn with_png_copies(files: Vec<ReportFile>) -> Result<Vec<ReportFile>, PngErr
 
 /// PNG bytes of an SVG document drawn `scale` times its own size, each side rounded to whole pixels.
 ///
-/// Every text is set in the built-in font, whatever family it names.
+/// Every text is set in the built-in font, also if it names another font family.
 ///
 /// ```
 /// use palpate_report::{Chart, chart_to_svg, svg_to_png};
@@ -66,7 +66,7 @@ pub fn with_png_copies(files: Vec<ReportFile>) -> Result<Vec<ReportFile>, PngErr
 /// ```
 ///
 /// # Errors
-/// Text that is not SVG, and a scale that gives no pixels or a side longer than 16,384.
+/// [`PngError`] for text that is not SVG, and for a scale that gives no pixels or a side longer than 16,384.
 pub fn svg_to_png(svg: &str, scale: f32) -> Result<Vec<u8>, PngError> {
     let tree = parse(svg)?;
     let (width_px, height_px) =

@@ -1,4 +1,4 @@
-//! The report of a design of training positions: arrangements by several rules and searches, judged alike.
+//! The report of a design of training positions: arrangements by several rules and searches, all judged in the same way.
 
 use maud::{Markup, html};
 
@@ -38,7 +38,7 @@ pub fn position_design_report(report: &PositionDesignReport) -> Vec<ReportFile> 
         }
         Extent::Plane { .. } => (positions, errors.figures(report.maps())),
     };
-    let meaning = Section::new("meaning", "How positions are found and judged").text(report.meaning());
+    let meaning = Section::new("meaning", "Search and scores of positions").text(report.meaning());
     let sections = vec![positions.table(report.places()), errors, meaning];
     Page::new(report.title, report.summary(), sections)
         .with_source(html! { ", seed " (report.problem.design().seed) })
@@ -54,7 +54,7 @@ impl<'a> PositionDesignReport<'a> {
         best_placed(self.placed)
     }
 
-    /// The even arrangement and the best, where that is another.
+    /// The even arrangement and the best, if that is another one.
     fn compared(&self) -> Vec<&'a Placed> {
         let best = self.best().filter(|best| best.placement != Placement::Even);
         self.even().into_iter().chain(best).collect()

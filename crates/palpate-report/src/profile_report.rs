@@ -1,4 +1,4 @@
-//! The report of one load profile: how force is spread, how far that can be told, and what is left unexplained.
+//! The report of one load profile: the distribution of the force, its resolution, and the residuals.
 
 use maud::{Markup, html};
 
@@ -10,10 +10,10 @@ use palpate_estimators::estimator::{ForceBounds, LoadProfile, Patch, PatchLimit,
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Extent, UniformLoad};
 
-/// Places whose averaging kernels are drawn, as shares of the length, and on a plane of the width.
+/// Places of the drawn averaging kernels, as shares of the length, and on a plane also of the width.
 const KERNEL_PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 const KERNEL_PLACES_ON_A_PLANE: [[f64; 2]; 3] = [[0.5, 0.5], [0.25, 0.25], [0.1, 0.5]];
-/// N/mm in N/m, and kPa in Pa.
+/// Factor from N/m to N/mm, and from Pa to kPa.
 const PER_THOUSAND: f64 = 1e-3;
 
 /// Contents of a profile's report.
@@ -25,13 +25,13 @@ pub struct ProfileReport<'a> {
     pub layout: &'a Layout,
     /// The reading, in SI units.
     pub reading: &'a [f64],
-    /// The load that it tells.
+    /// The load estimated from the reading.
     pub profile: &'a LoadProfile,
-    /// The limit of each patch, where the readings tell them all.
+    /// The limit of each patch; `None` if the readings do not determine all patches.
     pub limits: Option<&'a [PatchLimit]>,
     /// Resolution of the layout; `None` without load.
     pub resolution: Option<&'a Resolution>,
-    /// The loads that were simulated; none where the truth is not known.
+    /// The simulated loads; empty if the truth is unknown.
     pub truth: &'a [UniformLoad],
     /// Origin of the reading: a file and a line, or a rig and a seed.
     pub source: &'a str,
@@ -77,7 +77,7 @@ impl<'a> ProfileReport<'a> {
             @if let Some(centre) = &profile.centre {
                 li {
                     "Total force " b { (number(profile.total_n)) " N" } ", 95 % interval " (interval_n(total_95_n)) " N"
-                    " whatever the shape of the load; " (interval_n(seen_95_n)) " N where nothing lies within " (mm(margin_m))
+                    " for any shape of the load; " (interval_n(seen_95_n)) " N without a load within " (mm(margin_m))
                     " mm of an edge."
                 }
                 li {
@@ -139,7 +139,7 @@ impl<'a> ProfileReport<'a> {
         Figure::chart(&chart, caption)
     }
 
-    /// The simulated loads in N/mm as a line that steps up and down.
+    /// The simulated loads in N/mm, as a step function.
     fn truth_steps(&self) -> Vec<(f64, f64)> {
         let mut loads = self.truth.to_vec();
         loads.sort_by(|a, b| a.from().x_m.total_cmp(&b.from().x_m));
@@ -203,7 +203,7 @@ impl<'a> ProfileReport<'a> {
         }
         panels.push(kpa("standard deviation", cells.map(|cell| profile.density_sd(cell)).collect()));
         let caption = html! {
-            "The pressure that the reading tells, cell by cell"
+            "The pressure of the reading, cell by cell"
             @if !self.truth.is_empty() { ", the pressure that was simulated," }
             " and the standard deviation of what is told. Neighbouring cells share their uncertainty: where one is too high, the next is too \
              low, and their sum is told better than either. Dots: the sensors."
@@ -348,7 +348,7 @@ fn tenths_mm(length_m: f64) -> String {
 fn status_in_words(profile: &LoadProfile) -> Markup {
     let (misfit, worst) = (number(profile.misfit), stated(profile.worst_misfit.round()));
     match profile.status {
-        Status::NoContact => html! { "No contact: the reading is no more than its noise." },
+        Status::NoContact => html! { "No contact: the reading is within its noise." },
         Status::OutsideModel => html! {
             b { "Outside the model" } ": no load explains the reading within its noise. The least sum of squared residuals is "
             (misfit) " standard deviations squared; noise alone seldom makes more than " (worst) "."

@@ -1,5 +1,5 @@
-//! The report of any study: its arms side by side, their layouts, and how far off they are along the surface; and what it shares
-//! with the founding paper's.
+//! The report of any study: its arms side by side, their layouts, and their errors along the surface; and parts that the report
+//! of the founding paper shares.
 
 use maud::{Markup, html};
 
@@ -13,11 +13,11 @@ use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_studies::{Arm, ArmOutcome, ArmResults, PreparedStudy, RunFacts, StudyResults};
 
-/// Number of arms that are distinguished in a table; more are also drawn side by side.
+/// Greatest number of arms that a table alone distinguishes; more are also drawn side by side.
 const FEW_ARMS: usize = 3;
-/// Greatest number of bands that lie over each other in a figure.
+/// Greatest number of overlapping bands in a figure.
 const MOST_BANDS: usize = 2;
-/// Markers of an arm stand this far beside each other, in rows.
+/// Distance between neighbouring markers of an arm, in rows.
 const BESIDE: f64 = 0.22;
 
 /// Contents of a study's report.
@@ -27,7 +27,7 @@ pub struct StudyReport<'a> {
     pub study: &'a PreparedStudy,
     /// Every fit, by arm; arms may be missing.
     pub outcomes: &'a [ArmOutcome],
-    /// The figures of those outcomes.
+    /// The figures of these outcomes.
     pub results: &'a StudyResults,
     /// Facts of the run.
     pub run: &'a RunFacts,
@@ -91,7 +91,7 @@ pub(super) fn longest(report: &StudyReport) -> Option<Markup> {
     })
 }
 
-/// The average errors of all arms, a row each, where there are more than a few.
+/// The average errors of all arms, a row each, if there are more than a few.
 fn overview(report: &StudyReport) -> Option<Figure> {
     let arms = &report.results.arms;
     if arms.len() <= FEW_ARMS {
@@ -126,14 +126,14 @@ fn overview(report: &StudyReport) -> Option<Figure> {
     Some(Figure::chart(&chart, caption))
 }
 
-/// A figure that arms are compared by.
+/// A figure by which arms are compared.
 struct Compared {
     label: String,
     error: fn(&ArmResults) -> Option<Quantiles>,
     limit: fn(&ArmResults) -> Option<f64>,
 }
 
-/// The error over all positions and in the first portion; or, where a study tells them apart, between training positions and
+/// The error over all positions and in the first portion; or, if the study distinguishes them, between training positions and
 /// beyond them.
 fn compared(report: &StudyReport) -> Vec<Compared> {
     if report.study.judging().training_span {
@@ -190,7 +190,7 @@ fn layouts_figure(report: &StudyReport, layouts: &[(Vec<&str>, &Layout)]) -> Fig
     Figure::chart(&sites_chart(&rows, report.length_m(), Vec::new()), caption)
 }
 
-/// Table of the layouts, with the arms that have each.
+/// Table of the layouts, each with its arms.
 fn layouts_table(layouts: &[(Vec<&str>, &Layout)], extent: Extent) -> Table {
     Table::from_rows(layouts)
         .wide("arms", |(arms, _)| arms.join(", "))
@@ -198,7 +198,7 @@ fn layouts_table(layouts: &[(Vec<&str>, &Layout)], extent: Extent) -> Table {
         .caption(html! { "Where the sensors of every arm sit." })
 }
 
-/// Errors along the surface: a figure for the arms that share a title, and one for each that has none.
+/// Errors along the surface: a figure for the arms that share a title, and one for each arm without a title.
 fn along_the_surface(report: &StudyReport) -> Vec<Figure> {
     let mut groups: Vec<(Option<&str>, Vec<&Arm>)> = Vec::new();
     let run = report.results.arms.iter().filter_map(|arm| report.arm(&arm.name));
@@ -280,23 +280,23 @@ impl<'a> StudyReport<'a> {
         self.outcomes.iter().find(|outcome| outcome.name == arm && !outcome.fits.is_empty())
     }
 
-    /// An arm as the study has it.
+    /// An arm of the study.
     pub(crate) fn arm(&self, name: &str) -> Option<&'a Arm> {
         self.study.study.arms.iter().find(|arm| arm.name == name)
     }
 
-    /// Noun for what is fitted, one and many: networks, or locators where some arm has another estimator.
+    /// Noun for the fits, singular and plural: networks, or locators if some arm has another estimator.
     pub(crate) fn noun(&self) -> [&'static str; 2] {
         let trained = self.results.arms.iter().all(|arm| arm.epochs.is_some());
         if trained { ["network", "networks"] } else { ["locator", "locators"] }
     }
 
-    /// Fits of all arms.
+    /// Number of fits of all arms.
     pub(crate) fn networks(&self) -> usize {
         self.results.arms.iter().map(|arm| arm.seeds).sum()
     }
 
-    /// "25 seeds", or "3 to 25 seeds" where the arms differ.
+    /// "25 seeds", or "3 to 25 seeds" if the arms differ.
     pub(crate) fn seeds_in_words(&self) -> String {
         let seeds = self.results.arms.iter().map(|arm| arm.seeds);
         match (seeds.clone().min(), seeds.max()) {
@@ -307,13 +307,13 @@ impl<'a> StudyReport<'a> {
         }
     }
 
-    /// First and last of the positions where locators are judged, in metres.
+    /// First and last of the judged positions, in metres.
     pub(crate) fn judged_portion(&self) -> Option<Portion> {
         let positions = &self.study.judging().positions;
         Some(Portion { from_m: positions.first()?.x_m, to_m: positions.last()?.x_m })
     }
 
-    /// The line along the surface; that of the first arm.
+    /// The line along the surface of the first arm.
     fn extent(&self) -> Option<Extent> {
         Some(self.study.study.arms.first()?.rig.setup.surface().extent().along_x())
     }
@@ -323,7 +323,7 @@ impl<'a> StudyReport<'a> {
         self.extent().map_or(f64::NAN, |extent| extent.length_m())
     }
 
-    /// A sentence on the networks that did not converge; none where all did.
+    /// A sentence about the networks that did not converge; `None` if all did.
     pub(crate) fn not_converged(&self) -> Option<String> {
         let trained = || self.results.arms.iter().filter(|arm| arm.converged.is_some());
         let left: usize = trained().map(|arm| arm.seeds - arm.converged.unwrap_or(arm.seeds)).sum();
@@ -338,7 +338,7 @@ impl<'a> StudyReport<'a> {
     }
 }
 
-/// The spread over an arm's seeds of a figure of each contact: by position in mm.
+/// Quantiles over an arm's seeds of a figure of each contact, by position in mm.
 pub(crate) fn spread_by_position(
     outcome: &ArmOutcome,
     figure: impl Fn(&Located) -> f64,
@@ -346,14 +346,14 @@ pub(crate) fn spread_by_position(
     outcome.by_position(figure).into_iter().map(|(x_m, spread)| (x_m * 1e3, spread)).collect()
 }
 
-/// The location error of an arm in mm along the surface, with a band over its seeds where there are several; nothing without a fit.
+/// The location error of an arm in mm along the surface, with a band over its seeds if there are several; empty without a fit.
 pub(crate) fn errors(report: &StudyReport, line: &ArmLine, with_band: bool) -> Vec<Series> {
     let Some(outcome) = report.outcome(line.arm) else { return Vec::new() };
     let along = spread_by_position(outcome, |located| located.error_m() * 1e3);
     banded(line.label, line.colour, &along, with_band && outcome.fits.len() > 1)
 }
 
-/// Location error along the surface, in mm on a logarithmic axis, against the limit of the first arm; `None` where no arm has a fit.
+/// Location error along the surface, in mm on a logarithmic axis, against the limit of the first arm; `None` if no arm has a fit.
 pub(crate) fn error_chart(report: &StudyReport, title: &str, arms: &[ArmLine]) -> Option<Chart> {
     let mut series: Vec<Series> = arms.iter().flat_map(|line| errors(report, line, true)).collect();
     if series.is_empty() {
@@ -371,10 +371,10 @@ pub(crate) fn chart_of_errors(report: &StudyReport, title: &str, series: Vec<Ser
     Chart::new(title, x, y, series).with_marks(vec![tolerance_mark(report.study.judging().tolerance_m)])
 }
 
-/// Low end of the axis of errors: they cross zero, which a logarithmic axis cannot show.
+/// Low end of the axis of errors: errors cross zero, which a logarithmic axis cannot show.
 const LEAST_ERROR_MM: f64 = 0.05;
 
-/// Table of every arm with its figures; a column only where some arm fills it.
+/// Table of every arm with its figures, without empty columns.
 pub(crate) fn arms_table(report: &StudyReport) -> Table {
     let arms = &report.results.arms;
     let mut table = Table::from_rows(arms.iter().enumerate()).short("arm", |(_, arm)| arm.name.clone());
@@ -390,7 +390,7 @@ pub(crate) fn arms_table(report: &StudyReport) -> Table {
     })
 }
 
-/// A column of the arms' table: what it says of each arm, where it has something to say.
+/// A column of the arms' table, with a cell for each arm; `None` for an empty one.
 struct ArmColumn {
     heading: String,
     cells: Vec<Option<Markup>>,
@@ -447,18 +447,18 @@ fn arm_columns(report: &StudyReport) -> Vec<ArmColumn> {
     }));
     columns.extend([
         spread("error over the limit's", &|arm| arm.limit.as_ref()?.error_over_limit),
-        spread("95 % intervals that hold, %", &|arm| arm.coverage_percent),
+        spread("95 % intervals that cover, %", &|arm| arm.coverage_percent),
     ]);
     columns
 }
 
-/// The median, and beneath it the range where there is one.
+/// The median, and beneath it the range, if it differs.
 fn stacked(spread: Quantiles, shown: fn(f64) -> String) -> Markup {
     let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
     html! { (median) @if low != median || high != median { span.range { (low) "–" (high) } } }
 }
 
-/// A text that no line is broken within.
+/// A text without line breaks.
 fn unbroken(text: &str) -> String {
     text.replace(' ', "\u{a0}").replace('–', "\u{2060}–\u{2060}")
 }
@@ -497,7 +497,7 @@ fn counted_seeds(seeds: u64) -> String {
     }
 }
 
-/// The study and the seeds that a page was made from.
+/// The study and the seeds of a page.
 pub(crate) fn source(report: &StudyReport) -> Markup {
     let run = report.run;
     html! {
@@ -530,8 +530,8 @@ pub(crate) fn glossary(report: &StudyReport) -> Markup {
                 }
             }
             @if report.results.arms.iter().any(|arm| arm.coverage_percent.is_some()) {
-                dt { "95 % intervals that hold" }
-                dd { "The share of estimates whose 95 % interval holds the true position: 95 % if the estimator knows how sure it can be." }
+                dt { "95 % intervals that cover" }
+                dd { "The share of estimates with the true position in their 95 % interval: 95 % for correct intervals." }
             }
             dt { "Seed" }
             dd {

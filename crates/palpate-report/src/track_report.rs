@@ -1,4 +1,4 @@
-//! The report of a contact that was followed.
+//! The report of the track of a contact.
 
 use maud::{Markup, html};
 
@@ -11,11 +11,11 @@ use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, tracked_of};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 
-/// Greatest number of single estimates that are drawn; more would hide the track.
+/// Greatest number of drawn single estimates; more would cover the track.
 const MOST_POINTS: usize = 60;
 /// Greatest number of points of a line; more cannot be distinguished.
 const MOST_OF_LINE: usize = 2000;
-/// Width of the plot area of a chart, and what there is above and below it, both about: a plane is drawn to scale.
+/// Approximate width of the plot area of a chart, and height of the parts above and below it: a plane is drawn to scale.
 const PLOT_WIDTH_PX: f64 = 630.0;
 const AROUND_PLOT_PX: f64 = 130.0;
 
@@ -30,11 +30,11 @@ pub struct TrackReport<'a> {
     pub extent: Extent,
     /// The tracks to show: of the filter or of the smoother.
     pub tracks: &'a [Track],
-    /// Name of the method that gave them: "filter" or "smoother".
+    /// Name of the method of tracking: "filter" or "smoother".
     pub how: &'a str,
-    /// The true contacts of each track, where the source says; a force of 0 of those that did not touch.
+    /// The true contacts of each track, if the source contains them; a contact that did not touch has force 0.
     pub truths: &'a [Vec<Contact>],
-    /// Errors of the filter and of the smoother, by name, where the truth is known.
+    /// Errors of the filter and of the smoother, by name; empty if the truth is unknown.
     pub errors: &'a [(&'static str, TrackErrors)],
     /// Errors by the contact's speed; may be empty.
     pub sweep: &'a [SpeedErrors],
@@ -97,7 +97,7 @@ impl TrackReport<'_> {
         Figure::chart(&chart, caption)
     }
 
-    /// The way over a plane, drawn to scale.
+    /// The path over a plane, drawn to scale.
     fn path_figure(&self) -> Figure {
         let path = |places: &mut dyn Iterator<Item = Option<Position>>| -> Vec<(f64, f64)> {
             places.map(|place| place.map_or((f64::NAN, f64::NAN), in_mm)).collect()
@@ -120,7 +120,7 @@ impl TrackReport<'_> {
         Figure::chart(&chart, caption)
     }
 
-    /// Some of the estimates by single readings.
+    /// A selection of the estimates by single readings.
     fn single_readings(&self, position: impl Fn(&Track) -> (f64, f64)) -> Series {
         let stride = self.tracks.len().div_ceil(MOST_POINTS).max(1);
         let every = if stride > 1 { format!(", every {stride}th") } else { String::new() };
@@ -128,7 +128,7 @@ impl TrackReport<'_> {
         Series::markers(format!("single readings{every}"), 4, points, Marker::Cross)
     }
 
-    /// The track less the true position, with its 95 % band; where the truth is not known, the band alone, about the track.
+    /// The track less the true position, with its 95 % band; if the truth is unknown, only the band about the track.
     fn errors_figure(&self) -> Figure {
         let stride = self.tracks.len().div_ceil(MOST_OF_LINE).max(1);
         let mut series = Vec::new();
@@ -153,14 +153,14 @@ impl TrackReport<'_> {
             (
                 "How far the track is off",
                 "position less the true one, mm",
-                "The track's error over time and its 95 % interval, while something touched: the interval should hold 0.",
+                "The track's error over time and its 95 % interval, while something touched: the interval should contain 0.",
             )
         };
         let chart = Chart::new(title, Axis::linear("time, s"), Axis::linear(y), series).with_height(480);
         Figure::chart(&chart, html! { (caption) })
     }
 
-    /// Coordinates that the figure of errors has a line for: each contact, or both coordinates of a plane.
+    /// Coordinates with a line in the figure of errors: each contact, or both coordinates of a plane.
     fn coordinates(&self) -> Vec<Coordinate> {
         let named = |name, contact, across| Coordinate { name, contact, across };
         match self.extent {
@@ -171,7 +171,7 @@ impl TrackReport<'_> {
         }
     }
 
-    /// The track at reading `i` and both ends of its 95 % interval in mm, less the truth, or less the track where that is not known.
+    /// The track at reading `i` and both ends of its 95 % interval in mm, less the truth; less the track if the truth is unknown.
     fn off_mm(&self, i: usize, coordinate: &Coordinate) -> Option<[f64; 3]> {
         let track = &self.tracks[i];
         let (tracked, truth) = match self.truths.get(i) {
@@ -191,7 +191,7 @@ impl TrackReport<'_> {
         Some([place_m, low_m, high_m].map(|end_m| (end_m - from_m) * 1e3))
     }
 
-    /// Greatest number of contacts that were followed.
+    /// Greatest number of tracked contacts.
     fn most_contacts(&self) -> usize {
         self.tracks.iter().map(|track| track.contacts.len()).max().unwrap_or(0)
     }
@@ -244,20 +244,20 @@ impl TrackReport<'_> {
     }
 }
 
-/// Coordinate of a contact whose errors are drawn.
+/// Coordinate of a contact in the figure of errors.
 struct Coordinate {
-    /// Name, as it goes on after "track".
+    /// Name, which follows "track".
     name: &'static str,
     contact: usize,
     across: bool,
 }
 
-/// Position of a contact; `None` where it does not touch.
+/// Position of a contact; `None` if it does not touch.
 fn touching(contact: Option<&Contact>) -> Option<Position> {
     contact.filter(|contact| contact.force_n > 0.0).map(|contact| contact.position)
 }
 
-/// Name of one of two contacts; empty where there is but one.
+/// Name of one of two contacts; empty for a single contact.
 fn of_two(k: usize, report: &TrackReport) -> &'static str {
     match (report.most_contacts(), k) {
         (2.., 0) => " of the first",

@@ -1,13 +1,14 @@
-//! TOML read into types by serde, so that every error knows its key, its place in the document and what is written there.
+//! TOML read into types by serde, with the key, the place in the document and the written value in every error.
 //!
-//! A file's sections are plain types with `#[derive(Deserialize)]`. What a type refuses, in serde's words, becomes a [`RigError`]; the
-//! innermost value that it comes from gives it its key and place. Two conventions go beyond serde's. A value of type [`At`] knows its
-//! place, for what can only be checked beside other values. And the name of an enum says how its variant is told:
+//! A file's sections are plain types with `#[derive(Deserialize)]`. A value that a type refuses, in serde's words, becomes a
+//! [`RigError`]. The innermost value that the error comes from gives it its key and place. Two conventions go beyond serde's.
+//! A value of type [`At`] keeps its place, for checks that need other values too. And the name of an enum determines where its
+//! variant comes from:
 //!
-//! - `#[serde(rename = "by kind")]`: by the key `kind` of a table; the table's other keys are the variant's. `by kind or network` is
-//!   the same with a variant for tables that lack the key.
-//! - `#[serde(rename = "by shape")]`: by what is written: `Text` or `Number`, or `Scalar` for both; `List`; `Table`.
-//! - Any other name: by a word.
+//! - `#[serde(rename = "by kind")]`: from the key `kind` of a table; the table's other keys are the variant's. `by kind or network`
+//!   adds a variant for tables that lack the key.
+//! - `#[serde(rename = "by shape")]`: from the shape of the value: `Text` or `Number`, or `Scalar` for both; `List`; `Table`.
+//! - Any other name: from a word.
 
 use std::marker::PhantomData;
 use std::ops::Deref;
@@ -30,7 +31,7 @@ pub(crate) struct At<T> {
     pub place: Place,
 }
 
-/// The values of a document.
+/// Parses the text of a document.
 ///
 /// # Errors
 /// [`RigError`] when it is not TOML.
@@ -41,10 +42,10 @@ pub(crate) fn parse(text: &str) -> Result<Spanned<DeValue<'_>>, RigError> {
     }
 }
 
-/// Reads a document, of which the `path` is empty, or the value that stands at a `path` in one.
+/// Reads a value of a document; `path` is its path there, empty for the whole document.
 ///
 /// # Errors
-/// [`RigError`], for the first thing that is wrong.
+/// [`RigError`] for the first problem.
 pub(crate) fn read<'de, T: Deserialize<'de>>(path: &str, value: &Spanned<DeValue>) -> Result<T, RigError> {
     Node::new(path, value).read(PhantomData)
 }
@@ -57,12 +58,12 @@ impl<T> Deref for At<T> {
     }
 }
 
-/// The place of a key, if it is there.
+/// The place of a key; `None` for a missing key.
 pub(crate) fn place<T>(key: &Option<At<T>>) -> Option<&Place> {
     key.as_ref().map(|key| &key.place)
 }
 
-/// The name by which [`At`] asks for a value's place.
+/// The name by which [`At`] requests a value's place.
 const AT: &str = "At";
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for At<T> {
@@ -104,7 +105,7 @@ impl<'de> SeqAccess<'de> for Parts<'_> {
 struct Node<'a> {
     value: &'a DeValue<'a>,
     place: Place,
-    /// The key of a table that has told its variant, and what it says.
+    /// The key of a table that determined its variant, and the value of that key.
     tag: Option<(&'static str, &'a str)>,
 }
 
@@ -125,7 +126,7 @@ impl<'a> Node<'a> {
         Self { value, place: Place { path: path.to_owned(), span, written }, tag: None }
     }
 
-    /// Reads this value; what its type refuses is at its place.
+    /// Reads this value; an error of its type gets the value's place.
     fn read<'de, S: DeserializeSeed<'de>>(self, seed: S) -> Result<S::Value, RigError> {
         let place = self.place.clone();
         seed.deserialize(self).map_err(|error| error.with_place(&place))
@@ -137,7 +138,7 @@ impl<'a> Node<'a> {
         Self::new(&format!("{}{dot}{key}", self.place.path), value)
     }
 
-    /// This table's entries in the order of the document, but for the key that has told its variant.
+    /// This table's entries in the order of the document, without the key that determined its variant.
     fn entries(&self, table: &'a DeTable<'a>) -> Vec<Entry<'a>> {
         let told = self.tag.map(|(key, _)| key);
         let mut entries: Vec<_> =
@@ -146,7 +147,7 @@ impl<'a> Node<'a> {
         entries
     }
 
-    /// The variant that this table tells by a key; see the head of this file.
+    /// The variant of this table, by a key; see the head of this file.
     fn tagged(
         mut self,
         table: &'a DeTable<'a>,
@@ -248,7 +249,7 @@ fn one_of(words: &[&str]) -> String {
     format!("one of {}", words.join(", "))
 }
 
-/// The names of a value's shape.
+/// The names of a value's shape, as in "by shape".
 fn shapes(value: &DeValue) -> &'static [&'static str] {
     match value {
         DeValue::String(_) => &["Text", "Scalar"],
@@ -278,7 +279,7 @@ impl<'de> SeqAccess<'de> for Elements<'_, '_> {
 struct Entries<'n, 'a> {
     node: &'n Node<'a>,
     rest: std::vec::IntoIter<Entry<'a>>,
-    /// The value whose key was read last.
+    /// The value of the key that was read last.
     value: Option<Node<'a>>,
 }
 
@@ -320,7 +321,7 @@ impl<'de, 'a> EnumAccess<'de> for Variant<'a> {
 impl<'de> VariantAccess<'de> for Node<'_> {
     type Error = RigError;
 
-    /// A word; or a table that has no keys beside the one that has told the variant.
+    /// Reads a word, or a table without keys beside the one that determined the variant.
     fn unit_variant(self) -> Result<(), RigError> {
         if let (DeValue::Table(table), Some(_)) = (self.value, self.tag)
             && let Some((key, _)) = self.entries(table).first()

@@ -14,13 +14,13 @@ use palpate_mechanics::surface::{
 use palpate_numerics::OutOfRange;
 use serde::de::{Expected, Unexpected};
 
-/// A rig or study file that cannot be used.
+/// Error of a rig or study file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{problem}")]
 pub struct RigError {
     /// The problem.
     pub problem: Box<RigProblem>,
-    /// The bytes of the document that are meant; `None` when something is not there at all.
+    /// The bytes of the document at fault; `None` when something is missing.
     pub span: Option<Range<usize>>,
 }
 
@@ -31,7 +31,7 @@ pub enum RigProblem {
     #[error("{}", .0.message())]
     Toml(toml::de::Error),
     /// A section is missing.
-    #[error("there is no section {section}")]
+    #[error("the rig has no section {section}")]
     MissingSection {
         /// Name in brackets.
         section: &'static str,
@@ -51,18 +51,18 @@ pub enum RigProblem {
         key: String,
         /// The keys that can stand there.
         known: Vec<&'static str>,
-        /// Key and value that leave the section with these keys, where it can have others: `kind = "beam"`.
+        /// Key and value that restrict the section to these keys, as in `kind = "beam"`; `None` if they do not depend on a value.
         with: Option<String>,
     },
-    /// A key that means nothing beside what else is written.
+    /// A key that has no effect with the other keys.
     #[error("`{key}` does not go with {with}")]
     UnusedKey {
         /// The key.
         key: String,
-        /// The other key or thing, which it does not go with.
+        /// The other key or thing with which it conflicts.
         with: String,
     },
-    /// A word that the key cannot be.
+    /// A word that is not a value of the key.
     #[error("`{key}` is `{word}`{}", suggestion(word, known))]
     UnknownWord {
         /// The key.
@@ -72,7 +72,7 @@ pub enum RigProblem {
         /// The words that may stand there.
         known: Vec<&'static str>,
     },
-    /// A text that is not what the key wants, such as a quantity in another unit.
+    /// A text that is not a valid value of the key, such as a quantity in another unit.
     #[error("`{key}`: {reason}")]
     Invalid {
         /// The key.
@@ -105,7 +105,7 @@ pub enum RigProblem {
     /// A digit that cannot be computed.
     #[error(transparent)]
     Digit(DigitError),
-    /// A beam whose motion cannot be computed.
+    /// A beam with a motion that cannot be computed.
     #[error(transparent)]
     ModalBeam(ModalBeamError),
     /// A moving contact with a number out of its range.
@@ -120,9 +120,9 @@ pub enum RigProblem {
     /// Training positions that cannot be laid out.
     #[error(transparent)]
     Arrangement(ArrangementError),
-    /// A sensor that reads nothing, wherever the surface is touched.
+    /// An insensitive sensor: its reading does not depend on the contact.
     #[error(
-        "{kind} sensor {number} is at {} and would read nothing: {reason}",
+        "{kind} sensor {number} is at {} and would always read 0: {reason}",
         extent.place_in_words(*position)
     )]
     InsensitiveSensor {
@@ -137,7 +137,7 @@ pub enum RigProblem {
         /// Why.
         reason: InsensitiveSensor,
     },
-    /// A reaction sensor where nothing supports the surface.
+    /// A reaction sensor at a place without a support that takes up force.
     #[error(
         "reaction sensor {number} is at {}, where no support takes up force; {}",
         extent.place_in_words(*position),
@@ -163,7 +163,8 @@ pub enum RigProblem {
 /// Place of a value in the document, and the text that is written there.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
-    /// Path: its key after those of the tables around it, with dots between; that of its list for an element; empty for the document.
+    /// Path of the value: its key after those of the tables around it, joined by dots. An element has the path of its list; the document has an
+    /// empty one.
     pub path: String,
     /// Bytes in the document.
     pub span: Range<usize>,
@@ -181,13 +182,13 @@ impl Place {
         self.refuse_as(&self.written, bound)
     }
 
-    /// The error for a value outside its bound, in other words than it is written in.
+    /// The error for a value outside its bound, quoted as `value` instead of as written.
     pub fn refuse_as(&self, value: impl Display, bound: impl Display) -> RigError {
         let (value, bound) = (value.to_string(), bound.to_string());
         RigProblem::OutOfRange { key: self.key().to_owned(), value, bound }.at_place(self)
     }
 
-    /// The error for a value that is not what its key wants, for this reason.
+    /// The error for an invalid value of the key, with the reason.
     pub fn invalid(&self, reason: impl Display) -> RigError {
         RigProblem::Invalid { key: self.key().to_owned(), reason: reason.to_string() }.at_place(self)
     }
@@ -197,14 +198,14 @@ impl Place {
         RigProblem::MissingKey { section: self.path.clone(), key: key.to_owned() }.at_place(self)
     }
 
-    /// The error for a key that means nothing beside what else is written.
+    /// The error for a key that has no effect with the other keys.
     pub fn unused(&self, with: impl Display) -> RigError {
         RigProblem::UnusedKey { key: self.key().to_owned(), with: with.to_string() }.at_place(self)
     }
 }
 
 impl RigError {
-    /// Remedy, where more can be said than the message does.
+    /// Remedy, if there is one beyond the message.
     pub fn help(&self) -> Option<String> {
         match &*self.problem {
             RigProblem::UnknownKey { key, known, .. } => {
@@ -225,7 +226,7 @@ impl RigError {
         }
     }
 
-    /// Sets key and place to those of the value that a type has refused, unless a value within it has been named already.
+    /// Sets key and place to those of the refused value, unless a value within it is named already.
     pub(crate) fn with_place(mut self, place: &Place) -> Self {
         if self.span.is_some() {
             return self;
@@ -241,12 +242,12 @@ impl RigError {
             RigProblem::MissingKey { section, .. } => place.path.clone_into(section),
             _ => {}
         }
-        // What the file itself lacks is nowhere.
+        // A key that the file itself lacks has no place.
         self.span = (!place.path.is_empty()).then(|| place.span.clone());
         self
     }
 
-    /// Sets the place to that of a key that a table has refused, and what tells the table's keys.
+    /// Sets the place to that of an unknown key. `tag` is the key and value that determined the table's variant, and so its keys.
     pub(crate) fn at_key(mut self, span: Range<usize>, tag: Option<(&'static str, &str)>) -> Self {
         if let (RigProblem::UnknownKey { known, with, .. }, Some((key, word))) = (&mut *self.problem, tag) {
             known.insert(0, key);
@@ -263,13 +264,13 @@ impl RigProblem {
         RigError { problem: Box::new(self), span: Some(place.span.clone()) }
     }
 
-    /// This problem, of something that is not there.
+    /// This problem, for something that is missing.
     pub(crate) fn without_place(self) -> RigError {
         RigError { problem: Box::new(self), span: None }
     }
 }
 
-/// Refusal by a type; the error that carries it says where.
+/// Refusals by types; the caller of the deserializer adds the place.
 impl serde::de::Error for RigError {
     fn custom<T: Display>(reason: T) -> Self {
         RigProblem::Invalid { key: String::new(), reason: reason.to_string() }.without_place()
@@ -311,7 +312,7 @@ impl serde::de::Error for RigError {
     }
 }
 
-/// "those that do are at 0 mm and 400 mm".
+/// Lists the supports that take up force: "those that do are at 0 mm and 400 mm".
 fn force_takers(extent: Extent, supports: &[Position]) -> String {
     let places: Vec<String> = supports.iter().map(|support| extent.place_in_words(*support)).collect();
     match places.as_slice() {
@@ -330,7 +331,7 @@ fn unknown_key(key: &str, known: &[&'static str], with: Option<&str>) -> String 
     }
 }
 
-/// ", did you mean `x`?" for the known word closest to `word`, or what is known where none is close.
+/// ", did you mean `x`?" for the known word closest to `word`, or the list of known words if none is close.
 fn suggestion(word: &str, known: &[&'static str]) -> String {
     match closest(word, known) {
         Some(other) => format!(", did you mean `{other}`?"),
@@ -338,10 +339,10 @@ fn suggestion(word: &str, known: &[&'static str]) -> String {
     }
 }
 
-/// Words that files had before, and those that they have now.
+/// Invalid words, each with the valid word that it stands for.
 const RENAMED: [(&str, &str); 1] = [("from", "source")];
 
-/// The known word that `word` was before, or that is a slip of the pen away: one edit, and one more for every four letters.
+/// The known word that `word` stands for or is close to: at most one edit, and one more for every four letters.
 fn closest(word: &str, known: &[&'static str]) -> Option<&'static str> {
     let renamed = RENAMED.iter().find(|(before, now)| *before == word && known.contains(now));
     if let Some((_, now)) = renamed {

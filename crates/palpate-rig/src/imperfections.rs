@@ -1,4 +1,4 @@
-//! `[imperfections]`: what simulations add to the model of the surface.
+//! `[imperfections]`: deviations from the model of the surface in simulations.
 
 use serde::Deserialize;
 
@@ -13,8 +13,8 @@ use crate::values::{
 };
 use crate::values::{Positive, Quantity, Ratio, ShareOrQuantity, TailFreedom, Time};
 
-/// Imperfections of a real bench, which simulated recordings and boards have; see docs/imperfections.md. An empty section adds untouched
-/// rows and times alone.
+/// Imperfections of a real bench in simulated recordings and boards; see docs/imperfections.md. An empty section adds only untouched
+/// rows and times.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ImperfectionsKeys {
@@ -47,7 +47,7 @@ pub(crate) struct ImperfectionsKeys {
     pub touch_width: Option<At<NotNegative<Length>>>,
     /// Share by which a deviation as large as the range falls short of a linear one; 0 by default.
     pub saturation: Option<Fraction>,
-    /// Force whose largest deviation over the surface is the range of a channel; that of the presses by default.
+    /// Force at which the largest deviation over the surface is the range of a channel; that of the presses by default.
     pub range_force: Option<Positive<Force>>,
     /// Untouched time before each press and after the last; 4 s by default.
     pub rest: Option<Positive<Time>>,
@@ -77,11 +77,11 @@ impl RelaxationKeys {
     }
 }
 
-/// Seconds of an hour.
+/// Seconds in an hour.
 const HOUR_S: f64 = 3600.0;
 
 impl At<ImperfectionsKeys> {
-    /// The imperfections of a surface whose sensors all measure `dimension`, if they do.
+    /// The imperfections of a surface; `dimension` is that of its sensors if all measure the same.
     pub fn build(
         &self,
         surface: &SurfaceSpec,
@@ -130,7 +130,7 @@ impl At<ImperfectionsKeys> {
         match &self.touch_width {
             None => Ok(0.0),
             Some(width) if width.si > 0.0 && matches!(surface, SurfaceSpec::Digit(_)) => {
-                Err(width.place.unused("a digit, whose readings under several forces do not add up"))
+                Err(width.place.unused("a digit: its readings under several forces do not add up"))
             }
             Some(width) => {
                 let shortest_m = surface.extent().sides_m().fold(f64::INFINITY, f64::min);

@@ -1,4 +1,4 @@
-//! Rigs and studies in words, a line for each thing that is to be said.
+//! Descriptions of rigs and studies, one line for each fact.
 
 use palpate_estimators::description;
 
@@ -6,7 +6,7 @@ use crate::rig::Rig;
 use crate::study::Study;
 
 impl Rig {
-    /// The rig in words: surface, sensors, force, training positions, and every setting of the estimator.
+    /// Describes the rig: surface, sensors, force, training positions, and every setting of the estimator.
     pub fn in_words(&self) -> Vec<String> {
         let mut lines = vec!["a rig".to_owned()];
         lines.extend(description::setup(&self.setup));
@@ -25,7 +25,7 @@ impl Rig {
 }
 
 impl Study {
-    /// The study in words: its arms, and the setup of the first.
+    /// Describes the study: its arms, and the setup of the first.
     pub fn in_words(&self) -> Vec<String> {
         let mut lines = vec![format!(
             "the study {}: {} arms × {} seeds, judged at {} positions",

@@ -1,9 +1,8 @@
-//! The rig file and the study file: TOML documents that say what is on the bench, read into the types of palpate.
+//! The rig file and the study file: TOML documents that describe the bench, read into the types of palpate.
 //!
-//! A [`Rig`] says which surface is touched, what its sensors read, where it is pressed to calibrate it, and which estimator
-//! locates; [`RigSections`] are parts of one, read by themselves. A [`Study`] is a rig with arms, each of which replaces some of its
-//! sections. Values are checked as they are read: an unknown key, a wrong unit, a value outside its bounds is a [`RigError`], which knows
-//! its place in the text.
+//! A [`Rig`] describes the surface, the readings of its sensors, the presses that calibrate it, and the estimator; [`RigSections`]
+//! are parts of a rig, read by themselves. A [`Study`] is a rig with arms, and each arm replaces some of its sections. Values are
+//! checked as they are read. An unknown key, a wrong unit or a value outside its bounds is a [`RigError`] with its place in the text.
 //!
 //! ```
 //! use palpate_estimators::fit::Fit;

@@ -15,19 +15,19 @@ use crate::values::{Positive, Speed, Time};
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MotionKeys {
-    /// Position of its start.
+    /// Position of the start.
     pub from: At<Point>,
-    /// Position of its turn.
+    /// Position of the turn.
     pub to: At<Point>,
     /// Speed between turns.
     pub speed: Positive<Speed>,
-    /// Distance over which it slows down and speeds up; a fifth of the whole by default.
+    /// Distance over which the contact slows down and speeds up; a fifth of the whole by default.
     pub turn: Option<At<Positive<Length>>>,
     /// Passes from one place to the other; 1 by default.
     pub passes: Option<Count<1, 100_000>>,
-    /// Time for which it is lifted off at each turn; 0 by default.
+    /// Time for which the contact is lifted off at each turn; 0 by default.
     pub lifted: Option<NotNegative<Time>>,
-    /// Time that it takes to touch, and to let go; 0.1 s by default.
+    /// Time that the contact takes to touch, and to let go; 0.1 s by default.
     pub touch: Option<At<Positive<Time>>>,
     /// Force, if it is neither known nor that of the presses.
     pub force: Option<At<Positive<Force>>>,
@@ -37,9 +37,9 @@ pub(crate) struct MotionKeys {
     pub damping: Option<At<Fraction>>,
 }
 
-/// Greatest number of readings that a recording should hold in memory.
+/// Greatest number of readings of a recording that is kept in memory.
 const MOST_READINGS: f64 = 1e7;
-/// A turn takes this share of the way, and a touch this long, unless the rig says otherwise.
+/// Defaults: share of the way that a turn takes, and duration of a touch.
 const TURN: f64 = 0.2;
 const TOUCH_S: f64 = 0.1;
 
@@ -95,17 +95,17 @@ impl At<MotionKeys> {
             .map_err(|error| RigProblem::ModalBeam(error).at_place(&density.place))
     }
 
-    /// A contact beside another one, which says what both share.
+    /// A second contact, without the keys that both share.
     fn further(&self, extent: Extent, known_force_n: Option<f64>) -> Result<MovingContact, RigError> {
         match place(&self.rate).or(place(&self.damping)) {
-            Some(key) => Err(key.unused("a second [[motion]]; the first says it for both")),
+            Some(key) => Err(key.unused("a second [[motion]]; the first states it for both")),
             None => self.contact(extent, known_force_n),
         }
     }
 
     fn contact(&self, extent: Extent, known_force_n: Option<f64>) -> Result<MovingContact, RigError> {
         if let (Some(force), Some(_)) = (&self.force, known_force_n) {
-            return Err(force.place.unused("a [contact] whose force is known"));
+            return Err(force.place.unused("a [contact] with a known force"));
         }
         let force_n = self.force.as_ref().map(|force| force.si);
         Ok(MovingContact { motion: self.motion(extent)?, force_n })
@@ -188,7 +188,7 @@ mod tests {
         insta::assert_snapshot!(told.join("\n"));
     }
 
-    /// The example with an unknown force and a second contact that says `keys`.
+    /// The example with an unknown force and a second contact with `keys`.
     fn with_second(keys: &str) -> String {
         let contact = RIG.find("[contact]").unwrap()..RIG.find("\n[training]\n").unwrap();
         let text = RIG.replacen("[motion]", "[[motion]]", 1).replacen(&RIG[contact], "", 1);
@@ -210,14 +210,14 @@ mod tests {
         let told = ["rate = \"1 kHz\"", "damping = 0.1", "force = \"-1 N\"", third]
             .map(|keys| complaint(&with_second(keys)));
         insta::assert_snapshot!(told.join("\n"), @r#"
-        `rate` does not go with a second [[motion]]; the first says it for both | "1 kHz"
-        `damping` does not go with a second [[motion]]; the first says it for both | 0.1
+        `rate` does not go with a second [[motion]]; the first states it for both | "1 kHz"
+        `damping` does not go with a second [[motion]]; the first states it for both | 0.1
         `force` is -1 N; it must be greater than 0 | "-1 N"
         `motion` is a list of 3; it must be one, or a list of two | [[motion]]
         "#);
         let known = RIG.replacen("passes = 4", "force = \"2 N\"", 1);
         let told = Rig::from_toml(&known).unwrap_err().to_string();
-        assert_eq!(told, "`force` does not go with a [contact] whose force is known");
+        assert_eq!(told, "`force` does not go with a [contact] with a known force");
     }
 
     #[test]

@@ -36,7 +36,7 @@ pub(crate) struct RecordingKeys {
     pub position_unit: Option<At<String>>,
     /// Columns of the sensors' readings, which also name raw sensors; the sensors' names with their units by default.
     pub channels: Option<At<Vec<At<ColumnKey>>>>,
-    /// The unit of readings, or that of each channel; mm, rad, m/m, N, or none of raw channels by default.
+    /// The unit of readings, or that of each channel; by default mm, rad, m/m or N, and no unit for raw channels.
     pub channel_unit: Option<At<ChannelUnitKeys>>,
     /// Column of the contact's force, positive downward, 0 in untouched rows; `force_n`, where the file has it, by default.
     pub force: Option<At<ColumnKey>>,
@@ -44,8 +44,8 @@ pub(crate) struct RecordingKeys {
     pub force_unit: Option<At<String>>,
     /// Largest absolute force of an untouched row, because load cells never read exactly 0; estimated from the rows by default.
     pub force_zero: Option<NotNegative<Force>>,
-    /// Column of a coordinate that readings depend on, is known here, and is unknown in use, or a list of several; the first is looked for
-    /// with the position.
+    /// Column of a nuisance coordinate, or a list of several: readings depend on it, and it is known here, but unknown in use. The first is
+    /// searched with the position.
     pub nuisance: Option<At<NuisanceKeys>>,
     /// The unit of the nuisance coordinate, or a list of as many; none by default.
     pub nuisance_unit: Option<At<ChannelUnitKeys>>,
@@ -221,7 +221,7 @@ impl At<RecordingKeys> {
         Ok(columns.into_iter().zip(units).map(|(column, unit)| ValueColumn { column, unit }).collect())
     }
 
-    /// Columns of the nuisance coordinates with their units, of which none can be said alone.
+    /// Columns of the nuisance coordinates with their units; a unit without a column is an error.
     fn nuisances(&self) -> Result<Vec<ValueColumn>, RigError> {
         let Some(listed) = &self.nuisance else {
             return match &self.nuisance_unit {
@@ -253,13 +253,13 @@ impl At<RecordingKeys> {
         each.collect()
     }
 
-    /// The error of a unit at `place` without the `key` that it is of.
+    /// The error for a unit at `place` that lacks its column's `key`.
     fn alone(&self, key: &str, place: &Place) -> RigError {
         let (section, key) = (self.place.path.clone(), key.to_owned());
         RigProblem::MissingKey { section, key }.at_place(place)
     }
 
-    /// The column that is said at `key`, of which the unit cannot be said alone.
+    /// The column of `key`; a unit without a column is an error.
     fn value(
         &self,
         key: &str,
@@ -274,7 +274,7 @@ impl At<RecordingKeys> {
     }
 }
 
-/// The columns of a list, none of them twice.
+/// The columns of a list, all different.
 fn distinct(listed: &[At<ColumnKey>]) -> Result<Vec<Column>, RigError> {
     let columns: Vec<_> = listed.iter().map(|column| column.column()).collect();
     if let Some(again) = (1..columns.len()).find(|i| columns[..*i].contains(&columns[*i])) {
@@ -293,7 +293,7 @@ impl ColumnKey {
     }
 }
 
-/// The unit that is said, or palpate's own.
+/// The stated unit, or palpate's own by default.
 fn unit(symbol: &Option<At<String>>, wanted: Dimension, own: Unit) -> Result<Unit, RigError> {
     symbol.as_ref().map_or(Ok(own), |symbol| unit_of(symbol, wanted))
 }

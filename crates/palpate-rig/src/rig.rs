@@ -15,22 +15,22 @@ use crate::error::RigError;
 use crate::sections::RigSections;
 use crate::stage::Stage;
 
-/// A bench, where to press it, and the method that then locates: all checked.
+/// A bench with its sensors, training positions and estimator, all checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// Surface, sensors and contact.
     pub setup: Setup,
-    /// Training positions and presses, to calibrate.
+    /// Training positions and presses of the calibration.
     pub training: Option<Training>,
-    /// The method that locates.
+    /// The estimator that locates contacts.
     pub estimator: Estimator,
-    /// Loads for a load profile to be simulated from.
+    /// Loads that simulate a load profile.
     pub loads: Vec<UniformLoad>,
-    /// Motion of the contacts, and of the beam beneath them, where the rig says.
+    /// Motion of the contacts, and of the beam beneath them; `None` without a `[motion]`.
     pub motion: Option<MovingContacts>,
-    /// Candidates and constraints of a sensor design, where the rig says.
+    /// Candidates and constraints of a sensor design; `None` without a `[design]`.
     pub design: Option<SensorDesign>,
-    /// The machine that presses by itself, where the rig says.
+    /// The machine that presses the surface; `None` without a `[stage]`.
     pub stage: Option<Stage>,
 }
 
@@ -57,10 +57,10 @@ impl Rig {
         Self::from_sections(&RigSections::from_toml(text)?)
     }
 
-    /// The rig that sections make together.
+    /// Builds a rig from its sections.
     ///
     /// # Errors
-    /// [`RigError`] for a section that is missing, or that does not go with the others.
+    /// [`RigError`] for a missing section, or for one that does not go with the others.
     pub fn from_sections(sections: &RigSections) -> Result<Self, RigError> {
         let setup = sections.setup()?;
         Ok(Self {
@@ -74,7 +74,7 @@ impl Rig {
         })
     }
 
-    /// The bench as it is when pressed to calibrate: with the force of the training presses.
+    /// The setup during calibration, with the force of the training presses.
     ///
     /// # Errors
     /// [`OutOfRange`] for a force of the presses that is not greater than 0 and finite.
@@ -104,10 +104,10 @@ impl Rig {
         self.simulate_watched(seed, Watch::NONE)
     }
 
-    /// The same, watched.
+    /// Simulates the presses of a calibration, watched: [`Rig::simulate`] that reports progress and can be stopped.
     ///
     /// # Errors
-    /// Those of [`Rig::simulate`], and [`SimulateError::Cancelled`].
+    /// As for [`Rig::simulate`], and [`SimulateError::Cancelled`].
     pub fn simulate_watched(&self, seed: u64, watch: Watch) -> Result<Recording, RigSimulationError> {
         Ok(self.setup.simulate_watched(self.training()?, seed, watch)?)
     }
@@ -115,7 +115,7 @@ impl Rig {
     /// Simulates the presses of a calibration for a fit, watched: [`Rig::simulate`] with the zero that recordings of the rig have.
     ///
     /// # Errors
-    /// Those of [`Rig::simulate_watched`], and [`SimulateError::NoUntouchedRow`].
+    /// As for [`Rig::simulate_watched`], and [`SimulateError::NoUntouchedRow`].
     pub fn simulate_calibration_watched(
         &self,
         seed: u64,
@@ -125,7 +125,7 @@ impl Rig {
         Ok(recorded.zeroed(self.setup.recording_columns().zero).map_err(SimulateError::from)?)
     }
 
-    /// The calibration at the training positions, to be simulated.
+    /// The calibration at the training positions, for simulations.
     ///
     /// # Errors
     /// [`RigSimulationError`] when the rig has no training positions, or they cannot be laid out.
@@ -133,8 +133,8 @@ impl Rig {
         Ok(Calibration::from_training(&self.setup, self.training()?)?)
     }
 
-    /// Simulated calibrations with `count` seeds from the first on, each judged by one contact at each position of
-    /// [`all_over`](palpate_estimators::arrangement::all_over), by several forces where the rig does not know it: see
+    /// Simulated calibrations with `count` seeds from `seed` on. Each is judged by one contact at each position of
+    /// [`all_over`](palpate_estimators::arrangement::all_over). If the rig's force is unknown, several forces are used: see
     /// [`Calibration::at_forces_of_use`].
     ///
     /// # Errors
@@ -143,10 +143,10 @@ impl Rig {
         self.trials_watched(count, seed, Watch::NONE)
     }
 
-    /// The same, watched.
+    /// Simulates calibrations with `count` seeds, watched: [`Rig::trials`] that reports progress and can be stopped.
     ///
     /// # Errors
-    /// Those of [`Rig::trials`], and [`SimulateError::Cancelled`].
+    /// As for [`Rig::trials`], and [`SimulateError::Cancelled`].
     pub fn trials_watched(
         &self,
         count: u64,
@@ -164,7 +164,7 @@ impl Rig {
         self.training.as_ref().ok_or(RigSimulationError::NoTraining)
     }
 
-    /// Moves the contacts as `[motion]` says; see [`palpate_estimators::simulate::simulate_moving`].
+    /// Simulates the moving contacts of `[motion]`; see [`palpate_estimators::simulate::simulate_moving`].
     ///
     /// # Errors
     /// [`RigSimulationError`] when the rig has no motion, no model or no force.
@@ -181,10 +181,10 @@ impl Rig {
         self.simulate_moving_watched(seed, Watch::NONE)
     }
 
-    /// The same, watched.
+    /// Simulates the moving contacts, watched: [`Rig::simulate_moving`] that reports progress and can be stopped.
     ///
     /// # Errors
-    /// Those of [`Rig::simulate_moving`], and [`SimulateError::Cancelled`].
+    /// As for [`Rig::simulate_moving`], and [`SimulateError::Cancelled`].
     pub fn simulate_moving_watched(
         &self,
         seed: u64,
@@ -199,13 +199,13 @@ impl Rig {
 /// A rig that cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RigSimulationError {
-    /// The rig does not say where to press.
+    /// The rig has no `[training]`, which determines where to press.
     #[error("a simulation needs training positions; the rig has no [training]")]
     NoTraining,
-    /// The rig does not say how a contact moves.
-    #[error("a moving contact needs to be told of; the rig has no [motion]")]
+    /// The rig has no `[motion]`, which determines how a contact moves.
+    #[error("a moving contact needs [motion], and the rig has none")]
     NoMotion,
-    /// A bench that cannot be simulated.
+    /// The bench cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
 }

@@ -1,4 +1,4 @@
-//! The sections of a rig, each read by itself: what somebody needs who has a surface and sensors, but no whole rig.
+//! The sections of a rig, each read by itself, for users who have a surface and sensors, but no whole rig.
 
 use serde::Deserialize;
 
@@ -22,8 +22,8 @@ use crate::surface::SurfaceKeys;
 use crate::training::{ContactKeys, LoadKeys, TrainingKeys, check_force};
 use crate::values::OneOrMany;
 
-/// Sections of a rig: those that a text has, whichever they are. Keys and single values are checked; what a section makes with others is
-/// checked where it is built.
+/// The sections of a rig that a text contains. Keys and single values are checked as they are read; a section is checked against the
+/// others where it is built.
 ///
 /// ```
 /// use palpate_rig::RigSections;
@@ -74,7 +74,7 @@ pub(crate) struct RigFile {
     pub imperfections: Option<At<ImperfectionsKeys>>,
 }
 
-/// Greatest number of values that a recording of the training positions should hold in memory.
+/// Greatest number of values of a recording of the training positions that is kept in memory.
 const MOST_VALUES: usize = 100_000_000;
 
 impl From<RigFile> for RigSections {
@@ -100,13 +100,13 @@ impl RigSections {
         self.0.surface.as_ref().ok_or_else(|| missing("[surface]"))?.build()
     }
 
-    /// `[surface]` and `[sensors]`, with what `[contact]` says of the force, `[recording]` of the columns, and `[imperfections]` of simulations.
+    /// `[surface]` and `[sensors]`, with the force of `[contact]`, the columns of `[recording]`, and the `[imperfections]` of simulations.
     ///
     /// # Errors
-    /// [`RigError`] without a surface or sensors, and for what does not go together.
+    /// [`RigError`] without a surface or sensors, and for sections that do not go together.
     pub fn setup(&self) -> Result<Setup, RigError> {
         let RigFile { surface, sensors, contact, recording, .. } = &self.0;
-        // A file without sensors is told so before its surface, which may be large, is set up.
+        // The surface may be large, so missing sensors are reported before it is set up.
         let surface = surface.as_ref().ok_or_else(|| missing("[surface]"))?;
         let sensors = sensors.as_ref().ok_or_else(|| missing("[sensors]"))?;
         let surface = surface.build()?;
@@ -146,7 +146,7 @@ impl RigSections {
         setup.map_err(|error| RigProblem::Setup(error).at_place(&keys.place))
     }
 
-    /// `[training]` on a setup, of which the readings can be simulated or are recorded.
+    /// `[training]` on a setup with simulated or recorded readings.
     ///
     /// # Errors
     /// [`RigError`] for positions or a force that do not go with the setup.
@@ -207,7 +207,7 @@ impl RigSections {
     /// `[stage]`
     ///
     /// # Errors
-    /// [`RigError`] for what no machine can do.
+    /// [`RigError`] for settings that no machine can reach.
     pub fn stage(&self) -> Result<Option<Stage>, RigError> {
         self.0.stage.as_ref().map(StageKeys::build).transpose()
     }

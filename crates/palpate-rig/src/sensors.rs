@@ -20,14 +20,14 @@ const MOST: i64 = 10_000;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SensorsKeys {
-    /// Their kind; of a measured surface `raw`, of a digit `strain`.
+    /// Kind of the sensors; `raw` on a measured surface, `strain` on a digit.
     pub measure: At<SensorKind>,
-    /// Number of sensors, evenly along the length: the i-th at i·l/(count + 1). Raw channels need none of `count`, `grid` and `positions`
+    /// Number of sensors, evenly along the length: the i-th at i·l/(count + 1). Raw channels need neither `count`, `grid` nor `positions`
     /// where [recording] lists them.
     pub count: Option<At<Count<1, MOST>>>,
     /// Columns and rows, evenly on a plane.
     pub grid: Option<At<Grid<MOST>>>,
-    /// Their positions, one by one.
+    /// Positions of the sensors, one by one.
     pub positions: Option<At<Vec<At<Point>>>>,
     /// Standard deviation of a reading's noise; 0 by default.
     pub noise: Option<At<Written>>,
@@ -50,7 +50,7 @@ pub(crate) struct SensorsKeys {
 #[serde(expecting = "a list of 2, the lower value first")]
 pub(crate) struct RangeKeys(At<Written>, At<Written>);
 
-/// The layout of `sections`: every sensor, named after the channels of the recording where it names them.
+/// The layout of `sections`: every sensor, with the names of the recording's channels, if there are any.
 pub(crate) fn build(
     sections: &At<OneOrMany<SensorsKeys>>,
     recording: Option<&RecordingKeys>,
@@ -85,7 +85,7 @@ pub(crate) fn build(
     Layout::new(sensors).map_err(|problem| RigProblem::Layout(problem).at_place(&sections.place))
 }
 
-/// Kind of a sensor of `surface` that is said to `measure` this.
+/// Kind of a sensor that is to `measure` this on `surface`; an error for a kind that the surface does not have.
 pub(crate) fn kind_on(surface: &SurfaceSpec, measure: &At<SensorKind>) -> Result<SensorKind, RigError> {
     let place = &measure.place;
     match **measure {
@@ -102,7 +102,7 @@ pub(crate) fn kind_on(surface: &SurfaceSpec, measure: &At<SensorKind>) -> Result
 }
 
 impl At<SensorsKeys> {
-    /// Positions of the sensors; `channel_count` is the recording's number of channels where they are all this section's.
+    /// Positions of the sensors; `channel_count` is the recording's number of channels if all are of this section.
     fn positions(
         &self,
         surface: &SurfaceSpec,
@@ -125,7 +125,7 @@ impl At<SensorsKeys> {
                 let (columns, rows) = grid.sides(extent)?;
                 (inner_grid(extent, columns, rows), &grid.place)
             }
-            // Where a raw channel is means nothing.
+            // The place of a raw channel has no effect.
             (Some(count), None, None) => match extent {
                 Extent::Plane { .. } if kind != SensorKind::Raw => {
                     return Err(count.place.unused(ON_A_PLANE));
@@ -151,7 +151,7 @@ impl At<SensorsKeys> {
         let size = |key: &Option<At<Written>>| {
             key.as_ref().map_or(Ok(0.0), |written| written.si::<AtLeastZero>(dimension))
         };
-        // A reaction sensor is part of its support, and a raw channel's place means nothing.
+        // A reaction sensor is part of its support, and the place of a raw channel has no effect.
         if let (Some(error), SensorKind::Reaction | SensorKind::Raw) = (&self.position_error, kind) {
             return Err(error.place.unused(format!("measure = \"{kind}\"")));
         }
@@ -188,7 +188,7 @@ impl At<SensorsKeys> {
     }
 }
 
-/// Checks that under a modelled surface a reaction sensor sits at a support, and the others where something moves.
+/// Checks that a reaction sensor sits at a support of a modelled surface, and any other sensor where the surface moves.
 fn check_sensor(
     surface: &SurfaceSpec,
     kind: SensorKind,

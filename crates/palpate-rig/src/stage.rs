@@ -1,4 +1,4 @@
-//! `[stage]`: the machine that presses by itself.
+//! `[stage]`: the machine that presses the surface.
 
 use serde::Deserialize;
 
@@ -8,16 +8,16 @@ use crate::document::At;
 use crate::error::RigError;
 use crate::values::{Force, Length, Positive, Quantity, Speed};
 
-/// Place of a surface in a machine, how it presses there, and what stops it; lengths in metres, in the machine's coordinates.
+/// Place of a surface in a machine, how it presses there, and its limits; lengths in metres, in the machine's coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stage {
-    /// The finger's x and y over the surface's left support, or over its lower left corner.
+    /// x and y of the finger over the surface's left support, or over its lower left corner.
     pub origin_m: (f64, f64),
-    /// The finger's z as it touches the untouched surface.
+    /// z of the finger as it touches the untouched surface.
     pub touch_z_m: f64,
-    /// Height above that at which it travels; greater than 0.
+    /// Height of travel above `touch_z_m`; greater than 0.
     pub clearance_m: f64,
-    /// Depths of the presses below that, at least one; greater than 0.
+    /// Depths of the presses below `touch_z_m`, at least one; greater than 0.
     pub depths_m: Vec<f64>,
     /// Speed of travel in m/s; greater than 0.
     pub travel_m_per_s: f64,
@@ -25,9 +25,9 @@ pub struct Stage {
     pub press_m_per_s: f64,
     /// Name of the load cell's values in the frames, which are in newtons; `None` without one.
     pub load_cell: Option<String>,
-    /// Force at the load cell beyond which the machine is stopped; greater than 0.
+    /// Greatest force at the load cell; the machine is stopped above it; greater than 0.
     pub force_limit_n: Option<f64>,
-    /// True where a stop may reset the machine by the DTR line of its serial port.
+    /// Whether a stop may reset the machine by the DTR line of its serial port.
     pub dtr_reset: bool,
 }
 
@@ -35,7 +35,7 @@ impl Stage {
     /// Checks that every number is in its range.
     ///
     /// # Errors
-    /// [`OutOfRange`], for the first that is not.
+    /// [`OutOfRange`] for the first that is not.
     pub fn check(&self) -> Result<(), OutOfRange> {
         let (x_m, y_m) = self.origin_m;
         let places = [("x of the origin", x_m), ("y of the origin", y_m), ("z of the touch", self.touch_z_m)];
@@ -66,7 +66,7 @@ impl Stage {
     }
 }
 
-/// The machine that presses by itself; see docs/live.md.
+/// The machine that presses the surface; see docs/live.md.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StageKeys {
@@ -74,7 +74,7 @@ pub(crate) struct StageKeys {
     pub origin: OriginKeys,
     /// The machine's z as the finger touches the untouched surface.
     pub touch: Quantity<Length>,
-    /// Height above that at which the finger travels; 5 mm by default.
+    /// Height of travel above `touch`; 5 mm by default.
     pub clearance: Option<Positive<Length>>,
     /// Depths below `touch` to which every position is pressed, one after the other.
     pub depths: At<Vec<Positive<Length>>>,
@@ -86,7 +86,7 @@ pub(crate) struct StageKeys {
     pub load_cell: Option<String>,
     /// Largest force at the load cell; the machine stops above it.
     pub force_limit: Option<At<Positive<Force>>>,
-    /// Stop a machine whose firmware reads no stop during a move by a reset over the DTR line of its serial port; `false` by default.
+    /// Stop the machine by a reset over the DTR line of its serial port, for firmware that reads no stop during a move; `false` by default.
     pub dtr_reset: Option<bool>,
 }
 
@@ -95,9 +95,9 @@ pub(crate) struct StageKeys {
 #[serde(expecting = "a list of 2, x and y in the machine")]
 pub(crate) struct OriginKeys(Quantity<Length>, Quantity<Length>);
 
-/// Most depths of the presses of one position.
+/// Greatest number of depths at one position.
 const MOST_DEPTHS: usize = 1000;
-/// Height of travel and speeds, unless the rig says otherwise.
+/// Defaults of the height of travel and of the speeds.
 const CLEARANCE_M: f64 = 5e-3;
 const TRAVEL_M_PER_S: f64 = 20e-3;
 const PRESS_M_PER_S: f64 = 1e-3;
@@ -108,7 +108,7 @@ impl StageKeys {
             return Err(self.depths.place.refuse(format!("a list of at least 1 and at most {MOST_DEPTHS}")));
         }
         if let (Some(limit), None) = (&self.force_limit, &self.load_cell) {
-            return Err(limit.place.unused("a machine without a `load_cell`, whose force nobody knows"));
+            return Err(limit.place.unused("a machine without a `load_cell`, so the force is unknown"));
         }
         Ok(Stage {
             origin_m: (self.origin.0.si, self.origin.1.si),

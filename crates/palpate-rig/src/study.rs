@@ -25,18 +25,18 @@ use crate::surface::SurfaceKeys;
 use crate::training::{ContactKeys, TrainingKeys};
 use crate::values::{Count, Length, OneOrMany, Positive};
 
-/// A set of experiments: every arm is a rig, fitted once a seed.
+/// A set of experiments: every arm is a rig, fitted once for each seed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Study {
     /// Name.
     pub name: String,
-    /// Seeds 0 to this less 1, unless the caller wants another number; at least 1.
+    /// Seeds 0 to this less 1 by default; at least 1.
     pub seeds: u64,
     /// The arithmetic of training in lanes.
     pub precision: Precision,
-    /// Positions and tolerance by which its locators are judged.
+    /// Positions and tolerance by which the locators are judged.
     pub judging: Judging,
-    /// Arms, at least 1, with names of their own.
+    /// Arms, at least 1, with different names.
     pub arms: Vec<Arm>,
     /// SHA-256 of the study file, in hexadecimal.
     pub digest: String,
@@ -47,20 +47,20 @@ pub struct Study {
 pub struct Arm {
     /// Name, unique in the study.
     pub name: String,
-    /// Rig that is fitted; where a layout is asked for, it takes the place of the rig's own when the study is prepared.
+    /// Rig that is fitted; when the study is prepared, a layout by method replaces the rig's own.
     pub rig: Rig,
-    /// The layout that it asks for by method.
+    /// The layout by method, if the arm has one.
     pub layout: Option<AskedLayout>,
-    /// The title of the figure that it shares with other arms in reports; `None` for a figure of its own.
+    /// The title of the figure that the arm shares with others in reports; `None` for a figure of its own.
     pub figure: Option<String>,
 }
 
-/// A layout asked for by method.
+/// A layout that a method determines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AskedLayout {
     /// The method.
     pub method: Method,
-    /// The bytes of the study file that ask for it.
+    /// The bytes of the study file that state the method.
     pub span: Range<usize>,
 }
 
@@ -71,7 +71,7 @@ pub struct Judging {
     pub positions: Vec<Position>,
     /// Readings at each position, where sensors have noise; at least 1.
     pub readings: usize,
-    /// An error up to this, in metres, is good enough for the effective length.
+    /// Largest error in metres that counts for the effective length.
     pub tolerance_m: f64,
     /// Portions of the surface that are also judged by themselves.
     pub portions: Vec<Portion>,
@@ -98,11 +98,11 @@ struct StudyFile {
     contact: Option<ContactKeys>,
     /// Calibration of arms without `training`.
     training: Option<At<TrainingKeys>>,
-    /// The estimator; its keys hold for arms that do not say the same keys.
+    /// The estimator; an arm's own keys replace these.
     // Read by [`estimator`].
     #[serde(rename = "estimator")]
     _estimator: Option<IgnoredAny>,
-    /// Candidates for layouts that are asked for by method.
+    /// Candidates for layouts by method.
     design: Option<At<DesignKeys>>,
     /// Positions and tolerance by which locators are judged; 399 positions, 5 readings at each by default.
     evaluation: Option<EvaluationKeys>,
@@ -117,9 +117,9 @@ struct StudyFile {
 struct EvaluationKeys {
     /// The first contact position.
     from: Positive<Length>,
-    /// The last.
+    /// The last contact position.
     to: At<Positive<Length>>,
-    /// The distance between two.
+    /// The distance between neighbours.
     step: At<Positive<Length>>,
     /// Readings at each position; 5 by default.
     readings: Option<Count<1, 1000>>,
@@ -143,9 +143,9 @@ struct PortionKeys(Positive<Length>, Positive<Length>);
 struct ArmKeys {
     /// Name, unique in the study, of letters, digits, `-`, `_`, and `.` between them.
     name: At<String>,
-    /// The title of a figure that it shares with other arms; a figure of its own by default.
+    /// The title of a figure that the arm shares with others; a figure of its own by default.
     figure: Option<String>,
-    /// The method that places its sensors.
+    /// The method that places the sensors.
     layout: Option<At<Method>>,
     /// Sensors; the study's by default.
     sensors: Option<At<OneOrMany<SensorsKeys>>>,
@@ -199,7 +199,7 @@ impl Study {
     }
 }
 
-/// The estimator of an arm: its own keys, and the base's where it is silent.
+/// The estimator of an arm: its own keys, and the base's keys that it does not have.
 fn estimator(document: &DeValue, arm: usize) -> Result<Option<EstimatorKeys>, RigError> {
     let base = document.get("estimator");
     let own = document.get("arm").and_then(|arms| arms.get_ref().get(arm)?.get_ref().get("estimator"));
@@ -220,7 +220,7 @@ fn estimator(document: &DeValue, arm: usize) -> Result<Option<EstimatorKeys>, Ri
 }
 
 impl ArmKeys {
-    /// The base's sections; those of the arm take their place.
+    /// Builds an arm from the base's sections; those of the arm replace them.
     fn build(&self, base: &StudyFile, estimator: Option<EstimatorKeys>) -> Result<Arm, RigError> {
         let name = checked_arm_name(&self.name)?;
         let rig = RigFile {
@@ -243,7 +243,7 @@ impl ArmKeys {
         Ok(Arm { name, rig, layout, figure: self.figure.clone() })
     }
 
-    /// The layout by its method, which leaves nothing for positions to say.
+    /// The layout by method; positions of sensors are an error beside it.
     fn asked_layout(&self) -> Result<Option<AskedLayout>, RigError> {
         let Some(layout) = &self.layout else { return Ok(None) };
         for sensors in self.sensors.iter().flat_map(|sensors| sensors.sections()) {
@@ -255,7 +255,7 @@ impl ArmKeys {
     }
 }
 
-/// The name of a study, which is that of its folder.
+/// The name of a study, which is also that of its folder.
 fn checked_name(name: &At<String>) -> Result<String, RigError> {
     if name.is_empty() || !name.chars().all(in_any_name) {
         return Err(name.place.refuse("of letters, digits, `-` and `_`"));
@@ -263,7 +263,7 @@ fn checked_name(name: &At<String>) -> Result<String, RigError> {
     Ok((**name).clone())
 }
 
-/// The name of an arm, which may stand in that of a file: points are within it only, so that it is neither hidden nor a folder.
+/// The name of an arm, which may be part of a file's name: points are within it only, so that it is neither hidden nor a folder.
 fn checked_arm_name(name: &At<String>) -> Result<String, RigError> {
     let fits = |c: char| in_any_name(c) || c == '.';
     if name.is_empty() || !name.chars().all(fits) || name.starts_with('.') || name.ends_with('.') {
@@ -277,7 +277,7 @@ fn in_any_name(c: char) -> bool {
 }
 
 impl StudyFile {
-    /// The `[evaluation]`; without one, 399 positions, 5 readings at each, tolerance 2 mm, no portions.
+    /// The `[evaluation]`; by default 399 positions, 5 readings at each, tolerance 2 mm, no portions.
     fn judging(&self, first: &Arm) -> Result<Judging, RigError> {
         let extent = first.rig.setup.surface().extent();
         if let (Some(surface), Extent::Plane { .. }) = (&self.surface, extent) {
@@ -303,7 +303,7 @@ impl StudyFile {
 
 impl EvaluationKeys {
     fn positions(&self, length_m: f64) -> Result<Vec<Position>, RigError> {
-        /// The most contact positions a study judges at.
+        /// Greatest number of contact positions by which a study judges.
         const MOST: usize = 100_000;
         let (from_m, to_m, step_m) = (self.from.si, self.to.si, self.step.si);
         if to_m < from_m || to_m > length_m {

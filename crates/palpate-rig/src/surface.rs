@@ -23,7 +23,7 @@ pub(crate) enum SurfaceKeys {
     Plate(PlateKeys),
     /// A flexible finger, clamped at 0 and free at its tip.
     Digit(DigitKeys),
-    /// A surface without a model, of which there are recordings only.
+    /// A surface without a model, with recordings only.
     Measured(MeasuredKeys),
 }
 
@@ -149,7 +149,7 @@ pub(crate) enum EdgesKeys {
 }
 
 #[derive(Clone, Debug, Deserialize)]
-#[serde(rename = "by shape", expecting = "a list of points on a plate; its edges are held by `edges`")]
+#[serde(rename = "by shape", expecting = "a list of points on a plate; its edges are supported by `edges`")]
 pub(crate) enum PointSupportsKeys {
     List(Vec<At<PointSupportKeys>>),
 }
@@ -221,7 +221,7 @@ impl At<SurfaceKeys> {
         }
     }
 
-    /// Density, if it says one.
+    /// The density of a beam; `None` without one.
     pub fn density(&self) -> Option<&At<Positive<Density>>> {
         match &**self {
             SurfaceKeys::Beam(keys) => keys.density.as_ref(),
@@ -299,7 +299,7 @@ impl BeamKeys {
 }
 
 impl BeamSupportKeys {
-    /// The support, and where the document says its position.
+    /// The support, and the place of its position in the document.
     fn build(&self) -> (&Place, BeamSupport) {
         let (at, kind) = match self {
             Self::Simple { at } => (at, BeamSupportKind::Simple),

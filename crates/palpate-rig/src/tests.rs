@@ -111,7 +111,7 @@ fn the_water_strips_recording_is_read() {
     assert_eq!(held_out, [9 * 19, 8 * 19, 8 * 19, 8 * 19, 8 * 19]);
 }
 
-/// The message, then the first line that is meant with a mark under it, then the help.
+/// The message, then the first line at fault with a mark under it, then the help.
 fn pointed(text: &str) -> String {
     let error = Rig::from_toml(text).unwrap_err();
     let mut shown = error.to_string();
@@ -410,7 +410,7 @@ proptest::proptest! {
         let _ = Rig::from_toml(&String::from_utf8_lossy(&bytes));
     }
 
-    /// Cuts and swaps within real rigs get further than random bytes.
+    /// Cuts and swaps within real rigs reach more code than random bytes.
     #[test]
     fn no_damaged_rig_panics(from in 0..BENCH.len(), length in 0..30usize, patch in "[-\"0-9a-zN%\\[\\]=. \n]{0,12}") {
         for rig in [BENCH, PAPER, FSI_WATER] {

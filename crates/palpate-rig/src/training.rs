@@ -18,11 +18,12 @@ const MOST: i64 = 100_000;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ContactKeys {
-    /// Their force, where it is known and one for all; unknown by default.
+    /// Force of every contact, if it is known and the same for all; unknown by default.
     pub force: Option<At<Positive<Force>>>,
-    /// The greatest that an unknown force can be, on a surface with a model; ten times that of the presses by default.
+    /// Greatest value of an unknown force, on a surface with a model; ten times that of the presses by default.
     pub greatest_force: Option<At<Positive<Force>>>,
-    /// Least and greatest force of contacts of unknown force: 1 in 200 is lighter, none is harder; a decade either side of the presses by default.
+    /// Least and greatest force of contacts of unknown force: 1 in 200 is below the least, no contact is above the greatest; a decade either side
+    /// of the presses by default.
     pub force_range: Option<At<ForceRangeKeys>>,
 }
 
@@ -39,10 +40,10 @@ impl ContactKeys {
             return Err(range.place.unused("`force`, by which the force is known"));
         }
         if let SurfaceSpec::Digit(_) = surface {
-            return Err(range.place.unused("a digit, whose model bounds the force"));
+            return Err(range.place.unused("a digit: its model bounds the force"));
         }
         if let Some(greatest) = &self.greatest_force {
-            return Err(greatest.place.unused("`force_range`, whose upper end it is"));
+            return Err(greatest.place.unused("`force_range`, which has it as its upper end"));
         }
         let ForceRangeKeys(least, greatest) = **range;
         let built = ForceRange::new(least.si, greatest.si);
@@ -53,14 +54,14 @@ impl ContactKeys {
         })
     }
 
-    /// The greatest force in newtons, where it is said.
+    /// The greatest force in newtons; `None` if it is not stated.
     pub fn greatest_force_n(&self, surface: &SurfaceSpec) -> Result<Option<f64>, RigError> {
         let Some(greatest) = &self.greatest_force else { return Ok(None) };
         if self.force.is_some() {
             return Err(greatest.place.unused("`force`, by which the force is known"));
         }
         match surface {
-            SurfaceSpec::Digit(_) => Err(greatest.place.unused("a digit, whose model bounds the force")),
+            SurfaceSpec::Digit(_) => Err(greatest.place.unused("a digit: its model bounds the force")),
             surface if surface.model().is_none() => {
                 Err(greatest.place.unused("a `measured` surface; give `force_range`"))
             }
@@ -90,7 +91,7 @@ pub(crate) struct TrainingKeys {
     pub repeats: Option<Count<1, MOST>>,
     /// The force of the presses; that of [contact] by default.
     pub force: Option<At<Positive<Force>>>,
-    /// Standard deviation of the pressed place from the asked place, in each direction; unknown by default.
+    /// Standard deviation of the pressed place from the requested place, in each direction; unknown by default.
     pub placement: Option<At<Positive<Length>>>,
 }
 
@@ -180,7 +181,7 @@ impl At<TrainingKeys> {
         Ok(training)
     }
 
-    /// The placement, which is less than the surface's longest side: a place that could be anywhere is none.
+    /// The standard deviation of the placement, which is less than the surface's longest side: a larger one would not restrict the place.
     fn placement_sd_m(&self, extent: Extent) -> Result<Option<f64>, RigError> {
         let Some(placement) = &self.placement else { return Ok(None) };
         let side_m = extent.length_m().max(extent.width_m().unwrap_or(0.0));
@@ -219,7 +220,7 @@ impl At<TrainingKeys> {
     }
 }
 
-/// Refuses a force beyond a digit's model, which goes as far as a load of [`Digit::MOST_LOAD`] at the tip.
+/// Refuses a force beyond the range of a digit's model, which ends at a load of [`Digit::MOST_LOAD`] at the tip.
 pub(crate) fn check_force(
     force: Option<&At<Positive<Force>>>,
     surface: &SurfaceSpec,
@@ -238,7 +239,7 @@ pub(crate) fn check_force(
 impl At<LoadKeys> {
     pub fn build(&self, surface: &SurfaceSpec) -> Result<UniformLoad, RigError> {
         if let SurfaceSpec::Digit(_) = surface {
-            return Err(self.place.unused("a digit, whose readings under several loads do not add up"));
+            return Err(self.place.unused("a digit: its readings under several loads do not add up"));
         }
         let extent = surface.extent();
         let (from, to) = (self.from.on_surface(extent)?, self.to.on_surface(extent)?);

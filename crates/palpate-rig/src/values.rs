@@ -11,7 +11,7 @@ use serde::de::{Deserialize, Deserializer, Error, Unexpected};
 use crate::document::At;
 use crate::error::{Place, RigError};
 
-/// A quantity in SI units that measures `D` and keeps to the bound `B`: "400 mm" becomes 0.4.
+/// A quantity in SI units that measures `D` and satisfies the bound `B`: "400 mm" becomes 0.4.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Quantity<D, B = Finite> {
     pub si: f64,
@@ -95,7 +95,7 @@ impl<'de, D: Measure, B: Bound> Deserialize<'de> for Quantity<D, B> {
     }
 }
 
-/// A quantity as it is written: its dimension is that of the sensors it belongs to.
+/// A quantity as it is written, with the dimension of its sensors.
 #[derive(Clone, Debug, serde::Deserialize)]
 #[serde(rename = "by shape", expecting = "a quantity such as \"400 mm\", or a number")]
 pub(crate) enum Written {
@@ -120,7 +120,7 @@ impl Written {
 }
 
 impl At<Written> {
-    /// Its SI value as a quantity that measures `wanted` and keeps to the bound `B`.
+    /// The SI value of a quantity that measures `wanted` and satisfies the bound `B`.
     pub fn si<B: Bound>(&self, wanted: Dimension) -> Result<f64, RigError> {
         match Written::si(self, wanted) {
             Ok(si) if B::holds(si) => Ok(si),
@@ -154,9 +154,9 @@ impl<'de, const LEAST: i64, const MOST: i64> Deserialize<'de> for Count<LEAST, M
     }
 }
 
-/// Thing that a number of positions does not go with, and the remedy.
+/// Text for messages: a number of positions does not go with a plane, and the remedy.
 pub(crate) const ON_A_PLANE: &str =
-    "a plane; say `grid = [3, 3]`, columns and rows, or list pairs in `positions`";
+    "a plane; set `grid = [3, 3]`, columns and rows, or list pairs in `positions`";
 
 /// Columns and rows of a grid of at most `MOST` positions.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
@@ -167,7 +167,7 @@ impl<const MOST: i64> At<Grid<MOST>> {
     /// Columns and rows.
     pub fn sides(&self, extent: Extent) -> Result<(usize, usize), RigError> {
         if let Extent::Line { .. } = extent {
-            return Err(self.place.unused("a surface that is a line; say `count`"));
+            return Err(self.place.unused("a surface that is a line; set `count`"));
         }
         let (columns, rows) = (self.0.get(), self.1.get());
         if columns.saturating_mul(rows) as u64 > MOST.unsigned_abs() {
@@ -201,7 +201,7 @@ impl At<Point> {
         }
     }
 
-    /// The position, refused beside the surface.
+    /// The position; an error for one beside the surface.
     pub fn on_surface(&self, extent: Extent) -> Result<Position, RigError> {
         match self.position(extent)? {
             position if extent.contains(position) => Ok(position),
@@ -213,7 +213,7 @@ impl At<Point> {
     }
 }
 
-/// Refuses a stretch or rectangle, of which the end stands at `place`, that does not go from left to right, and upward on a plane.
+/// Checks that a stretch or rectangle goes from left to right, and upward on a plane; `place` is that of its end.
 pub(crate) fn check_order(
     from: Position,
     to: Position,

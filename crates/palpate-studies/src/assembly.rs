@@ -1,4 +1,4 @@
-//! A study put together from parts: rows of tasks that ran anywhere, or the tables of shards.
+//! Assembly of a study from parts: rows of tasks from any process, or the tables of shards.
 
 use std::collections::{HashMap, HashSet};
 
@@ -8,36 +8,36 @@ use super::run::{ArmOutcome, PreparedStudy, StudyRunError, Trained};
 use super::tables::{CheckpointError, FitRows, StudyTables, TableKind, shard_in};
 use super::task::{Shard, Task};
 
-/// Error of putting a study together.
+/// Error of assembling a study.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AssemblyError {
-    /// A table that is not of this study, or holds a row that it does not write.
+    /// A table that is not of this study, or contains a row that it does not write.
     #[error("{place}: {}: {error}", error.table().file_name())]
     Table {
-        /// Where the table was found.
+        /// Place of the table.
         place: String,
-        /// Why.
+        /// The problem.
         error: CheckpointError,
     },
     /// A table of a whole study.
     #[error("{place}: {} is of a whole study, not of a shard", TableKind::Networks.file_name())]
     Whole {
-        /// Where it was found.
+        /// Place of the table.
         place: String,
     },
     /// Shards of different numbers of shards or of seeds.
     #[error("{place} is shard {found}, and {first_place} is shard {first}: all must be of one split")]
     Split {
-        /// Where the second was found.
+        /// Place of the second shard.
         place: String,
-        /// The second, with its seeds.
+        /// The second shard, with its seeds.
         found: String,
-        /// Where the first was found.
+        /// Place of the first shard.
         first_place: String,
-        /// The first, with its seeds.
+        /// The first shard, with its seeds.
         first: String,
     },
-    /// The same shard in two places.
+    /// One shard in two places.
     #[error("shard {shard} is there twice: {first_place} and {place}")]
     TwoOfAShard {
         /// The shard.
@@ -47,19 +47,19 @@ pub enum AssemblyError {
         /// The second place.
         place: String,
     },
-    /// A shard that was stopped before its end.
+    /// A shard with missing fits, because it was stopped before its end.
     #[error("{place}: shard {shard} is not finished: {found} of its {wanted} fits are there")]
     Unfinished {
-        /// Where it was found.
+        /// Place of the shard.
         place: String,
         /// The shard.
         shard: String,
-        /// Its fits that are there.
+        /// Number of its finished fits.
         found: u64,
-        /// All of its fits.
+        /// Number of all its fits.
         wanted: u64,
     },
-    /// Shards that are not there.
+    /// Missing shards.
     #[error("{} of {of} shards {} missing: {}", .missing.len(), if .missing.len() == 1 { "is" } else { "are" }, listed(.missing))]
     MissingShards {
         /// Their numbers.
@@ -67,7 +67,7 @@ pub enum AssemblyError {
         /// Number of shards.
         of: u64,
     },
-    /// The same fit twice.
+    /// Two results of one fit.
     #[error("the fit of arm `{arm}` from seed {seed} is there twice")]
     TwoOfAFit {
         /// The arm.
@@ -75,26 +75,26 @@ pub enum AssemblyError {
         /// The seed.
         seed: u64,
     },
-    /// Fits that are not there.
+    /// Missing fits.
     #[error(
         "{found} of {wanted} fits are there; the first that is missing is of arm `{arm}` from seed {seed}"
     )]
     MissingFits {
-        /// Number of the fits that are there.
+        /// Number of the present fits.
         found: usize,
         /// Number of all fits.
         wanted: usize,
-        /// Arm of the first that is missing.
+        /// Arm of the first missing fit.
         arm: String,
-        /// Seed.
+        /// Seed of that fit.
         seed: u64,
     },
-    /// No part at all.
-    #[error("there are no shards: there must be at least 1")]
+    /// No shard at all.
+    #[error("the number of shards is 0: it must be at least 1")]
     Nothing,
 }
 
-/// Numbers, of which many are told as the first few.
+/// Numbers as text, at most the first ten.
 fn listed(numbers: &[u64]) -> String {
     const MOST: usize = 10;
     let mut shown: Vec<String> = numbers.iter().take(MOST).map(u64::to_string).collect();
@@ -104,7 +104,7 @@ fn listed(numbers: &[u64]) -> String {
     shown.join(", ")
 }
 
-/// The tables that a shard left, and where they were found.
+/// The tables of a shard, and their place.
 #[derive(Clone, Debug)]
 pub struct ShardTables {
     /// Name of the place, for messages.
@@ -113,16 +113,16 @@ pub struct ShardTables {
     pub texts: FitRows,
 }
 
-/// A study put together from shards.
+/// A study merged from shards.
 #[derive(Clone, Debug)]
 pub struct MergedStudy {
     /// All fits.
     pub fits: Vec<Trained>,
-    /// Seeds 0 to this less 1 of every arm.
+    /// Number of seeds of every arm: 0 to this less 1.
     pub seeds: u64,
 }
 
-/// A shard whose tables were read.
+/// A shard with its tables read.
 struct ReadShard<'t> {
     place: &'t str,
     shard: Shard,
@@ -137,7 +137,7 @@ impl ReadShard<'_> {
 }
 
 impl PreparedStudy {
-    /// Runs a task; rows of its fits, by rising seed. They are the same whatever process runs it and by however many threads.
+    /// Runs a task and returns the rows of its fits, by rising seed. They do not depend on the process or the number of threads.
     ///
     /// ```
     /// use palpate_numerics::watch::Watch;
@@ -156,7 +156,7 @@ impl PreparedStudy {
     /// ```
     ///
     /// # Errors
-    /// [`StudyRunError`], also when `watch` stopped it.
+    /// [`StudyRunError`], also when `watch` stopped the task.
     pub fn run_task(&self, task: &Task, threads: usize, watch: Watch) -> Result<FitRows, StudyRunError> {
         let mut fits = self.fit_tasks(std::slice::from_ref(task), &[], threads, &|_| {}, watch)?;
         fits.sort_by_key(|trained| trained.fit.seed);
@@ -166,10 +166,10 @@ impl PreparedStudy {
         Ok(rows)
     }
 
-    /// The outcomes of a study of `seeds` seeds, from the rows of all its tasks, in any order and without headings.
+    /// Assembles the outcomes of a study of `seeds` seeds from the rows of all its tasks, in any order and without headings.
     ///
     /// # Errors
-    /// [`AssemblyError`] for rows that are not of this study, and for fits that are missing or there twice.
+    /// [`AssemblyError`] for rows that are not of this study, and for missing or repeated fits.
     pub fn assemble(&self, seeds: u64, rows: &FitRows) -> Result<Vec<ArmOutcome>, AssemblyError> {
         let tables = StudyTables::new(self);
         let mut texts = tables.headings();
@@ -181,10 +181,10 @@ impl PreparedStudy {
         Ok(self.by_arm(checkpoint.done, seeds))
     }
 
-    /// The fits of a study, from the tables of all its shards.
+    /// Merges the fits of a study from the tables of all its shards.
     ///
     /// # Errors
-    /// [`AssemblyError`] for shards of another study or another split, one that is missing, unfinished, or there twice.
+    /// [`AssemblyError`] for shards of another study or another split, and for missing, unfinished or repeated ones.
     pub fn merge(&self, shards: &[ShardTables]) -> Result<MergedStudy, AssemblyError> {
         let read = shards.iter().map(|tables| self.read_shard(tables)).collect::<Result<Vec<_>, _>>()?;
         let first = read.first().ok_or(AssemblyError::Nothing)?;
@@ -214,14 +214,14 @@ impl PreparedStudy {
         Ok(MergedStudy { fits: read.into_iter().flat_map(|shard| shard.fits).collect(), seeds })
     }
 
-    /// The fits of a shard that is finished.
+    /// Reads the fits of a finished shard.
     fn read_shard<'t>(
         &self,
         ShardTables { place, texts }: &'t ShardTables,
     ) -> Result<ReadShard<'t>, AssemblyError> {
         let table = |error| AssemblyError::Table { place: place.clone(), error };
         let Some((shard, seeds)) = shard_in(&texts.networks) else {
-            // What the first line has in place of a shard's comment.
+            // The first line names no shard: the table is of a whole study, or invalid.
             StudyTables::new(self).read(texts).map_err(table)?;
             return Err(AssemblyError::Whole { place: place.clone() });
         };
@@ -236,7 +236,7 @@ impl PreparedStudy {
         Ok(ReadShard { place, shard, seeds, fits })
     }
 
-    /// Checks that every fit of so many seeds is there once.
+    /// Checks that every fit of `seeds` seeds is there once.
     fn check_complete(&self, fits: &[Trained], seeds: u64) -> Result<(), AssemblyError> {
         let name = |arm: usize| self.study.arms[arm].name.clone();
         let mut there = HashSet::new();

@@ -1,8 +1,8 @@
 //! Dead areas: is the surface between sensors located as well as the surface over them?
 //!
-//! After Brett and Li: whether there are dead areas depends on how readings are interpreted, not on how many sensors there are.
-//! Every estimator is calibrated on the same bench with 2, 4, 8, … sensors, and beside them an [`ArraySensor`], whose sensors
-//! each respond to contacts near them only. Errors are then folded over all gaps between sensors.
+//! After Brett and Li: whether there are dead areas depends on the interpretation of the readings, not on the number of sensors.
+//! Every estimator is calibrated on the same bench with 2, 4, 8, … sensors. For comparison, an [`ArraySensor`] has sensors that
+//! each respond only to contacts near them. Errors are then folded over all gaps between sensors.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -24,7 +24,7 @@ use palpate_rig::{Rig, RigSimulationError};
 pub const RIG_TOML: &str = include_str!("../../../examples/dead-areas.toml");
 /// Sensor counts of the study.
 pub const COUNTS: [usize; 4] = [2, 4, 8, 16];
-/// Standard deviation of the array sensor's point spread where it is the same at every count, in metres.
+/// Standard deviation of the array sensor's point spread in metres, for the arrays with the same spread at every count.
 const FIXED_SPREAD_M: f64 = 0.01;
 /// Presentations after which a network trained by back-propagation stops.
 const MOST_PRESENTATIONS: usize = 2_000_000;
@@ -32,15 +32,15 @@ const MOST_PRESENTATIONS: usize = 2_000_000;
 /// Settings of the study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeadAreas {
-    /// Beam, noise, force and training positions; its sensors' kind and noise, not their count.
+    /// Beam, noise, force and training positions; kind and noise of its sensors are used, their number is not.
     pub rig: Rig,
     /// Sensor counts.
     pub counts: Vec<usize>,
     /// Calibrations at each count, each with noise of its own.
     pub calibrations: u64,
-    /// An error up to this, in metres, is good enough for the effective length.
+    /// Largest error in metres that counts for the effective length.
     pub tolerance_m: f64,
-    /// Kinds of estimators that are left out.
+    /// Kinds of estimators to leave out.
     pub without: Vec<&'static str>,
     /// Seed of noise and fits.
     pub seed: u64,
@@ -49,7 +49,7 @@ pub struct DeadAreas {
 /// Errors of one estimator at one sensor count.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeadAreaRow {
-    /// "distributive", or what the array sensor's point spread is.
+    /// "distributive", or a description of the array sensor's point spread.
     pub sensing: String,
     /// The estimator's kind.
     pub estimator: &'static str,
@@ -66,13 +66,13 @@ pub struct DeadAreaRow {
 /// Results of the study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeadAreaResults {
-    /// A row an estimator and count.
+    /// One row for each estimator and count.
     pub rows: Vec<DeadAreaRow>,
-    /// Estimators that could not be fitted: sensing, kind, count and why.
+    /// Estimators that could not be fitted: sensing, kind, count and reason.
     pub left_out: Vec<(String, &'static str, usize, String)>,
 }
 
-/// Error of a study of dead areas that does not come to its end.
+/// Error of a study of dead areas.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DeadAreasError {
     /// The rig cannot be simulated.
@@ -106,7 +106,7 @@ impl DeadAreas {
         Ok(findings)
     }
 
-    /// The most often that [`DeadAreas::run`] asks whether to go on while it fits.
+    /// Greatest number of rounds of the fits in [`DeadAreas::run`], each reported to `watch`.
     pub fn most_rounds(&self) -> u64 {
         let rounds = |count: &usize| {
             let estimators = self.estimators(&self.with_sensors(*count));
@@ -115,7 +115,7 @@ impl DeadAreas {
         self.calibrations * self.counts.iter().map(rounds).sum::<u64>()
     }
 
-    /// The rig with so many sensors of its first kind, evenly placed.
+    /// The rig with `count` sensors of its first kind, evenly placed.
     fn with_sensors(&self, count: usize) -> Rig {
         let mut rig = self.rig.clone();
         let length_m = rig.setup.surface().extent().length_m();
@@ -176,14 +176,14 @@ impl DeadAreas {
 /// Width of a sensor's point spread: its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PointSpread {
-    /// In metres, whatever the pitch.
+    /// In metres, independent of the pitch.
     Metres(f64),
     /// In pitches of the array.
     Pitches(f64),
 }
 
-/// A line of n sensors at (i + ½)·l/n. Sensor i reads exp(−(a − x_i)²/(2·s²)) of a contact at a, its response over itself being
-/// 1, plus Gaussian noise; s is its point spread. It is a surface without a model: raw channels, known by recordings.
+/// A line of n sensors at (i + ½)·l/n. Sensor i reads exp(−(a − x_i)²/(2·s²)) for a contact at a, so that its response over itself is
+/// 1, plus Gaussian noise; s is its point spread. The surface has no model: raw channels, known only by recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArraySensor {
     rig: Rig,
@@ -194,7 +194,7 @@ pub struct ArraySensor {
 }
 
 impl ArraySensor {
-    /// An array as long as a rig's surface, pressed at the same training positions with the same force. Its noise has the
+    /// An array of the length of a rig's surface, pressed at the same training positions with the same force. The noise is the
     /// same share of the full scale as that of the rig's first sensor.
     ///
     /// # Errors
@@ -280,13 +280,13 @@ pub const FOLDS: usize = 10;
 /// Errors of all contacts between the outermost sensors, folded over all gaps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FoldedErrors {
-    /// From over a sensor to half-way between two; parts that no contact fell into are left out.
+    /// From over a sensor to half-way between two; parts without a contact are left out.
     pub folds: Vec<Fold>,
     /// Mean error within a tenth of a pitch from a sensor, in metres.
     pub at_sensors_m: f64,
     /// Mean error within a tenth of a pitch from the middle of a gap, in metres.
     pub between_m: f64,
-    /// Share of the contacts between the outermost sensors that are off by more than the tolerance, in %.
+    /// Share of the contacts between the outermost sensors with an error above the tolerance, in %.
     pub dead_percent: f64,
 }
 
@@ -297,7 +297,7 @@ pub struct Fold {
     pub pitches: f64,
     /// Mean error, in metres.
     pub mean_error_m: f64,
-    /// Contacts.
+    /// Number of contacts.
     pub contacts: usize,
 }
 
@@ -333,7 +333,7 @@ impl FoldedErrors {
     }
 }
 
-/// Distance of a contact from the nearest sensor over the distance of the two sensors around it; `None` beyond the outermost.
+/// Distance of a contact from the nearest sensor, divided by the distance of the two sensors around it; `None` beyond the outermost.
 fn pitches_off(places: &[f64], located: &Located) -> Option<f64> {
     let x_m = located.truth.x_m;
     let gap = places.windows(2).find(|gap| gap[0] <= x_m && x_m <= gap[1] && gap[0] < gap[1])?;

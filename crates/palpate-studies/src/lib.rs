@@ -1,8 +1,8 @@
 //! Experiments in sets: arms, each fitted from many seeds and judged at the same contact positions.
 //!
-//! There are two ways to fit an arm. Networks on perfect sensors, as the founding paper has them, share one recording: what a seed
-//! changes is the network's random start, and many are trained at once, in lanes. Of every other arm each seed makes a recording of
-//! its own, with fresh noise, to which the estimator is fitted and by which it is judged.
+//! There are two ways to fit an arm. Networks on perfect sensors, as in the founding paper, share one recording: the seed determines
+//! the network's random start, and many networks are trained at once, in lanes. In every other arm each seed has a recording of
+//! its own, with fresh noise. The estimator is fitted to it and judged by it.
 //!
 //! ```
 //! use palpate_numerics::watch::Watch;
@@ -51,10 +51,10 @@
 //! ```
 //!
 //! A study splits into tasks, blocks of seeds of an arm, which may run in other processes or on other machines, or into shards of
-//! them: [`PreparedStudy::tasks`], [`PreparedStudy::run_task`], [`PreparedStudy::assemble`] and [`PreparedStudy::merge`]. What comes out
-//! does not depend on the split.
+//! them: [`PreparedStudy::tasks`], [`PreparedStudy::run_task`], [`PreparedStudy::assemble`] and [`PreparedStudy::merge`]. The results
+//! do not depend on the split.
 //!
-//! Beside studies from files there are three built in: [`paper`], the founding paper's; [`dead_areas`], what lies between sensors;
+//! Besides studies from files, three are built in: [`paper`], the founding paper's; [`dead_areas`], errors between sensors;
 //! and [`elliott`], components of a plate's readings and a network.
 #![forbid(unsafe_code)]
 #![cfg_attr(

@@ -1,4 +1,4 @@
-//! Results of a study: each arm's figures, with their spread over the seeds.
+//! Results of a study: the figures of each arm, as quantiles over the seeds.
 
 use std::f64::consts::FRAC_2_PI;
 
@@ -21,7 +21,7 @@ pub struct StudyResults {
     pub arms: Vec<ArmResults>,
 }
 
-/// Facts of a study's run, as every file that it writes says.
+/// Facts of a study's run, which every file of the run contains.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunFacts {
     /// Version of palpate.
@@ -35,22 +35,22 @@ pub struct RunFacts {
     /// Shards that were joined, where the study ran in shards.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shards: Option<usize>,
-    /// Threads that fitted; of shards the most that one had.
+    /// Number of threads; for shards the largest of theirs.
     pub threads: usize,
     /// Width of the numbers in training.
     pub precision: Precision,
     /// The arithmetic of the lanes, in words.
     pub arithmetic: String,
-    /// Patterns presented to networks in this run; what an earlier run left is not counted.
+    /// Patterns presented to networks in this run; those of an earlier run do not count.
     pub presentations: u64,
     /// Wall-clock time of the fits, in seconds; the sum over shards.
     pub seconds: f64,
-    /// Their ratio.
+    /// Ratio of `presentations` to `seconds`.
     pub presentations_per_second: f64,
 }
 
 impl RunFacts {
-    /// Facts of a run of `study` that presented so many patterns in so many seconds.
+    /// Facts of a run of `study`, with the number of presentations and the seconds that they took.
     pub fn new(
         study: &PreparedStudy,
         options: RunOptions,
@@ -73,7 +73,7 @@ impl RunFacts {
         }
     }
 
-    /// Facts of a study that was joined from shards, from the facts of each; `None` of no shard.
+    /// Facts of a study joined from shards, by the facts of each; `None` without a shard.
     pub fn of_shards(shards: &[Self]) -> Option<Self> {
         let first = shards.first()?;
         let presentations = shards.iter().fold(0u64, |sum, shard| sum.saturating_add(shard.presentations));
@@ -98,15 +98,15 @@ impl RunFacts {
 pub struct ArmResults {
     /// The arm.
     pub name: String,
-    /// Estimator and bench, in a study whose arms differ in them.
+    /// Estimator and bench; `None` if all arms of the study have the same.
     #[serde(flatten)]
     pub set_up: Option<SetUp>,
     /// Seeds that were fitted.
     pub seeds: usize,
-    /// Seeds whose training converged; `None` for an estimator that is not trained by epochs.
+    /// Number of seeds with converged training; `None` for an estimator that is not trained by epochs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged: Option<usize>,
-    /// Epochs of training, likewise.
+    /// Epochs of training; `None` for an estimator that is not trained by epochs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub epochs: Option<Quantiles>,
     /// Average percentage error over all positions.
@@ -115,16 +115,16 @@ pub struct ArmResults {
     pub max_error_percent: Quantiles,
     /// Share of the positions located within the tolerance, in %.
     pub effective_length_percent: Quantiles,
-    /// The same errors by portion; in JSON as `error_percent_20_380` and so on.
+    /// Errors by portion; in JSON as `error_percent_20_380` and so on.
     #[serde(flatten, serialize_with = "portions_as_keys")]
     pub portions: Vec<PortionResults>,
-    /// Errors between the outermost training positions and beyond them, where the study asks for them.
+    /// Errors between the outermost training positions and beyond them, if the study requests them.
     #[serde(flatten)]
     pub training_span: Option<TrainingSpanResults>,
-    /// The limit, where sensors have noise.
+    /// The limit; `None` without noise.
     #[serde(flatten)]
     pub limit: Option<LimitResults>,
-    /// Share of the estimator's 95 % intervals that hold their contact, in %, where it has them.
+    /// Share of the estimator's 95 % intervals that contain the contact, in %; `None` for an estimator without intervals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage_percent: Option<Quantiles>,
 }
@@ -134,15 +134,15 @@ pub struct ArmResults {
 pub struct SetUp {
     /// The kind of its estimator.
     pub estimator: &'static str,
-    /// Knowledge of the force that the estimator has.
+    /// Force of the contacts: known or unknown to the estimator.
     pub force: Force,
-    /// The method that its layout was asked for by.
+    /// The method of its layout; `None` for a layout given by positions.
     pub layout: Option<&'static str>,
     /// Sensors.
     pub sensors: Vec<SensorPlace>,
 }
 
-/// A sensor in short.
+/// Kind and position of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SensorPlace {
     /// Kind.
@@ -160,7 +160,7 @@ pub struct PortionResults {
     pub error_percent: Quantiles,
     /// Largest percentage error.
     pub max_error_percent: Quantiles,
-    /// Average percentage error of an estimator at the limit, where there is a limit.
+    /// Average percentage error of an estimator at the limit; `None` without a limit.
     pub limit_error_percent: Option<f64>,
 }
 
@@ -169,20 +169,20 @@ pub struct PortionResults {
 pub struct TrainingSpanResults {
     /// Portion from one outermost training position to the other.
     pub training_span: Portion,
-    /// Average percentage error between them; `None` where nothing is judged there.
+    /// Average percentage error between them; `None` without a position there.
     pub error_percent_within_training: Option<Quantiles>,
-    /// Average percentage error beyond them, likewise.
+    /// Average percentage error beyond them; `None` without a position there.
     pub error_percent_beyond_training: Option<Quantiles>,
 }
 
 /// Cramér–Rao limit of an arm, as figures of error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LimitResults {
-    /// Average percentage error of an estimator at the limit, over all positions. Where readings hardly tell the position, it is
-    /// still known that the contact lies on the surface: the limit s counts as 1/√(1/s² + 12/l²), with l the surface's length.
+    /// Average percentage error of an estimator at the limit, over all positions. The contact is known to lie on the surface, also where
+    /// the readings hardly determine the position. So the limit s counts as 1/√(1/s² + 12/l²), with l the surface's length.
     pub limit_error_percent: f64,
-    /// Average error over the limit's, at contacts at least 1/80 of the length from the ends whose limit is at most 1/200 of it;
-    /// `None` where there are none.
+    /// Ratio of the average error to the average error at the limit; `None` without contacts that count. These are at least 1/80 of the
+    /// length from the ends, and have a limit of at most 1/200 of the length.
     pub error_over_limit: Option<Quantiles>,
 }
 
@@ -204,10 +204,10 @@ fn portions_as_keys<S: serde::Serializer>(
 }
 
 impl StudyResults {
-    /// Sums up the outcomes of a run of `study`, an outcome an arm.
+    /// Summarizes the outcomes of a run of `study`, one for each arm.
     pub fn new(outcomes: &[ArmOutcome], study: &PreparedStudy) -> Self {
         let set_ups: Vec<SetUp> = study.study.arms.iter().map(SetUp::new).collect();
-        // What is the same for all arms, the study file says once.
+        // If all arms have the same, the study file states it.
         let same =
             |a: &SetUp, b: &SetUp| (a.estimator, a.force, &a.sensors) == (b.estimator, b.force, &b.sensors);
         let differ = set_ups.windows(2).any(|pair| !same(&pair[0], &pair[1]));
@@ -219,7 +219,7 @@ impl StudyResults {
         Self { arms: outcomes.iter().filter_map(results).collect() }
     }
 
-    /// The arm called `name`.
+    /// The arm with this name.
     pub fn arm(&self, name: &str) -> Option<&ArmResults> {
         self.arms.iter().find(|arm| arm.name == name)
     }
@@ -286,14 +286,14 @@ impl ArmResults {
     }
 }
 
-/// Positions where locators are judged, with the mean error there of an estimator at the limit, in metres.
+/// The judged positions, with the mean error of an estimator at the limit at each, in metres.
 fn allowed(arm: &Arm, judging: &Judging) -> Option<Vec<(Position, f64)>> {
     let force_n = arm.rig.setup.force_n().or(arm.rig.pressed_setup().ok()?.force_n())?;
     let errors_m = expected_errors_m(&arm.rig.setup, force_n, &judging.positions)?;
     Some(judging.positions.iter().copied().zip(errors_m).collect())
 }
 
-/// The mean within a portion, or of all.
+/// The mean over the figures within a portion, or over all.
 fn mean(figures: &[(Position, f64)], portion: Option<Portion>) -> Option<f64> {
     let inside = |at: Position| portion.is_none_or(|portion| portion.contains(at));
     let inner: Vec<f64> = figures.iter().filter(|(at, _)| inside(*at)).map(|(_, figure)| *figure).collect();
@@ -327,18 +327,18 @@ pub(super) fn percent(
     evaluation.summary(portion).map(|summary| percentage_error(pick(summary), evaluation.extent.length_m()))
 }
 
-/// Average error of the contacts at the positions that `keep` wants, in % of the length.
+/// Average error of the contacts at the positions that `keep` accepts, in % of the length.
 pub(super) fn average_percent(evaluation: &Evaluation, keep: impl Fn(Position) -> bool) -> Option<f64> {
     let located = evaluation.located.iter().filter(|located| keep(located.truth)).copied().collect();
     percent(&Evaluation { located, ..*evaluation }, None, |summary| summary.average_m)
 }
 
-/// Mean error, in metres, of an estimator at the limit at each of `positions`, for contacts of `force_n` newtons; `None` where the
-/// bench has no limit.
+/// Mean error, in metres, of an estimator at the limit at each of `positions`, for contacts of `force_n` newtons; `None` for a
+/// bench without a limit.
 ///
-/// Where readings hardly tell the position, the limit is boundless, but it is still known that the contact lies on the surface. So
-/// the bound's standard deviation s is combined with a flat prior of variance l²/12, as a sensor design scores contacts:
-/// √(2/π) / √(1/s² + 12/l²), with l the surface's length. Where s is small, that is the mean error of the bound itself.
+/// Where readings hardly determine the position, the limit is unbounded, but the contact is known to lie on the surface. So
+/// the bound's standard deviation s is combined with a flat prior of variance l²/12, as in the scores of a sensor design:
+/// √(2/π) / √(1/s² + 12/l²), with l the surface's length. For small s, this is the mean error of the bound itself.
 fn expected_errors_m(setup: &Setup, force_n: f64, positions: &[Position]) -> Option<Vec<f64>> {
     let limit = setup.cramer_rao_bound().ok()?;
     let force = setup.force();

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::paper::{Claim, PublishedFigure};
 use super::results::{RunFacts, StudyResults};
 
-/// Content of `results.json`: results with the facts of their run, and of the founding paper's study how they compare with it.
+/// Content of `results.json`: results and the facts of their run; for the founding paper's study also a comparison with the paper.
 #[derive(Clone, Debug, Serialize)]
 pub struct ResultsFile<'a> {
     /// Facts of the run.

@@ -1,4 +1,4 @@
-//! A study made ready and run: its layouts found, its recordings made, and every arm's seeds fitted, in lanes and threads.
+//! Preparation and run of a study: its layouts, its recordings, and the fits of every arm's seeds, in lanes and threads.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -24,14 +24,14 @@ use super::task::Task;
 /// Error of running a study.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StudyRunError {
-    /// The layout that an arm asks for cannot be had.
+    /// The layout of an arm cannot be designed.
     #[error("arm `{arm}`: {error}")]
     Design {
         /// The arm.
         arm: String,
-        /// The bytes of the study file that ask for it.
+        /// The bytes of the study file that state the method.
         span: Range<usize>,
-        /// Why.
+        /// The problem.
         error: Box<DesignError>,
     },
     /// An arm's bench cannot be simulated.
@@ -39,7 +39,7 @@ pub enum StudyRunError {
     Simulate {
         /// The arm.
         arm: String,
-        /// Why.
+        /// The problem.
         error: RigSimulationError,
     },
     /// An arm's estimator cannot be fitted, or evaluated.
@@ -47,7 +47,7 @@ pub enum StudyRunError {
     Fit {
         /// The arm.
         arm: String,
-        /// Why.
+        /// The problem.
         error: EvaluationError<FitError>,
     },
     /// A task of an arm that the study does not have.
@@ -58,7 +58,7 @@ pub enum StudyRunError {
         /// The study's arms.
         known: Vec<String>,
     },
-    /// The run was stopped; what was finished has been observed.
+    /// The run was stopped; finished fits have been reported.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
@@ -66,20 +66,20 @@ pub enum StudyRunError {
 /// A study that is ready to be run.
 #[derive(Clone, Debug)]
 pub struct PreparedStudy {
-    /// The study, with the layouts that its arms asked for.
+    /// The study, with the layouts that methods determined.
     pub study: Study,
     arms: Vec<PreparedArm>,
 }
 
-/// Way of fitting an arm.
+/// Method of fitting an arm.
 #[derive(Clone, Debug)]
 enum PreparedArm {
-    /// Networks on perfect sensors: one recording for all seeds, and one to judge by.
+    /// Networks on perfect sensors: one recording for all seeds, and one for judging.
     InLanes(Box<InLanes>),
-    /// Anything else: a calibration that is simulated anew for each seed.
+    /// Any other arm: a calibration that is simulated anew for each seed.
     SeedBySeed {
         calibration: Box<Calibration>,
-        /// Contacts that every seed is judged by, one a reading.
+        /// Contacts by which every seed is judged, one for each reading.
         contacts: Vec<Contact>,
         /// Patterns of an epoch; 0 for an estimator that is not trained by epochs.
         patterns: usize,
@@ -89,7 +89,7 @@ enum PreparedArm {
 /// An arm of networks on perfect sensors.
 #[derive(Clone, Debug)]
 struct InLanes {
-    /// Estimator to fit: networks.
+    /// Estimator of the arm: networks.
     estimator: Estimator,
     setup: Setup,
     trial: Split,
@@ -102,10 +102,10 @@ impl InLanes {
 }
 
 impl PreparedStudy {
-    /// Finds the layouts that arms ask for, and makes the recordings that all seeds of an arm share.
+    /// Determines the layouts by method, and simulates the recordings that all seeds of an arm share.
     ///
     /// # Errors
-    /// [`StudyRunError`], naming the arm, or when `watch` stopped the search for layouts.
+    /// [`StudyRunError`] with the name of the arm, or when `watch` stopped the search for layouts.
     pub fn new(study: Study, watch: Watch) -> Result<Self, StudyRunError> {
         let study = lay_out(study, watch)?;
         let arms = study.arms.iter().map(|arm| PreparedArm::new(arm, &study));
@@ -113,8 +113,8 @@ impl PreparedStudy {
         Ok(Self { study, arms })
     }
 
-    /// Whether an arm's fits are networks, which are restored from the weights in `networks.csv`; of others `evaluations.csv` keeps what
-    /// they located.
+    /// Whether an arm's fits are networks, which are restored from the weights in `networks.csv`; for other fits `evaluations.csv` keeps the
+    /// located positions.
     pub fn keeps_weights(&self, arm: usize) -> bool {
         matches!(self.study.arms[arm].rig.estimator, Estimator::Network(_))
     }
@@ -124,7 +124,7 @@ impl PreparedStudy {
         matches!(self.arms[arm], PreparedArm::InLanes(_))
     }
 
-    /// Patterns that an epoch of each arm presents; 0 for an estimator that is not trained by epochs.
+    /// Patterns in an epoch of an arm; 0 for an estimator that is not trained by epochs.
     pub fn patterns(&self, arm: usize) -> usize {
         match &self.arms[arm] {
             PreparedArm::InLanes(arm) => arm.trial.training.rows.len(),
@@ -137,17 +137,17 @@ impl PreparedStudy {
         fit.training.map_or(0, |training| u64::from(training.epochs) * self.patterns(*arm) as u64)
     }
 
-    /// Judges a network that was trained in lanes as its arm is judged; `None` for another arm or other channels.
+    /// Judges a network that was trained in lanes; `None` for an arm that is not trained in lanes, or for other channels.
     fn judge(&self, arm: usize, seed: u64, locator: Locator) -> Option<Trained> {
         let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
         let evaluation = Evaluation::new(&locator, &prepared.trial.judged).ok()?;
         Some(Trained { arm, fit: Calibrated { seed, locator, evaluation }.into() })
     }
 
-    /// The place of the arm called `name` in the study.
+    /// The index of the arm with this name in the study.
     ///
     /// # Errors
-    /// [`StudyRunError::NoArm`], with the names that there are.
+    /// [`StudyRunError::NoArm`], with the names of all arms.
     pub fn arm(&self, name: &str) -> Result<usize, StudyRunError> {
         self.study.arms.iter().position(|arm| arm.name == name).ok_or_else(|| StudyRunError::NoArm {
             arm: name.to_owned(),
@@ -155,7 +155,7 @@ impl PreparedStudy {
         })
     }
 
-    /// Contacts that every seed of an arm is judged by, one a reading; nothing of an arm whose networks are trained in lanes.
+    /// Contacts by which every seed of an arm is judged, one for each reading; empty for an arm trained in lanes.
     pub(crate) fn contacts(&self, arm: usize) -> &[Contact] {
         match &self.arms[arm] {
             PreparedArm::InLanes(_) => &[],
@@ -163,8 +163,8 @@ impl PreparedStudy {
         }
     }
 
-    /// A network of this study, from its weights and outcome, and judged; `None` when their number is not the network's, or for an arm
-    /// of another estimator.
+    /// Restores a network of this study from its weights and outcome, and judges it; `None` for a wrong number of weights, or for an arm
+    /// with another estimator.
     pub fn restore(
         &self,
         arm: usize,
@@ -181,7 +181,7 @@ impl PreparedStudy {
             }
             PreparedArm::SeedBySeed { calibration, .. } => {
                 let Estimator::Network(network) = &self.study.arms[arm].rig.estimator else { return None };
-                // The recording of a seed is simulated again: it is the same to the last bit.
+                // The recording of a seed is simulated again; it is the same to the last bit.
                 let restored = |task: FitTask| match network.restore(task, weights, outcome) {
                     Ok(Some(locator)) => Ok(locator.map(Method::Network)),
                     Ok(None) | Err(_) => Err(Cancelled),
@@ -213,7 +213,7 @@ impl PreparedArm {
                 Ok(Self::InLanes(Box::new(InLanes { estimator, setup: setup.clone(), trial })))
             }
             estimator => {
-                // Where sensors have noise, locators are judged by as many readings at each position as the study says.
+                // With noisy sensors, locators are judged by the study's number of readings at each position.
                 let noisy = setup.layout().sensors().iter().any(|sensor| sensor.channel.noise_sd > 0.0);
                 let readings = if noisy { judging.readings } else { 1 };
                 let calibration = arm.rig.calibration().map_err(simulated)?;
@@ -227,10 +227,10 @@ impl PreparedArm {
     }
 }
 
-/// Seed of the searches, the same whatever the study's seeds are: a layout is part of what an arm is.
+/// Seed of the searches for layouts. A layout is part of its arm, so it does not depend on the study's seeds.
 const LAYOUT_SEED: u64 = 0;
 
-/// Gives every arm that asks for a layout the one that the study's `[design]` leads to; arms that ask alike get the same.
+/// Gives every arm with a layout by method the result of the study's `[design]`; arms with equal requests get the same.
 fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunError> {
     let mut found: Vec<(LayoutRequest, Layout)> = Vec::new();
     for arm in &mut study.arms {
@@ -257,7 +257,7 @@ fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunError> {
     Ok(study)
 }
 
-/// Request that a layout follows from.
+/// Inputs that determine a layout.
 #[derive(PartialEq)]
 struct LayoutRequest {
     method: DesignMethod,
@@ -280,23 +280,23 @@ fn request(arm: &Arm) -> Option<(AskedLayout, LayoutRequest)> {
     Some((asked, LayoutRequest { method, setup, design }))
 }
 
-/// One fitted seed of an arm: what results and files need of it.
+/// One fitted seed of an arm, as results and files need it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainedSeed {
     /// The seed.
     pub seed: u64,
-    /// Outcome of its training; `None` of an estimator that is not trained by epochs.
+    /// Outcome of its training; `None` for an estimator that is not trained by epochs.
     pub training: Option<TrainingOutcome>,
-    /// Weights of a network; nothing of another estimator.
+    /// Weights of a network; empty for another estimator.
     pub weights: Vec<f64>,
-    /// What it located.
+    /// The located contacts.
     pub evaluation: Evaluation,
 }
 
 impl From<Calibrated<Method>> for TrainedSeed {
     fn from(Calibrated { seed, locator, mut evaluation }: Calibrated<Method>) -> Self {
         let training = locator.training_outcome();
-        // Files of a study have neither, and its results do not depend on whether a fit comes from one.
+        // Files of a study contain neither, and the results must not depend on whether a fit comes from one.
         for located in &mut evaluation.located {
             (located.status, located.force) = (None, None);
         }
@@ -304,7 +304,7 @@ impl From<Calibrated<Method>> for TrainedSeed {
     }
 }
 
-/// A fitted seed with the place of its arm in the study.
+/// A fitted seed with the index of its arm in the study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trained {
     /// Index of the arm.
@@ -323,7 +323,7 @@ pub struct ArmOutcome {
 }
 
 impl ArmOutcome {
-    /// The spread over the seeds of a figure of each contact, the mean of all readings of a seed at a position: by x in metres.
+    /// Quantiles over the seeds of a figure of each contact, by x in metres; for each seed, the mean over all readings at a position.
     pub fn by_position(&self, figure: impl Fn(&Located) -> f64) -> Vec<(f64, Quantiles)> {
         let means = |fit: &TrainedSeed| -> Vec<(f64, f64)> {
             let positions = fit.evaluation.located.chunk_by(|a, b| a.truth == b.truth);
@@ -348,23 +348,23 @@ pub struct RunOptions {
     pub threads: usize,
 }
 
-/// Callback for every seed that is fitted, from many threads at once.
+/// Callback for every fitted seed; several threads may call it at once.
 pub type OnTrained<'a> = dyn Fn(&Trained) + Sync + 'a;
 
 impl PreparedStudy {
-    /// Number of networks that train side by side: a block of seeds that is a multiple of it fills the lanes.
+    /// Number of networks that train side by side; a block of seeds that is a multiple of this number fills the lanes.
     pub fn lanes(&self) -> u64 {
         self.study.precision.lanes() as u64
     }
 
-    /// The tasks of so many seeds of every arm, costliest arms first, in blocks of `block` seeds, at least 1.
+    /// The tasks of `seeds` seeds of every arm, costliest arms first, in blocks of `block` seeds, at least 1.
     pub fn tasks(&self, seeds: u64, block: u64) -> Vec<Task> {
         let arms = self.arms_by_cost().into_iter();
         arms.flat_map(|arm| Task::blocks(&self.study.arms[arm].name, seeds, block)).collect()
     }
 
-    /// The tasks that are left of so many seeds of every arm, where those in `done` are finished: in the order of
-    /// [`PreparedStudy::tasks`], blocks of at most `block` seeds that follow each other.
+    /// The unfinished tasks of `seeds` seeds of every arm, without the fits in `done`: in the order of [`PreparedStudy::tasks`], blocks
+    /// of at most `block` successive seeds.
     pub fn tasks_left(&self, seeds: u64, block: u64, done: &[Trained]) -> Vec<Task> {
         let done: HashSet<(usize, u64)> = done.iter().map(|t| (t.arm, t.fit.seed)).collect();
         let mut left: Vec<Task> = Vec::new();
@@ -382,12 +382,12 @@ impl PreparedStudy {
         left
     }
 
-    /// Fits every seed of every arm but those in `done`, and answers with all of them. A seed gives the same fit whatever the number of
-    /// threads and whatever was done before.
+    /// Fits every seed of every arm except those in `done`, and returns all of them. The fit of a seed depends neither on the number of
+    /// threads nor on earlier fits.
     ///
     /// # Errors
-    /// [`StudyRunError`] when an estimator cannot be fitted to what its arm's sensors read, or when `watch` stopped the run; what
-    /// was finished by then `on_trained` has been told of.
+    /// [`StudyRunError`] when an estimator cannot be fitted to its arm's readings, or when `watch` stopped the run. `on_trained` has
+    /// received the finished fits by then.
     pub fn run(
         &self,
         options: RunOptions,
@@ -400,8 +400,8 @@ impl PreparedStudy {
         Ok(self.by_arm(done, options.seeds))
     }
 
-    /// Fits the seeds of some tasks but those in `done`, by `threads` threads, in no particular order. A seed gives the same fit whatever
-    /// the tasks, the threads and what was done before.
+    /// Fits the seeds of some tasks except those in `done`, with `threads` threads, in no particular order. The fit of a seed depends
+    /// neither on the tasks, nor on the threads, nor on earlier fits.
     ///
     /// # Errors
     /// [`StudyRunError`] as for [`PreparedStudy::run`], and for an arm that the study does not have.
@@ -428,7 +428,7 @@ impl PreparedStudy {
                     PreparedArm::SeedBySeed { calibration, .. } => queue.fit_each(calibration, watch),
                 };
                 if let Err(error) = fitted {
-                    // The first error is the cause; a cancellation by it comes later.
+                    // The first error is the cause; a cancellation that it causes comes later.
                     lock(&failed).get_or_insert(error);
                     return;
                 }
@@ -445,7 +445,7 @@ impl PreparedStudy {
         }
     }
 
-    /// The seeds of every arm that are to be fitted.
+    /// The seeds of every arm that remain to be fitted.
     fn work(&self, tasks: &[Task], done: &[Trained]) -> Result<Vec<ArmWork>, StudyRunError> {
         let mut taken: HashSet<(usize, u64)> = done.iter().map(|t| (t.arm, t.fit.seed)).collect();
         let mut seeds = vec![Vec::new(); self.arms.len()];
@@ -456,14 +456,14 @@ impl PreparedStudy {
         Ok(seeds.into_iter().map(|seeds| ArmWork { seeds, taken: AtomicU64::new(0) }).collect())
     }
 
-    /// Arms in lanes first, the costliest of them first; the seeds of others fill the ends of the threads.
+    /// Arms in lanes first, the costliest of them first; the seeds of other arms keep all threads busy at the end.
     fn arms_by_cost(&self) -> Vec<usize> {
         let mut arms: Vec<usize> = (0..self.arms.len()).collect();
         arms.sort_by_key(|arm| std::cmp::Reverse((self.is_in_lanes(*arm), self.patterns(*arm))));
         arms
     }
 
-    /// Fits sorted into an outcome an arm, of seeds 0 to `seeds` less 1.
+    /// Sorts fits into one outcome for each arm, with seeds 0 to `seeds` less 1.
     pub fn by_arm(&self, finished: Vec<Trained>, seeds: u64) -> Vec<ArmOutcome> {
         let mut outcomes: Vec<ArmOutcome> = self
             .study
@@ -483,7 +483,7 @@ impl PreparedStudy {
     }
 }
 
-/// The seeds of an arm that are to be fitted, and how many are taken.
+/// The seeds of an arm that remain to be fitted, and the number of those that threads have taken.
 struct ArmWork {
     seeds: Vec<u64>,
     taken: AtomicU64,
@@ -508,7 +508,7 @@ impl Queue<'_> {
             .map_err(|error| unfitted(name, EvaluationError::Fit(error)))
     }
 
-    /// Fits seed after seed of an arm, until none is left.
+    /// Fits seed after seed of an arm, up to the last.
     fn fit_each(&mut self, calibration: &Calibration, watch: Watch) -> Result<(), StudyRunError> {
         let arm = &self.study.study.arms[self.arm];
         while let Some(seed) = self.next_seed() {
@@ -546,7 +546,7 @@ impl SeedQueue<Locator> for Queue<'_> {
     }
 
     fn fitted(&mut self, seed: u64, locator: Locator) {
-        // A locator of the study's own fitting has the study's channels.
+        // A locator that the study fitted has the study's channels.
         if let Some(trained) = self.study.judge(self.arm, seed, locator) {
             self.finish(trained);
         }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-/// Fits that are made together: some seeds of one arm. A plain value, which may be sent to another process or machine.
+/// Seeds of one arm that are fitted together: a plain value, which may be sent to another process or machine.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Task {
@@ -18,12 +18,12 @@ pub struct Task {
 pub(crate) const MOST_SEEDS: u64 = 1_000_000;
 
 impl Task {
-    /// Number of its fits.
+    /// Number of fits.
     pub fn fits(&self) -> u64 {
         self.seeds.end.saturating_sub(self.seeds.start)
     }
 
-    /// The seeds 0 to `seeds` less 1 of an arm in blocks of `block`, which is at least 1; the last block has what is left.
+    /// The seeds 0 to `seeds` less 1 of an arm in blocks of `block`, at least 1; the last block has the remaining seeds.
     pub(crate) fn blocks(arm: &str, seeds: u64, block: u64) -> impl Iterator<Item = Self> {
         let block = block.max(1);
         (0..seeds.div_ceil(block)).map(move |i| {
@@ -49,16 +49,16 @@ pub struct Shard {
     of: u64,
 }
 
-/// Error of naming a shard.
+/// Error of an invalid shard.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ShardError {
     /// Not of the form K/N.
-    #[error("{found:?} is no shard: it must be K/N, the K-th of N shares, as in 3/16")]
+    #[error("{found:?} is not a shard: it must be K/N, the K-th of N shares, as in 3/16")]
     NotAShard {
         /// The text.
         found: String,
     },
-    /// A number that is not one of the shards.
+    /// A number outside the range of the shards.
     #[error("shard {number} of {of}: it must be from 1 to {of}")]
     Number {
         /// The number.
@@ -104,7 +104,7 @@ impl Shard {
 
     /// The tasks of this shard among all tasks of a study.
     pub fn share(self, tasks: Vec<Task>) -> Vec<Task> {
-        // Neighbours are of one arm and cost alike, so that every shard gets its share of the costly arms.
+        // Neighbours are of one arm and have similar costs, so that every shard gets its share of the costly arms.
         let step = usize::try_from(self.of).unwrap_or(usize::MAX);
         let first = usize::try_from(self.number - 1).unwrap_or(usize::MAX);
         tasks.into_iter().skip(first).step_by(step).collect()
@@ -127,7 +127,7 @@ impl FromStr for Shard {
     }
 }
 
-/// A whole number of digits alone.
+/// A whole number written with digits only.
 fn whole(digits: &str) -> Option<u64> {
     digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| digits.parse().ok())?
 }

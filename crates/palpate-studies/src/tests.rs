@@ -80,7 +80,7 @@ fn locators_come_to_their_arms_limit() {
     }
     assert_eq!(known.set_up.as_ref().unwrap().force, Force::Known);
     assert_eq!(unknown.set_up.as_ref().unwrap().force, Force::Unknown);
-    // Blind ends, a known force and reactions which see them.
+    // A known force, or reactions, make the ends locatable.
     assert!(unknown.error_percent.median > 5.0 * known.error_percent.median);
     assert!(unknown.error_percent.median > 5.0 * reactions.error_percent.median);
     let places = &reactions.set_up.as_ref().unwrap().sensors;

@@ -1,4 +1,4 @@
-//! The folder of real recordings, which lies beside the workspace and is no part of it.
+//! The folder of real recordings, which lies beside the workspace and is not a part of it.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use super::skip::skip;
 /// let Some(path) = data::recording("tactile-fsi/1d-water-1.5mm.csv") else { return };
 /// ```
 pub fn recording(name: &str) -> Option<PathBuf> {
-    // As cargo says when the test runs: what it said at build time is stale once a clone has moved.
+    // From cargo's environment at run time: the path at build time is stale once a clone has moved.
     let package = env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
     let beside = || Path::new(&package).join("../../../shared/data");
     let folder = env::var_os("PALPATE_DATA").map_or_else(beside, PathBuf::from);

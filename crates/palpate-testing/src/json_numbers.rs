@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-/// Numbers that tear at whatever takes them for sound: none, nearly none, too many, too large, of the other sign.
+/// Numbers that break code without checks: zero, nearly zero, too many, too large, of the other sign.
 pub const HOSTILE: [&str; 10] = [
     "0",
     "-0.0",

@@ -1,4 +1,4 @@
-//! A test that finds a prerequisite missing says so in one line and passes, or fails when skips are forbidden.
+//! A test with a missing prerequisite prints one line and passes, or fails when skips are forbidden.
 
 use std::env;
 use std::fs::OpenOptions;

@@ -50,9 +50,9 @@ const SENSORS: [(Sensors, &str); 3] = [
 enum Loads {
     /// One to three disjoint loads at random.
     Random,
-    /// The random loads of which one is beside a support.
+    /// The random loads with one load beside a support.
     BesideSupport,
-    /// The random loads of which none is.
+    /// The random loads without a load beside a support.
     AwayFromSupports,
     /// 20 N on 370–390 mm and 2 N on 100–160 mm.
     HeavyAndLight,
@@ -193,7 +193,7 @@ pub struct TableRow {
     pub patch_force: IntervalFigures,
     /// Centre of each patch, of the same readings.
     pub patch_centre: IntervalFigures,
-    /// Share of the loads, of readings with fewer patches, whose centre is in the interval of a patch's centre, in %.
+    /// Share of the loads, in readings with fewer patches, with a centre in the interval of a patch's centre, in %.
     pub merged_centres: Option<f64>,
 }
 

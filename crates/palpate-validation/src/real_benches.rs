@@ -50,7 +50,7 @@ pub struct TableRow {
     pub world: &'static str,
     /// "once" for readings that are tared before the first contact, "each" before each.
     pub tared: &'static str,
-    /// The reason for which there are no figures.
+    /// Reason for missing figures.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
     /// Figures over all seeds.
@@ -86,7 +86,7 @@ fn chosen(names: &[String]) -> Result<Vec<(&'static str, &'static str)>> {
     let find = |name: &String| {
         let known = BENCHES.map(|(name, _)| name).join(", ");
         let bench = BENCHES.into_iter().find(|(bench, _)| bench == name);
-        bench.with_context(|| format!("there is no bench `{name}`; there are {known}"))
+        bench.with_context(|| format!("no bench is named `{name}`; there are {known}"))
     };
     names.iter().map(find).collect()
 }
@@ -157,7 +157,7 @@ fn judged(bench: &Bench, options: &Options) -> Result<Vec<Judged>> {
     for seed in 0..options.seeds {
         let recordings = bench.record(options.contacts, seed)?;
         for (estimator, (tallies, failure)) in estimators.iter().zip(&mut tallies) {
-            // An estimator that refuses a bench has a row that says why.
+            // An estimator that refuses a bench has a row with the reason.
             if let Err(error) = recordings.judge(estimator, seed, &zeros, tallies) {
                 *failure = Some(format!("seed {seed}: {error:#}"));
             }
@@ -197,7 +197,7 @@ const COLUMNS: [&str; 14] = [
     "world",
     "tared",
     "median, mean error (mm)",
-    "said at held-out places",
+    "coverage at held-out places",
     "position in 95 %",
     "force in 95 %",
     "outside model",
@@ -271,7 +271,7 @@ mod tests {
         let refused = run(&options, |_, _, _| ()).unwrap_err().to_string();
         assert_eq!(
             refused,
-            "there is no bench `real-bridge`; there are real-strip, real-finger, real-skin, real-floor"
+            "no bench is named `real-bridge`; there are real-strip, real-finger, real-skin, real-floor"
         );
     }
 }

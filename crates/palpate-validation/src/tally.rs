@@ -10,7 +10,7 @@ pub struct Tally {
     touches: Evaluation,
     untouched: Count,
     light: Count,
-    /// Coverage of the position that each fit said of held-out places, in %: by the method, and once widened.
+    /// Coverage of the position at held-out places that each fit reports, in %: by the method, and once widened.
     said: Vec<[f64; 2]>,
 }
 
@@ -30,9 +30,9 @@ pub struct Figures {
     pub median_error_mm: Option<f64>,
     /// Mean distance, in mm.
     pub mean_error_mm: Option<f64>,
-    /// Held-out presses that the method's regions of the position contain, as `fit` says; `None` where it does not check them.
+    /// Held-out presses within the method's regions of the position, from the check of `fit`; `None` without this check.
     pub said_before: Option<f64>,
-    /// The same of the regions that it widens.
+    /// Held-out presses within the widened regions.
     pub said_after: Option<f64>,
     /// 95 % regions of the position that contain it.
     pub position_coverage: Option<f64>,
@@ -68,7 +68,7 @@ impl Tally {
         Self { touches, untouched: Count::default(), light: Count::default(), said: Vec::new() }
     }
 
-    /// Adds what a fit said of its intervals, where it checked them.
+    /// Adds the check of a fit's intervals, where there is one.
     pub fn add_interval_check(&mut self, check: Option<&IntervalCheck>) {
         self.said.extend(check.map(|check| [check.position.before_percent, check.position.after_percent]));
     }

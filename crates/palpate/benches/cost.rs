@@ -49,7 +49,7 @@ fn main() {
     }
 }
 
-/// Those whose fit depends on the rows by more than a sum.
+/// Estimators with a fit that depends on the rows by more than a sum.
 fn estimators(setup: &Setup, recording: &Recording) -> Vec<Estimator> {
     let all = contenders(setup, &Estimator::default(), recording.rows.len()).into_iter();
     all.filter(|estimator| !matches!(estimator.kind(), "centroid" | "closed-form" | "digit")).collect()
@@ -120,7 +120,7 @@ fn report(bench: (&str, usize, usize), kind: &str) {
     );
 }
 
-/// Memory that this process has, or has had at most; NaN where the system does not tell.
+/// Memory of this process, now or at most; NaN where the system does not report it.
 fn memory_mb(of: &str) -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix(of));

@@ -241,7 +241,7 @@ fn fit_many_rows(kind: &str) {
     );
 }
 
-/// The most memory that this process has had; NaN where the system does not tell.
+/// Peak memory of this process; NaN where the system does not report it.
 fn peak_memory_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));

@@ -1,6 +1,6 @@
 //! `cargo bench -p palpate --bench statuses`: what every estimator says of readings that it should not believe, and of those that it should, as the
 //! table of docs/statuses.md: noise alone, a second contact, a channel that is stuck, channels in another order, absurd values; and how often its
-//! 95 % intervals hold contacts of half to twice the force of the presses. Five calibrations of each bench share the readings of a figure; `PALPATE_CASES` is
+//! 95 % intervals contain contacts of half to twice the force of the presses. Five calibrations of each bench share the readings of a figure; `PALPATE_CASES` is
 //! their number, 2,000 unless said otherwise. `-- beam` takes the benches whose names begin so.
 
 use palpate_estimators::arrangement::Training;
@@ -29,7 +29,7 @@ struct Bench {
     name: &'static str,
     /// The surface with its model and sensors.
     physics: Setup,
-    /// The surface and sensors as the locator knows them.
+    /// Surface and sensors of the locator.
     setup: Setup,
     presses: Recording,
 }
@@ -65,7 +65,7 @@ fn benches(seed: u64) -> Vec<Bench> {
     ]
 }
 
-/// The same presses with half, the whole and twice the force in turn, as a board of one's own has them.
+/// The presses with half, once and twice the force in turn, as on a board without a model.
 fn of_several_forces(Bench { physics, presses, .. }: &Bench, seed: u64) -> Recording {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(100 + seed);
     let surface = physics.surface().model().expect("every bench has one");
@@ -88,7 +88,7 @@ fn without_model(setup: &Setup) -> Setup {
 /// A reading, and the place of its contact where it has one.
 type Reading = (Option<Position>, Vec<f64>);
 
-/// Readings of a kind, and what is to be said of them.
+/// Readings of a kind, with their right status.
 struct Case {
     /// Head of its column.
     name: &'static str,
@@ -97,7 +97,7 @@ struct Case {
 }
 
 impl Case {
-    /// Share of its readings of which a locator says what is to be said.
+    /// Share of the readings with the right status.
     fn share(&self, locator: &Locator) -> f64 {
         let is_right = |(truth, reading): &&Reading| {
             let estimate = locator.locate(reading).expect("its channels are those of the bench");
@@ -239,7 +239,7 @@ fn most_told(bench: &Bench, count: usize) -> f64 {
     told.sum::<f64>() / count as f64
 }
 
-/// Places all over a surface, but not on its edges, where some read nothing.
+/// Places all over a surface except at its edges, where some readings are zero.
 fn places(extent: Extent) -> impl Iterator<Item = Position> {
     let (along, across) = if extent.width_m().is_some() { (48, 48) } else { (400, 2) };
     let width_m = extent.width_m().unwrap_or(0.0);
@@ -310,7 +310,7 @@ fn is_told(estimate: &Estimate, _: Option<Position>) -> bool {
     matches!(estimate.status, Status::Located | Status::Ambiguous)
 }
 
-/// True where the 95 % interval along the surface holds the contact.
+/// True where the 95 % interval along the surface contains the contact.
 fn is_held(estimate: &Estimate, truth: Option<Position>) -> bool {
     let Some((Uncertainty { x_95_m: (low, high), .. }, truth)) = estimate.contact.uncertainty.zip(truth)
     else {

@@ -1,4 +1,4 @@
-//! A plate over nine deflection sensors: position in two coordinates, and a force that nobody told.
+//! A plate over nine deflection sensors: position in two coordinates, and an unknown force.
 
 use palpate::prelude::*;
 

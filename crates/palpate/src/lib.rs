@@ -1,5 +1,5 @@
 //! palpate turns an elastic surface with a few sensors into a calibrated contact locator: press at known places, fit, and
-//! every later reading says where the surface is touched, how hard, and how sure that is.
+//! every later reading gives position and force of the contact, with intervals.
 //!
 //! ```
 //! use palpate::prelude::*;
@@ -22,7 +22,7 @@
 //! | [`mechanics`] | surfaces, sensors, what they read, and the Cramér–Rao bound | [`contact`](mechanics::contact), [`limit`](mechanics::limit), [`sensing`](mechanics::sensing), [`surface`](mechanics::surface) with [`modal`](mechanics::surface::modal) and [`plate`](mechanics::surface::plate), [`units`](mechanics::units) |
 //! | [`estimators`] | recordings, estimators, tracking, load profiles, evaluation | [`arrangement`](estimators::arrangement), [`batch`](estimators::batch), [`centroid`](estimators::centroid), [`closed_form`](estimators::closed_form), [`description`](estimators::description), [`digit`](estimators::digit), [`estimator`](estimators::estimator), [`evaluation`](estimators::evaluation), [`features`](estimators::features), [`fit`](estimators::fit), [`gaussian_process`](estimators::gaussian_process), [`imperfections`](estimators::imperfections), [`influence`](estimators::influence) with [`measured`](estimators::influence::measured), [`likelihood`](estimators::likelihood), [`load_profile`](estimators::load_profile), [`neighbours`](estimators::neighbours), [`network`](estimators::network), [`recording`](estimators::recording), [`setup`](estimators::setup), [`simulate`](estimators::simulate), [`status`](estimators::status), [`track_errors`](estimators::track_errors), [`tracking`](estimators::tracking) |
 //! | [`design`] | where to put the sensors and where to press | [`positions`](design::positions), [`sensors`](design::sensors) |
-//! | [`rig`] | the TOML file that says what is on the bench | |
+//! | [`rig`] | the TOML file that describes the bench | |
 //! | [`numerics`] | linear algebra, Gaussian-process regression, distributions | [`regression`](numerics::regression), [`simd`](numerics::simd), [`small`](numerics::small), [`watch`](numerics::watch) |
 //!
 //! Lengths are in metres, forces in newtons, moduli in pascals; functions such as [`mm`](prelude::mm) say the unit where a

@@ -1,4 +1,4 @@
-// What the page knows of the session, from its messages.
+// The session's state on the page, from its messages.
 
 import type { EventRecord, PastRecord, SampleRecord, StateRecord, StreamMessage } from "../protocol";
 import { Baseline } from "./baseline";

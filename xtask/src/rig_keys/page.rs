@@ -54,7 +54,7 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// Form of a value of this type, where that is more than a cell can say.
+    /// Form of a value of this type, where a cell is too small for it.
     fn explain(&mut self, file: &Path, type_text: &str, path: &str, level: usize) {
         let Some(item) = self.item(file, type_text) else { return };
         if !self.is_table(item) && !self.has_words(item) {
@@ -135,7 +135,7 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// Default of a key whose comment gives none.
+    /// Default of a key without one in its comment.
     fn default(&self, field: &Field, file: &Path) -> String {
         let fields_of = |item: &&Item| matches!(&item.shape, Shape::Struct(fields) if fields.iter().any(|own| std::ptr::eq(own, field)));
         let all_default =

@@ -46,7 +46,7 @@ pub struct Variant {
 }
 
 impl Item {
-    /// Its fields, or those of its variants.
+    /// The fields, or those of the variants.
     #[cfg(test)]
     pub fn fields(&self) -> Vec<&Field> {
         match &self.shape {
@@ -98,7 +98,7 @@ pub struct Types {
     texts: BTreeMap<PathBuf, String>,
 }
 
-/// The crates whose enums are words in files.
+/// The crates with enums that are words in files.
 const CRATES: [&str; 5] =
     ["palpate-rig", "palpate-core", "palpate-mechanics", "palpate-estimators", "palpate-design"];
 

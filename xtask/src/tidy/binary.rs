@@ -1,4 +1,4 @@
-//! The repository holds text. Pictures are SVG, but for those of the manuals: PNG or WebP of limited size.
+//! The repository contains text. Pictures are SVG, but for those of the manuals: PNG or WebP of limited size.
 
 use super::Finding;
 use super::project::{File, Project};

@@ -93,7 +93,7 @@ fn resolve<'p>(modules: &Modules, from: &[String], path: &'p [String]) -> Option
     Some((module, rest))
 }
 
-/// The module that a path names, as if every name were defined where the path says.
+/// The module that a path names, as if every name were defined at that path.
 fn descend<'p>(modules: &Modules, from: &[String], path: &'p [String]) -> Option<(Name, &'p [String])> {
     let up = path.iter().take_while(|segment| *segment == "super").count();
     let (start, rest) = match path.first()?.as_str() {

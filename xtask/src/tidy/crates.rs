@@ -23,7 +23,7 @@ const ORDER: [&str; 16] = [
     "xtask",
 ];
 
-/// A dependency on a crate below, and a crate that the table does not know.
+/// A dependency on a crate below, and a crate that is missing from the table.
 pub fn findings(project: &Project) -> Vec<Finding> {
     project.crates.iter().flat_map(|krate| of_crate(project, krate)).collect()
 }

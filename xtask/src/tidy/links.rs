@@ -6,7 +6,7 @@ use super::project::{File, Project};
 /// Documents that must be there.
 const REQUIRED: [&str; 2] = ["README.md", "ARCHITECTURE.md"];
 
-/// Folders whose TOML files the documents name.
+/// Folders with TOML files that the documents name.
 const RUNNABLE: [&str; 2] = ["studies/", "examples/"];
 
 /// A missing document, a link that leads nowhere, and a study or example that is not there.

@@ -7,7 +7,7 @@ use super::project::{File, Project};
 /// path is somebody's own.
 const EVERYWHERE: [&str; 6] = ["api", "dev", "etc", "palpate", "proc", "usr"];
 
-/// Hosts that readers are sent to, or that name a format. Packages are named, not the registries that hold them.
+/// Hosts that readers are sent to, or that name a format. Packages are named, not their registries.
 const HOSTS: [&str; 5] = ["127.0.0.1", "doi.org", "example.org", "www.apache.org", "www.w3.org"];
 
 /// Files that package managers write, which name the registries they use.
@@ -28,7 +28,7 @@ fn of_file(file: &File) -> Vec<Finding> {
             add(format!("/{path}/… is a path of one machine: make it relative, or an argument"));
         }
         for host in hosts(line).filter(|host| !is_lock && !HOSTS.contains(host)) {
-            add(format!("{host} is no host that the project names: name the package or the DOI instead"));
+            add(format!("{host} is not a host that the project names: name the package or the DOI instead"));
         }
     }
     found

@@ -27,11 +27,11 @@ pub struct File {
 /// A crate of the workspace.
 #[derive(Default)]
 pub struct Crate {
-    /// Its package name.
+    /// The package name.
     pub name: String,
-    /// Its version.
+    /// The version.
     pub version: String,
-    /// Its Cargo.toml, from the root.
+    /// The Cargo.toml, from the root.
     pub manifest: String,
     /// The root files of its library and binaries, from the root.
     pub roots: Vec<String>,

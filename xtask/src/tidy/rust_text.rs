@@ -1,4 +1,4 @@
-//! Rust text with its comments and literals told from its code, so that a rule reads code without being misled by prose.
+//! Rust text, split into comments, literals and code, so that a rule reads code without being misled by prose.
 
 /// A Rust file taken apart. Each part has the file's shape: what belongs elsewhere is blank, and lines keep their numbers.
 pub struct RustText {
@@ -22,7 +22,7 @@ struct Scanner {
 }
 
 impl RustText {
-    /// Takes a file apart. Text that is no Rust comes out as code.
+    /// Takes a file apart. Text that is not Rust comes out as code.
     pub fn parse(text: &str) -> Self {
         let parts = Self { code: String::with_capacity(text.len()), comments: String::new() };
         let mut scanner = Scanner { characters: text.chars().collect(), at: 0, parts };

@@ -6,7 +6,7 @@ use super::rust_text::RustText;
 
 const MARKERS: [&str; 2] = ["TODO", "FIXME"];
 
-/// Files whose text, comments and all, may hold markers.
+/// Files with text, comments included, that may contain markers.
 const TEXT: [&str; 7] = [".ts", ".py", ".css", ".sh", ".toml", ".c", ".md"];
 
 /// Markers without a reason.

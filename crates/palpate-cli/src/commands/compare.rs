@@ -58,7 +58,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Kind of an estimator that does not suit the rig or the recording, and why.
+/// Kind of an estimator that does not suit the rig or the recording, and the reason.
 type LeftOut = (&'static str, String);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -143,7 +143,7 @@ fn trials_table(comment: &str, comparisons: &[Comparison], trials: &[Split]) -> 
         let Evaluation { extent, located } = &tried.evaluation;
         let mut rest = located.as_slice();
         for (number, trial) in trials.iter().enumerate() {
-            // The answers of all trials are one behind the other.
+            // The answers of all trials follow one another.
             let count = trial.judged.rows.iter().filter(|row| row.touches()).count();
             let (own, others) = rest.split_at(count.min(rest.len()));
             rest = others;
@@ -202,7 +202,7 @@ fn compare(arguments: &Arguments, rig: &Rig, trials: &[Split]) -> Result<Compare
         let complaint = Complaint::new(format!("--only {name}: no estimator of this kind suits the rig"));
         complaint.help(format!("it can be: {}", known.join(", ")))
     })?;
-    // Alone it is refused; among others it is left out.
+    // A single estimator is refused; among several it is omitted.
     if let ([only], Some(trial)) = (&contenders[..], trials.first()) {
         let cost = only.fit_cost(&rig.setup, &trial.training);
         arguments.memory.check(only, cost, &rig.setup, &trial.training)?;
@@ -211,7 +211,7 @@ fn compare(arguments: &Arguments, rig: &Rig, trials: &[Split]) -> Result<Compare
     let start = Instant::now();
     let shown = AtomicUsize::new(usize::MAX);
     let observe = |progress| {
-        // Said at every epoch of a network.
+        // A network reports this at every epoch.
         if let Progress::Counted { name, done, .. } = progress
             && shown.swap(done, Ordering::Relaxed) != done
         {

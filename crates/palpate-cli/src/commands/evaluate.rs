@@ -1,4 +1,4 @@
-//! `palpate evaluate`: how far a locator is off, or how far a rig's estimator would be.
+//! `palpate evaluate`: errors of a locator, or of the estimator of a rig.
 
 use crate::cost::MemoryOption;
 use crate::failure::{Complaint, Failure};
@@ -55,7 +55,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The errors of the whole surface or of a portion.
+/// Errors over the whole surface or a portion.
 #[derive(serde::Serialize)]
 struct PortionErrors {
     portion: String,
@@ -64,7 +64,7 @@ struct PortionErrors {
     error_percent: ErrorFigures,
 }
 
-/// Figures of location errors, all in one unit.
+/// Figures of location errors, in one unit.
 #[derive(serde::Serialize)]
 pub struct ErrorFigures {
     pub mean: f64,
@@ -75,7 +75,7 @@ pub struct ErrorFigures {
 }
 
 impl ErrorFigures {
-    /// The figures in the unit to which `unit` takes metres.
+    /// The figures in the unit into which `unit` converts metres.
     pub fn new(summary: &ErrorSummary, unit: impl Fn(f64) -> f64) -> Self {
         Self {
             mean: unit(summary.average_m),
@@ -87,7 +87,7 @@ impl ErrorFigures {
     }
 }
 
-/// Answers, and what gave them.
+/// Answers and their source.
 struct Answers {
     evaluation: Evaluation,
     recording: Provenance,
@@ -161,7 +161,7 @@ fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
     table
 }
 
-/// A rig: its estimator is fitted to each fold, and judged at the positions that the fold holds out.
+/// A rig: its estimator is fitted in each fold, and evaluated at the held-out positions.
 fn cross_validated(arguments: &Arguments, mut rig: Box<Rig>) -> Result<Answers, Failure> {
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
@@ -191,7 +191,7 @@ fn cross_validated(arguments: &Arguments, mut rig: Box<Rig>) -> Result<Answers, 
     Ok(Answers { evaluation, recording: recording.provenance, subject: RigOrLocator::Rig(rig) })
 }
 
-/// A locator, judged by a recording or by its own bench's simulation.
+/// A locator, evaluated with a recording or with a simulation of its own bench.
 fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Failure> {
     let recording = match arguments.files.read(&locator.setup)? {
         Some(recording) => {
@@ -220,7 +220,7 @@ fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
     Complaint::new(error).help("--data names a recording to judge by")
 }
 
-/// The bench touched all over after its calibration.
+/// Contacts all over the bench after its calibration, simulated.
 fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
     let calibration = &locator.provenance.recording;
     Observer::of_stages()
@@ -236,7 +236,7 @@ fn warn_of_training_data(locator: &Locator, recording: &Recording) {
     }
 }
 
-/// `60 mm..300 mm`, with spaces about the dots or without, or `60..300 mm`.
+/// `60 mm..300 mm`, with or without spaces around the dots, or `60..300 mm`.
 fn portion(text: &str) -> Result<Portion, String> {
     const EXAMPLE: &str = "write it as in `0 mm..100 mm` or `0..100 mm`";
     let (from, to) = text.split_once("..").ok_or_else(|| format!("`{text}` has no `..`; {EXAMPLE}"))?;

@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) = training {
         let epochs = format_count(u64::from(epochs));
         return Err(Failure::GoalMissed(format!(
-            "training diverged after {epochs} epochs; nothing was written: lower the learning rate or the momentum"
+            "training diverged after {epochs} epochs; no file was written: lower the learning rate or the momentum"
         )));
     }
     let learnt = learnt::of_locator(&locator);
@@ -105,13 +105,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     lines.iter().try_for_each(|line| output::say(format!("  {line}")))
 }
 
-/// Estimated cost of the fit, with a choice that takes no longer than it may.
+/// Estimated cost of the fit, including a choice within the time limit.
 fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
     let cost = rig.estimator.fit_cost(&rig.setup, recording);
     let task = FitTask::new(&rig.setup, recording);
     let Some(candidates) = rig.estimator.candidates(task) else { return cost.with_interval_check(recording) };
     let choice = cost.seconds.min(f64::from(arguments.auto_seconds));
-    // The chosen one takes no longer than the slowest.
+    // The chosen estimator takes at most as long as the slowest one.
     let costs = candidates.iter().map(|candidate| candidate.fit_cost(&rig.setup, recording));
     let slowest = costs.fold(FitCost { seconds: 0.0, ..cost }, |slowest, cost| FitCost {
         seconds: slowest.seconds.max(cost.seconds),
@@ -120,7 +120,7 @@ fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
     FitCost { seconds: choice + slowest.with_interval_check(recording).seconds, ..slowest }
 }
 
-/// The choice of the rig's estimator at held-out positions, with its figures for people.
+/// Chooses the rig's estimator by the errors at held-out positions, and prints the figures.
 fn decide(rig: &Rig, recording: &Recording, arguments: &Arguments) -> Result<Option<Choice>, Failure> {
     let task = FitTask::new(&rig.setup, recording).seed(arguments.seed);
     let start = Instant::now();
@@ -157,7 +157,7 @@ fn decide(rig: &Rig, recording: &Recording, arguments: &Arguments) -> Result<Opt
     Ok(Some(choice))
 }
 
-/// The candidates, the chosen one first; `None` for an estimator that the rig names.
+/// The candidates, the chosen one first; `None` if the rig names its estimator.
 fn choice_json(tried: &[Tried]) -> Option<Vec<impl Serialize>> {
     let one = |tried: &Tried| {
         object! {

@@ -1,4 +1,4 @@
-//! `palpate init`: a first rig for somebody's own recording.
+//! `palpate init`: a first rig for an existing recording.
 
 use crate::failure::{Complaint, Failure};
 use crate::remark::remark;
@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         FirstRig::guess(&name, &bytes, &arguments.hints()).map_err(|error| complaint(&error, &name))?;
     let rig_name = arguments.out.as_ref().map_or("RIG.toml".to_owned(), |out| out.display().to_string());
     let text = first.to_toml(&rig_name);
-    // Read as every later command will: what it has to say of file and channels is said now.
+    // Read as in every later command, so that its warnings about file and channels appear now.
     let rig = Rig::from_toml(&text).map_err(Complaint::new)?;
     let recording = rig.setup.read_recording(&name, bytes.as_slice());
     let recording = recording.map_err(|error| input::csv_complaint(&error))?;
@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// The rig's file, which is not there yet unless it is to be written over.
+    /// The rig's file, which must not exist unless it is to be overwritten.
     fn target(&self) -> Result<Option<Target>, Failure> {
         let Some(out) = &self.out else { return Ok(None) };
         let target = Target::new(out, &Inputs::new([self.recording.as_path()]))?;

@@ -1,4 +1,4 @@
-//! `palpate inspect`: what any of palpate's files holds, in words.
+//! `palpate inspect`: the contents of any palpate file, in words.
 
 use super::learnt;
 use crate::failure::Failure;
@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     })
 }
 
-/// Description of a CSV file: with a rig as its recording, otherwise as a table.
+/// Description of a CSV file: with a rig as a recording of it, otherwise as a table.
 fn csv(path: &Path, bytes: &[u8], rig: Option<&Path>) -> Result<Vec<String>, Failure> {
     let Some(rig) = rig else { return table(path, bytes) };
     let setup = input::read_rig(rig)?.setup;

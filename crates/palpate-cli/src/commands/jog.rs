@@ -1,4 +1,4 @@
-//! Jogs and touch-offs of a machine by the keys of a terminal, before a calibration.
+//! Jogs and touch-offs of a machine with the keys of a terminal, before a calibration.
 
 use super::operator::say;
 use crate::progress;
@@ -12,20 +12,20 @@ use std::time::Duration;
 
 const KEYS: &str = "keys, each with Enter: x+ x- y+ y- z+ z- move by a step, of fine (0.1 mm), normal (1 mm) or coarse (10 mm); t finds the height of the touch; b begins the presses; q ends here; Enter alone stops the machine at once";
 
-/// Longest time without a look at keys, signals and the machine.
+/// Longest interval between two checks of keys, signals and the machine.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 const FINE_M: f64 = 1e-4;
 const NORMAL_M: f64 = 1e-3;
 const COARSE_M: f64 = 1e-2;
 
-/// End of the jogs.
+/// Reason for the end of the jogs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JogEnd {
     /// The presses are to begin.
     Begin,
-    /// The operator ends it here.
+    /// The operator ends the calibration.
     Quit,
-    /// By a signal.
+    /// A signal ends the jogs.
     Interrupted,
 }
 
@@ -33,7 +33,7 @@ pub enum JogEnd {
 #[derive(Clone, Copy, Debug)]
 pub struct JogOutcome {
     pub end: JogEnd,
-    /// Height of the touch that was found last, in metres of the machine.
+    /// Height of the last touch, in metres of the machine.
     pub touch_z_m: Option<f64>,
 }
 
@@ -47,13 +47,13 @@ enum Key {
     Unknown,
 }
 
-/// A machine that is moved by keys.
+/// A machine that is moved with keys.
 pub struct Jog {
     machine: Machine,
     calibration: Calibration,
     clock: HostClock,
     step_m: f64,
-    /// Lines that wait until the machine rests.
+    /// Lines that are deferred until the machine rests.
     lines: VecDeque<String>,
     end: JogEnd,
     touch_z_m: Option<f64>,
@@ -65,10 +65,10 @@ impl Jog {
         Self { machine, calibration, clock, step_m: NORMAL_M, lines, end, touch_z_m: None }
     }
 
-    /// Does what is typed until the operator ends it; the finger is lifted then.
+    /// Executes typed lines until the operator ends the jogs; then the finger is lifted.
     ///
     /// # Errors
-    /// [`MachineError`] of a machine that was stopped.
+    /// [`MachineError`] if the machine was stopped.
     pub fn run(
         mut self,
         inputs: &Receiver<Input>,
@@ -77,12 +77,12 @@ impl Jog {
         remark!("{KEYS}");
         while !self.machine.is_done(&self.calibration) {
             if progress::interrupted() {
-                // The machine is stopped as it is dropped.
+                // Dropping the machine stops it.
                 return Ok(JogOutcome { end: JogEnd::Interrupted, touch_z_m: None });
             }
             let mut notes = Vec::new();
             match inputs.recv_timeout(LOOK_EVERY) {
-                // No press is asked for, so that no row is written.
+                // No press is requested, so no row is written.
                 Ok(Input::Arrived(arrived)) => drop(self.calibration.receive(&arrived, &mut notes)),
                 Ok(Input::Command(_) | Input::Stop) | Err(RecvTimeoutError::Timeout) => {
                     self.calibration.check_feed(self.clock.elapsed(), &mut notes);
@@ -107,7 +107,7 @@ impl Jog {
         Ok(JogOutcome { end: self.end, touch_z_m: self.touch_z_m })
     }
 
-    /// Takes what was typed: a stop at once, all else once the machine rests.
+    /// Takes typed lines: a stop at once, all others when the machine rests.
     fn take_keys(&mut self, keys: &Receiver<String>) -> Result<(), MachineError> {
         loop {
             match keys.try_recv() {

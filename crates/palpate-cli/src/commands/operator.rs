@@ -1,4 +1,4 @@
-//! Questions to the person who presses in `palpate calibrate`, and what he is shown of the presses and of a check.
+//! Questions to the person who presses in `palpate calibrate`, and displays of the presses and of a check.
 
 use crate::failure::Failure;
 use crate::remark::remark;
@@ -16,7 +16,7 @@ use std::io::IsTerminal;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
-/// Asks for what is not known yet, where a person is at the terminal.
+/// Asks for missing statements, if a person is at the terminal.
 pub fn ask(
     known: Statements,
     rig: &Rig,
@@ -52,14 +52,14 @@ pub fn ask(
     Ok(stated)
 }
 
-/// Warning of a calibration by one weight.
+/// Warning about a calibration with one weight.
 pub fn single_weight(force_n: f64) -> String {
     format!(
-        "all presses have {force_n} N, and the force in use is unknown: one weight cannot tell how readings grow with the force"
+        "all presses have {force_n} N, and the force in use is unknown: one weight does not show how readings grow with the force"
     )
 }
 
-/// True where a person at the terminal wishes a check.
+/// True if a person at the terminal requests a check.
 pub fn wants_check(keys: &Receiver<String>) -> bool {
     if !std::io::stdin().is_terminal() {
         return false;
@@ -95,7 +95,7 @@ fn answer<T>(
     }
 }
 
-/// Lists the presses with how far each is off the others of its place.
+/// Lists the presses with the deviation of each from the others of its place.
 pub fn list(rows: &[Row], extent: Extent) {
     let touched = rows.iter().enumerate().filter(|(_, row)| row.touches());
     if touched.clone().next().is_none() {
@@ -111,7 +111,7 @@ pub fn list(rows: &[Row], extent: Extent) {
     }
 }
 
-/// Says how far off the locator is at the places of a check.
+/// Prints the errors of the locator at the places of a check.
 pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Extent) -> Result<(), Failure> {
     let Some(check) = check else {
         remark!("no place was checked");
@@ -139,7 +139,7 @@ pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Ext
     output::say(format!("error at fresh places: median {median}, mean {mean}{covered}{placement}"))
 }
 
-/// Says what happened, and what a person who presses on a surface of the extent `hand` is to do next.
+/// Prints the events, and the next action of a person who presses on a surface of the extent `hand`.
 pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
     for note in notes {
         match note {
@@ -170,7 +170,7 @@ pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
     }
 }
 
-/// Asks for what the guide waits for.
+/// Asks for what the guide needs next.
 pub fn ask_for(calibration: &Calibration, extent: Extent) {
     let guide = calibration.guide();
     match (guide.waiting(), guide.next_press()) {

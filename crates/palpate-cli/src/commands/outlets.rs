@@ -1,4 +1,4 @@
-//! Where `record` and `serve` send a session to, beside what is their own: ROS 2 and Foxglove.
+//! Outputs of a session that `record` and `serve` share: ROS 2 and Foxglove.
 
 use crate::failure::{Complaint, Failure};
 use palpate_live::sink::OpenSink;

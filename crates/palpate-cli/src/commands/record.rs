@@ -1,4 +1,4 @@
-//! `palpate record`: a session into a file.
+//! `palpate record`: a session recorded into a file.
 
 use super::outlets::Outlets;
 use crate::failure::{Complaint, Failure};
@@ -59,11 +59,11 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Time between two looks for a signal.
+/// Interval between two checks for a signal.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    // Complains of what is no place for a file; the recorder itself makes it, and writes over nothing.
+    // Complains about an unusable path; the recorder itself makes the file, and overwrites no other.
     Target::new(&arguments.out, &Inputs::new([arguments.locator.as_path()]))?;
     arguments.session.check_source(&arguments.from)?;
     let locator = input::read_locator(&arguments.locator)?;
@@ -89,7 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         unpublished = Some((url, sink.lost()));
         sinks.push(Box::new(sink));
     }
-    // Kept until the end, as Foxglove's server lives in its outlet.
+    // Kept until the end, as the outlet owns Foxglove's server.
     let outlets = arguments.outlets.open()?;
     for open in &outlets {
         sinks.push(open(session.channels(), session.extent(), to.clone()).map_err(Complaint::new)?);
@@ -132,7 +132,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     finish(arguments, &status, &session.counters(), fault, unprinted)
 }
 
-/// Says what was recorded; a `fault` of the feed is a failure.
+/// Reports what was recorded; a `fault` of the feed is a failure.
 fn finish(
     arguments: &Arguments,
     status: &RecordingStatus,
@@ -157,7 +157,7 @@ fn finish(
     if !faults.is_empty() {
         return Err(Failure::DataLost(format!("{summary}; {}", faults.join("; "))));
     }
-    // A reader that has left has what it wants; the recording is what was asked for beside.
+    // A reader that has closed the pipe needs no more; the recording is complete without it.
     if let Some(error) = unprinted.filter(|error| error.kind() != std::io::ErrorKind::BrokenPipe) {
         remark!("{summary}");
         return Err(output::unprinted(error));
@@ -176,7 +176,7 @@ fn finish(
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Sends [`Input::Stop`] at a signal, or after so many seconds.
+    /// Sends [`Input::Stop`] at a signal, or after this many seconds.
     pub fn after(seconds: Option<f64>, to: SyncSender<Input>) -> Result<Self, Failure> {
         let done = Arc::new(AtomicBool::new(false));
         let watched = Arc::clone(&done);
@@ -184,7 +184,7 @@ impl Stop {
         let wait = move || {
             while !watched.load(Ordering::Relaxed) {
                 if progress::interrupted() || end.is_some_and(|end| Instant::now() >= end) {
-                    // A session that has ended by itself wants no more.
+                    // A session that has already ended ignores it.
                     let _ = to.send(Input::Stop);
                     return;
                 }
@@ -202,7 +202,7 @@ impl Drop for Stop {
     }
 }
 
-/// Says on stderr what goes wrong with the source, and with what stands beside the session.
+/// Writes problems of the source, and of the outputs beside the session, to stderr.
 pub struct Words;
 
 impl Sink for Words {

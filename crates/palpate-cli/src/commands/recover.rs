@@ -1,4 +1,4 @@
-//! `palpate recover`: a recording that was cut off, rewritten whole.
+//! `palpate recover`: an interrupted recording, rewritten in full.
 
 use crate::failure::{Complaint, Failure};
 use crate::output;

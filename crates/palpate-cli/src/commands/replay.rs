@@ -1,4 +1,4 @@
-//! `palpate replay`: the readings of a recording, located again.
+//! `palpate replay`: locates the readings of a recording again.
 
 use crate::estimate_columns::{EstimateColumns, Guesses};
 use crate::failure::{Complaint, Failure};
@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     by_another(arguments, session, playback, printer)
 }
 
-/// Locates what was located, and says whether every estimate is the same.
+/// Locates the readings again with the recorded settings, and reports whether every estimate is the same.
 fn by_the_same(
     arguments: &Arguments,
     locator: &Locator,
@@ -94,7 +94,7 @@ fn by_the_same(
     let mut reading = Vec::new();
     while let Some(recorded) = playback.next_recorded().map_err(Complaint::new)? {
         if let Recorded::Reading { values, .. } = recorded {
-            // As the board's number times its unit: the reading to the last bit.
+            // As the board's number times its unit: equal to the reading to the last bit.
             reading =
                 values.iter().zip(&units).map(|(value, channel)| value * channel.unit.factor()).collect();
             continue;
@@ -120,7 +120,7 @@ fn by_the_same(
     match others {
         0 => remark!("{all} estimates, each as recorded to the last bit"),
         _ => remark!(
-            "{all} estimates, of which {} are not as recorded, by palpate {}",
+            "{all} estimates, {} not as recorded, by palpate {}",
             format_count(others),
             playback.head().version
         ),
@@ -128,7 +128,7 @@ fn by_the_same(
     Ok(())
 }
 
-/// Takes the raw readings through another session.
+/// Processes the raw readings in another session.
 fn by_another(
     arguments: &Arguments,
     mut session: Session,
@@ -164,13 +164,13 @@ fn by_another(
     check_losses(arguments, &playback, count, "reading")
 }
 
-/// Fails where parts of the recording could not be read, or where it holds no such `record`; says what it holds of other programs.
+/// Fails if parts of the recording could not be read, or if it contains no `record`; reports messages of other programs.
 fn check_losses(arguments: &Arguments, playback: &Playback, count: u64, record: &str) -> Result<(), Failure> {
     let passed_over = playback.passed_over();
     if passed_over.foreign > 0 {
         remark!("{} messages on topics of other programs are left out", format_count(passed_over.foreign));
     }
-    let nothing = (count == 0).then(|| format!("it holds no {record}"));
+    let nothing = (count == 0).then(|| format!("it has no {record}"));
     let losses: Vec<String> = nothing.into_iter().chain(passed_over.loss()).collect();
     if losses.is_empty() {
         return Ok(());
@@ -200,7 +200,7 @@ fn is_the_same(estimate: &EstimateRecord, before: &Map<String, Value>) -> bool {
     serde_json::to_value(estimate).is_ok_and(|now| now.as_object() == Some(before))
 }
 
-/// Where and how estimates are printed.
+/// Destination and format of printed estimates.
 struct Printer<'a, W> {
     out: &'a mut W,
     /// Columns of the CSV; `None` for JSON.

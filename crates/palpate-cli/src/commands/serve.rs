@@ -1,4 +1,4 @@
-//! `palpate serve`: a session that browsers follow.
+//! `palpate serve`: a session for browsers.
 
 use super::calibrate::{OperatorOptions, about_journal, pressed_before, pressed_for, stage};
 use super::outlets::Outlets;
@@ -28,11 +28,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The bench of the demonstration: that of the founding paper, with noise.
+/// The bench of the demonstration: the founding paper's, with noise.
 const DEMO: &str = include_str!("../../../../examples/noisy-beam.toml");
-/// Its name.
+/// The name of the demonstration's file.
 const DEMO_NAME: &str = "examples/noisy-beam.toml";
-/// Time between two looks for Ctrl-C.
+/// Interval between two checks for Ctrl-C.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Serve a dashboard: contacts, readings and events of a board, live in a browser.
@@ -141,7 +141,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     while !progress::interrupted() {
         std::thread::sleep(LOOK_EVERY);
     }
-    // First the session, so that browsers get what it has told; both end within milliseconds.
+    // The session ends first, so that browsers get its last messages; both end within milliseconds.
     let fault = live.end();
     drop(server);
     if let Some(fault) = fault {
@@ -150,21 +150,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Err(Failure::Interrupted("the server was ended".to_owned()))
 }
 
-/// Refuses a folder of recordings that is none, and one that cannot be made; it is made with the first recording.
+/// Refuses a path for recordings that is not a folder, and one that cannot be made; the first recording makes the folder.
 fn check_folder(folder: &Path) -> Result<(), Failure> {
-    // The last ancestor of a relative path is the folder that the command was started in, and has no name.
+    // The last ancestor of a relative path is the working folder of the command; its path is empty.
     let is_there = |path: &&Path| path.as_os_str().is_empty() || path.symlink_metadata().is_ok();
     match folder.ancestors().find(is_there) {
         Some(found) if !found.as_os_str().is_empty() && !found.is_dir() => {
             let complaint =
-                Complaint::new(format!("--record {}: {} is no folder", folder.display(), found.display()));
+                Complaint::new(format!("--record {}: {} is not a folder", folder.display(), found.display()));
             Err(complaint.help("name the folder that recordings go into").into())
         }
         _ => Ok(()),
     }
 }
 
-/// A board without a rig: browsers look at it, make a rig and calibrate it.
+/// A board without a rig: in browsers, its readings are shown, a rig is made, and it is calibrated.
 fn bringing_up(from: &SourceUrl, arguments: &Arguments) -> Result<Live, Failure> {
     if let Some(path) = &arguments.rules {
         let complaint = Complaint::new(format!("--rules {}: rules need a locator", path.display()));
@@ -182,7 +182,7 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
         None => RigOrLocator::Rig(Box::new(input::parse_rig(path, DEMO)?)),
         Some(path) => RigOrLocator::read(path)?,
     };
-    // Read before a fit, which may take its time.
+    // Read before a fit, which may take long.
     let extent = read.setup().surface().extent();
     let rules = rules_of(arguments, extent)?;
     let alarms = kept_alarms(arguments, &rules, extent)?;
@@ -213,9 +213,9 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
     if let Err(error) = locator.tare() {
         remark!("warning: no tare, so offsets that have moved stay in the readings: {error}");
     }
-    // A locator that does not go with the options is refused before anything is served.
+    // A locator that does not fit the options is refused before the server starts.
     arguments.session.session(&locator, path)?;
-    // URLs name paths as the command line does: from the folder it was started in.
+    // Paths in URLs are relative to the working folder of the command, as in its arguments.
     let live = with_rules(Live::new(locator, &name, simulated, PathBuf::new()), rules, alarms);
     Ok(configured(live, arguments))
 }
@@ -237,14 +237,15 @@ fn with_rules(live: Live, rules: RulesByAction, alarms: Option<KeptAlarms>) -> L
     }
 }
 
-/// Alarms that an earlier run of the server kept, and their file.
+/// Alarms from an earlier run of the server, and their file.
 struct KeptAlarms {
     file: AlarmFile,
     text: String,
     rules: Rules,
 }
 
-/// The kept alarms, beside the locator or else in the folder of recordings; `None` where alarms come from --rules, or no file keeps them.
+/// The stored alarms, beside the locator or else in the folder of recordings; `None` if alarms come from --rules, or if they have
+/// no file.
 fn kept_alarms(
     arguments: &Arguments,
     rules: &RulesByAction,
@@ -266,7 +267,7 @@ fn kept_alarms(
     Ok(Some(KeptAlarms { file, text, rules }))
 }
 
-/// The same with the recordings and sessions of the arguments.
+/// Adds the recordings and sessions of the arguments.
 fn configured(live: Live, arguments: &Arguments) -> Live {
     let live = live.with_sessions(arguments.session.config());
     match &arguments.record {
@@ -275,7 +276,7 @@ fn configured(live: Live, arguments: &Arguments) -> Live {
     }
 }
 
-/// The calibration of the arguments, where browsers calibrate.
+/// The calibration of the arguments, if browsers calibrate.
 fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure> {
     let Arguments {
         calibrate: true,
@@ -301,7 +302,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     Target::new(out, &inputs)?;
     Target::new(presses, &inputs)?;
     let rig = input::read_rig(path)?;
-    // What cannot be calibrated is refused here, where the place in the file can be shown.
+    // A calibration that is impossible is refused here, where the place in the file can be shown.
     let stage = stage(path, &rig, arguments.stage.as_ref(), arguments.force)?;
     let depths = DepthKnowledge::for_stage(stage.as_ref());
     let (before, in_file_m) = pressed_before(path, &rig, presses, depths)?;
@@ -309,7 +310,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     let stated = arguments.operator.statements();
     let statements = match &stage {
         None => stated.or_known(&rig, arguments.force, in_file_m, &before),
-        // The placement of the rig is that of a person.
+        // The placement in the rig is for a person.
         Some(_) => stated,
     };
     plan(&rig, statements.weights(arguments.force), depths_m, &before)
@@ -335,7 +336,7 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
     if let Estimator::Auto(Auto { only }) = &rig.estimator
         && only.is_empty()
     {
-        let complaint = Complaint::about(path, "the estimator is `auto`, whose choice may take minutes");
+        let complaint = Complaint::about(path, "the estimator is `auto`, and the choice may take minutes");
         return Err(complaint
             .help("name its candidates by `only`, or `palpate fit` it once and serve the locator")
             .into());
@@ -361,7 +362,7 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
         .map_err(|error| Failure::from_error(&error))
 }
 
-/// Begins the first session, where its source is known.
+/// Starts the first session, if its source is known.
 fn begin(live: &Live, arguments: &Arguments) -> Result<(), Failure> {
     let begun = match (&arguments.from, &arguments.locator) {
         (Some(url), _) => live.begin(url),

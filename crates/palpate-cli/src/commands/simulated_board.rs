@@ -118,9 +118,9 @@ fn ppm(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Longest sleep, after which lines and signals are looked for.
+/// Longest sleep between checks for lines and signals.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
-/// Time for which the cable is pulled.
+/// Time for which the cable is disconnected.
 const AWAY: Duration = Duration::from_secs(1);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -135,7 +135,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         FrameName::Binary => FrameForm::Binary { clock_ppm: arguments.clock_ppm },
         FrameName::Text if arguments.clock_ppm == 0.0 => FrameForm::Text,
         FrameName::Text => {
-            let complaint = Complaint::new("--clock-ppm does not go with frames of text, which tell no time");
+            let complaint = Complaint::new("--clock-ppm does not go with frames of text, which have no time");
             return Err(complaint.help("add --frames binary").into());
         }
     };
@@ -149,12 +149,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Plugged { board, link, machine, away_until: None, commands: 0 }.run(arguments)
 }
 
-/// Time constants of a creep and of a residue whose share alone is given, in seconds.
+/// Default time constants of a creep and of a residue, in seconds, if only the share is given.
 const CREEP_S: f64 = 5.0;
 const RESIDUE_S: f64 = 20.0;
 
 impl Arguments {
-    /// Faults of the board: the imperfections of the rig, but for those that options give.
+    /// Faults of the board: the imperfections of the rig, overridden by options.
     fn faults(&self, rig: &Rig) -> FaultConfig {
         let faults = FaultConfig::of_setup(&rig.setup);
         let Imperfections { hysteresis, creep, residue, drift, repeated_readings, .. } = faults.imperfections;
@@ -180,7 +180,7 @@ impl Arguments {
     }
 }
 
-/// A relaxation of the rig, but for what options give.
+/// A relaxation of the rig, overridden by options.
 fn relaxation(of_rig: Relaxation, share: Option<f64>, time_s: Option<f64>, usual_s: f64) -> Relaxation {
     let rig_s = if of_rig.share > 0.0 { of_rig.time_s } else { usual_s };
     Relaxation { share: share.unwrap_or(of_rig.share), time_s: time_s.unwrap_or(rig_s) }
@@ -230,7 +230,7 @@ struct PluggedMachine {
 }
 
 impl PluggedMachine {
-    /// Does what the other end asks for, at a time since the start.
+    /// Answers the requests of the other end, at a time since the start.
     fn work(&mut self, now: Duration) -> std::io::Result<()> {
         self.machine.advance_to(now);
         let Some(bytes) = self.link.bytes()? else {
@@ -260,7 +260,7 @@ struct Plugged<'a> {
     link: Link,
     machine: Option<PluggedMachine>,
     away_until: Option<Duration>,
-    /// Commands that came from the other end.
+    /// Number of commands from the other end.
     commands: u64,
 }
 
@@ -330,7 +330,7 @@ impl Plugged<'_> {
     fn finish(&self, unsent: u64) -> Result<(), Failure> {
         let sent = self.board.sent();
         let words = format!(
-            "{} frames whole, {} torn, {} left out; of these {} while unplugged, {} that nobody read; {} commands received",
+            "{} frames whole, {} torn, {} left out; of these {} while unplugged, {} without a reader; {} commands received",
             format_count(sent.whole),
             format_count(sent.torn),
             format_count(sent.dropped),

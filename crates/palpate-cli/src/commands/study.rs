@@ -1,4 +1,4 @@
-//! `palpate study`: a set of experiments, the founding paper's built in.
+//! `palpate study`: a set of experiments; the founding paper's is built in.
 
 use crate::failure::{Complaint, Failure};
 use crate::output::Table;
@@ -55,7 +55,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The way an earlier run in the same folder is treated.
+/// Treatment of an earlier run in the same folder.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum EarlierRun {
     Leave,
@@ -72,7 +72,7 @@ impl Arguments {
         }
     }
 
-    /// The folder for results and report of a study; it may hold no earlier run unless the command line says what is to become of it.
+    /// The folder for results and report of a study. It may contain an earlier run only if the command line states how to treat it.
     fn folder(&self, study: &str) -> Result<TargetFolder, Failure> {
         let whole = || Path::new("palpate-out").join(study);
         let out = self.out.clone().unwrap_or_else(|| match self.shard {
@@ -86,8 +86,8 @@ impl Arguments {
             && self.earlier_run() == EarlierRun::Leave
         {
             let complaint = match found {
-                RESULTS_JSON => format!("{} holds the results of a run that was finished", out.display()),
-                SHARD_JSON => format!("{} holds a shard that was finished", out.display()),
+                RESULTS_JSON => format!("{} has the results of a run that was finished", out.display()),
+                SHARD_JSON => format!("{} has a shard that was finished", out.display()),
                 table => format!("{} is of a run that was not finished", out.join(table).display()),
             };
             let complaint = Complaint::new(complaint);
@@ -100,14 +100,14 @@ impl Arguments {
             .into());
         }
         if self.shard.is_some() && out.join(REPORT_HTML).exists() {
-            let complaint = Complaint::new(format!("{} holds a report, and a shard has none", out.display()));
+            let complaint = Complaint::new(format!("{} has a report, and a shard has none", out.display()));
             return Err(complaint.help("--out names another folder").into());
         }
         Ok(folder)
     }
 }
 
-/// A study as it was asked for.
+/// A requested study.
 struct Asked<'a> {
     arguments: &'a Arguments,
     is_paper: bool,
@@ -182,7 +182,7 @@ impl Asked<'_> {
     }
 }
 
-/// Complaint about a study, with a caret where its file asks for what cannot be had.
+/// Complaint about a study, with a caret at the setting that is impossible.
 fn complaint(error: &StudyRunError, name: &str, text: &str) -> Failure {
     let complaint = Complaint::new(error);
     match error {
@@ -198,8 +198,8 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Fits what an earlier run has not, keeping the tables up to date; leaves them sorted, with a row for every fit. All fits, and the facts of
-/// those of this run.
+/// Fits the tasks that an earlier run has not finished, and updates the tables; at the end they are sorted, with a row for every
+/// fit. Returns all fits, and the facts of this run's fits.
 fn train(
     prepared: &PreparedStudy,
     options: RunOptions,
@@ -295,7 +295,7 @@ fn yes_or_no(holds: bool) -> String {
     if holds { "yes" } else { "NO" }.to_owned()
 }
 
-/// Table of the arms; a column only where some arm fills it.
+/// Table of the arms; columns that are empty for all arms are omitted.
 fn arms_table(arms: &[ArmResults]) -> String {
     let mut table = Table::from_rows(arms);
     for (heading, of) in arm_columns(arms) {
@@ -306,7 +306,7 @@ fn arms_table(arms: &[ArmResults]) -> String {
     table.to_string()
 }
 
-/// A heading, and what an arm has to say under it.
+/// A heading, and the cell of an arm under it.
 type ArmColumn = (String, Box<dyn Fn(&ArmResults) -> Option<String>>);
 
 fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
@@ -328,7 +328,7 @@ fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
         column("effective length, %", move |arm| Some(spread(&arm.effective_length_percent, 1))),
         column("limit, %", |arm| Some(format!("{:.3}", arm.limit.as_ref()?.limit_error_percent))),
     ];
-    // Blind ends outweigh all else in the average; with noise, the portions are told beside it.
+    // Blind ends dominate the average; with noise, columns for the portions are added.
     let limited = arms.iter().find(|arm| arm.limit.is_some());
     for (i, portion) in limited.iter().flat_map(|arm| &arm.portions).map(|p| p.portion).enumerate() {
         let key = portion.key().replace('_', "–");
@@ -341,7 +341,7 @@ fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
     }
     columns
         .push(column("over the limit", move |arm| Some(spread(&arm.limit.as_ref()?.error_over_limit?, 2))));
-    columns.push(column("95 % hold, %", move |arm| Some(spread(&arm.coverage_percent?, 1))));
+    columns.push(column("95 % cover, %", move |arm| Some(spread(&arm.coverage_percent?, 1))));
     columns
 }
 
@@ -356,7 +356,7 @@ fn whole(count: f64) -> String {
     format_count(count.round() as u64)
 }
 
-/// A claim as long as a table's line can be.
+/// A claim, shortened to a line of a table.
 fn short(claim: &str) -> String {
     const MOST: usize = 90;
     if claim.chars().count() <= MOST {

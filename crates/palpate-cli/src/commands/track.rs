@@ -105,7 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         truths: Vec::new(),
         filtered: Vec::new(),
     };
-    // Readings that came before a signal are finished.
+    // Readings that arrived before a signal are processed.
     let stopped = match stream.run(&locator) {
         Err(Failure::Interrupted(message)) if !stream.numbers.is_empty() => Some(message),
         ran => ran.map(|()| None)?,
@@ -129,12 +129,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// True where stdout gets lines for people.
+    /// True if stdout gets text lines.
     fn prints_text(&self) -> bool {
         self.text || (!self.csv && std::io::stdout().is_terminal())
     }
 
-    /// The folder for the report, which must hold none of the files that are read.
+    /// The folder for the report. It must not contain a file that is read.
     fn report_folder(&self) -> Result<Option<TargetFolder>, Failure> {
         let read = [Some(&self.locator), self.readings.as_ref(), self.rig.as_ref()];
         let read = read.into_iter().flatten().map(PathBuf::as_path).chain(self.tare.path());
@@ -143,7 +143,7 @@ impl Arguments {
     }
 }
 
-/// Filter, or filter with the smoother behind it, that takes the readings.
+/// The tracker of the readings: a filter, or a filter with a smoother.
 enum Follower {
     Filter(Tracker),
     Smoother(SmoothTracker),
@@ -156,13 +156,13 @@ struct Stream<'a> {
     extent: Extent,
     format: Format,
     lines: Lines,
-    /// Readings so far, skipped ones too: --rate counts them.
+    /// Number of readings so far, including skipped ones, as --rate counts them.
     times: u64,
-    /// The line of each track.
+    /// The source line of each track.
     numbers: Vec<u64>,
     /// The true contacts so far.
     truths: Vec<Vec<Contact>>,
-    /// Tracks of the filter, where it is not the smoother that keeps them and there is a truth to compare them with.
+    /// Tracks of the filter, if a truth exists for comparison and the smoother does not store them.
     filtered: Vec<Track>,
 }
 
@@ -184,11 +184,11 @@ impl Stream<'_> {
                 let column =
                     columns.time.as_ref().map_or("`time_s`".to_owned(), |time| time.column.to_string());
                 let complaint = Complaint::new(format!("{} has no column {column}", self.lines.name()));
-                return Err(complaint.help("--rate says how many readings there are a second").into());
+                return Err(complaint.help("--rate gives the number of readings a second").into());
             }
         }
         if parsing.parser.progress().awaits_columns() && self.lines.is_whole() {
-            let complaint = Complaint::new(format!("{} holds no reading", self.lines.name()));
+            let complaint = Complaint::new(format!("{} has no reading", self.lines.name()));
             return Err(complaint.help("it must begin with a header").into());
         }
         self.taring.as_ref().map_or(Ok(()), |taring| taring.finish(self.lines.name()))
@@ -227,11 +227,11 @@ impl Stream<'_> {
         if reading.truth.is_some() {
             self.filtered.push(track);
         }
-        // A reader at the other end of a pipe wants each estimate now.
+        // The reader of a pipe gets each estimate at once.
         output::flush(out)
     }
 
-    /// The filter's tracks and the smoother's, and prints those that were kept back.
+    /// The filter's tracks and the smoother's; prints the deferred ones.
     fn finish(&mut self) -> Result<(Vec<Track>, Vec<Track>), Failure> {
         let mut out = std::io::stdout().lock();
         let Follower::Smoother(tracker) = &self.follower else {
@@ -239,7 +239,7 @@ impl Stream<'_> {
             return Ok((std::mem::take(&mut self.filtered), Vec::new()));
         };
         let filtered = tracker.filtered().to_vec();
-        // After a signal, too, for as long as the process is left.
+        // Also after a signal, until the process is ended.
         let smoothed = match self.arguments.smooth {
             true => tracker.smoothed(Watch::NONE).map_err(|_| Failure::stopped())?,
             false => Vec::new(),
@@ -268,7 +268,7 @@ impl Stream<'_> {
         }
     }
 
-    /// The errors of both, where the truth is known.
+    /// The errors of filter and smoother, if the truth is known.
     fn errors(&self, filtered: &[Track], smoothed: &[Track]) -> Vec<(&'static str, TrackErrors)> {
         let truths = &self.truths;
         let of = |name, tracks: &[Track]| {
@@ -322,15 +322,15 @@ impl Stream<'_> {
 
 /// Output on stdout.
 enum Format {
-    /// A JSON object a reading.
+    /// A JSON object per reading.
     Json,
-    /// A row a reading.
+    /// A row per reading.
     Csv(Columns),
-    /// Lines for people.
+    /// Text lines.
     Text(Box<ContactLines>),
 }
 
-/// Columns of the CSV; the cells of a contact that does not touch are empty.
+/// Columns of the CSV; cells are empty for a contact that does not touch.
 #[derive(Clone, Copy)]
 enum Columns {
     /// Columns of one contact on a line.
@@ -400,14 +400,14 @@ fn cells_on_plane(contact: Option<&Tracked>) -> Vec<String> {
     numbers.map(cell).to_vec()
 }
 
-/// Numbers from which on four decimals are beyond the precision of a float.
+/// Numbers from this on are beyond the precision of a float with four decimals.
 const LARGE: f64 = 1e11;
 
 fn cell(number: f64) -> String {
     if number.abs() < LARGE { format!("{number:.4}") } else { format!("{number:.4e}") }
 }
 
-/// A line of JSON: all that is known of the reading in line `line` of its source.
+/// A line of JSON: the track at the reading in line `line` of its source.
 fn json(track: &Track, line: u64, extent: Extent) -> Result<String, Failure> {
     let Position { x_m, y_m } = track.single.contact.position;
     let object = object! {
@@ -417,7 +417,7 @@ fn json(track: &Track, line: u64, extent: Extent) -> Result<String, Failure> {
         ..track.contacts.first().map(contact_fields),
         "two_touching": track.numbers[2],
         "second"?: track.contacts.get(1).map(|second| Object(contact_fields(second))),
-        // Position that the reading alone gives; on a plane its x and y.
+        // Position from this reading alone; on a plane its x and y.
         "single_mm": match extent {
             Extent::Line { .. } => json!(x_m * 1e3),
             Extent::Plane { .. } => json!([x_m * 1e3, y_m * 1e3]),

@@ -54,7 +54,7 @@ fn rows_that_cannot_be_followed_are_skipped_and_counted() {
     let folder = moved();
     let csv = fs::read_to_string(folder.path().join("moving.csv")).unwrap();
     let mut lines: Vec<String> = csv.lines().take(8).map(str::to_owned).collect();
-    // Again the time of the line before, and a field that is no number.
+    // Again the time of the line before, and a field that is not a number.
     lines[5] = lines[5].replacen("0.003,", "0.002,", 1);
     lines[6] = lines[6].replacen("0.004,", "soon,", 1);
     fs::write(folder.path().join("bad.csv"), lines.join("\n") + "\n").unwrap();

@@ -50,7 +50,7 @@ fn sources(port: &str) -> Vec<Source> {
         (
             "carriage returns",
             tcp(b"hello\rhello\rhello\rhello\rhello\rhello\r"),
-            &["frames in a row are no reading: a value is no number", "the last is `hello`"],
+            &["frames in a row are no reading: a value is not a number", "the last is `hello`"],
             &["no values are found", "the last is `hello`"],
         ),
         (

@@ -1,20 +1,20 @@
 //! The rest after a touch: readings at which an untouched surface settles again.
 //!
-//! A surface that is let go does not read what it read before: hysteresis and creep leave a residue, and the offsets have drifted meanwhile. A
-//! reading is a rest where it stays, and is small beside the touch.
+//! The reading after a touch differs from the one before it: hysteresis and creep leave a residue, and the offsets have drifted meanwhile. A
+//! reading is a rest if it is steady, and small compared with the touch.
 
 use super::{LET_GO, next_in_row};
 use crate::Status;
 
-/// Fewest readings in a row that stay, by which a surface is at rest.
+/// Fewest consecutive steady readings of a surface at rest.
 const AT_REST: u32 = 2 * LET_GO;
-/// Time in seconds for which they stay: [`AT_REST`] readings at 100 a second. Over less, the slow beginning of a touch seems to stay.
+/// Shortest duration of these readings in seconds: [`AT_REST`] readings at 100 a second. Over less, the slow beginning of a touch looks steady.
 const AT_REST_S: f64 = 0.1;
-/// Untouched readings after a touch by which it is at rest, whether they stay or not.
+/// Untouched readings after a touch that make a surface at rest, steady or not.
 const UNTOUCHED: u32 = 10 * AT_REST;
-/// Time in seconds of these readings, where they have times.
+/// Duration of these readings in seconds, where they have times.
 const UNTOUCHED_S: f64 = 10.0 * AT_REST_S;
-/// Untouched readings from which on the noise is known.
+/// Fewest untouched readings for an estimate of the noise.
 const NOISE_KNOWN: u32 = 20;
 /// Largest size of a residue, as a share of the touch before it. Gauges on elastic surfaces leave up to 3 % by hysteresis, and as much by creep.
 const RESIDUE: f64 = 0.05;
@@ -43,7 +43,7 @@ impl RestLength {
     /// Numbers for readings without times.
     pub const COUNTED: Self = Self { stays: AT_REST, untouched: UNTOUCHED };
 
-    /// Numbers for readings so many seconds apart.
+    /// Numbers for readings `interval_s` apart.
     pub fn of_interval(interval_s: f64) -> Self {
         // The conversions saturate.
         let readings = |seconds: f64| libm::ceil(seconds / interval_s) as u32;
@@ -54,19 +54,19 @@ impl RestLength {
 /// Watch for the rest after a touch.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RestWatch<B> {
-    /// Variance of the noise of each channel about the baseline, of untouched readings.
+    /// Variance of the noise of each channel about the baseline, from untouched readings.
     noise: B,
-    /// Readings that it is the mean of, at most a time constant.
+    /// Readings in this mean, at most a time constant.
     readings: u32,
-    /// Squared sizes of the last readings of a touch over the variance of the noise, in turn.
+    /// Squared sizes of the last readings of a touch over the variance of the noise, in a ring.
     sizes: [f64; LET_GO as usize],
     /// Readings of the touch.
     touched: u32,
-    /// Greatest squared size that [`LET_GO`] readings in a row had.
+    /// Greatest squared size that [`LET_GO`] consecutive readings reached.
     touch_size: f64,
-    /// Mean of the last readings that stayed.
+    /// Mean of the last steady readings.
     rest: B,
-    /// Readings that it is the mean of.
+    /// Readings in this mean.
     rested: u32,
     /// Untouched readings since the touch.
     untouched: u32,
@@ -93,12 +93,12 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         self.rest.as_ref()
     }
 
-    /// True where the rest is further from a baseline than one reading is by noise.
+    /// True where the rest is farther from a baseline than one reading is by noise.
     pub fn has_moved(&self, baseline: &[f64]) -> bool {
         self.distance(self.rest(), baseline) > baseline.len() as f64
     }
 
-    /// Readings that the rest is the mean of.
+    /// Number of readings in the mean at rest.
     pub fn rested(&self) -> u32 {
         self.rested
     }
@@ -113,7 +113,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         (self.touched, self.touch_size, self.rested, self.untouched) = (0, 0.0, 0, 0);
     }
 
-    /// Takes a reading that has a status by the baseline.
+    /// Adds a reading with its status by the baseline.
     pub fn add(
         &mut self,
         reading: &[f64],
@@ -132,7 +132,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         let size = self.distance(reading, baseline);
         if is_untouched {
             if self.touched < LET_GO {
-                // Noise that was taken for a contact.
+                // Noise was mistaken for a contact.
                 self.forget_touch();
                 return Course::Steady;
             }
@@ -157,10 +157,10 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         }
     }
 
-    /// Adds a reading to the rest, or begins another one with it.
+    /// Adds a reading to the rest, or begins another rest with it.
     fn follow_rest(&mut self, reading: &[f64]) {
         let channels = reading.len() as f64;
-        // Noise of any number of channels is within 2·channels + 8 in 99.7 % of readings.
+        // For any number of channels, noise is within 2·channels + 8 in 99.7 % of readings.
         let by_noise = (2.0 * channels + 8.0) * (1.0 + 1.0 / f64::from(self.rested.max(1)));
         let stays =
             self.distance(reading, self.rest.as_ref()) <= by_noise.max(CHANGE * CHANGE * self.touch_size);
@@ -180,7 +180,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         }
     }
 
-    /// Σ (a − b)² over the variances of the noise; a channel without noise, as of a coarse converter, counts as one of mean noise.
+    /// Σ (a − b)² over the variances of the noise. A channel without noise, as from a coarse converter, gets the mean noise.
     fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let noise = self.noise.as_ref();
         let mean = noise.iter().sum::<f64>() / noise.len().max(1) as f64;

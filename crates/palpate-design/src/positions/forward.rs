@@ -13,28 +13,27 @@ use palpate_numerics::mean;
 use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, Samples};
 use palpate_numerics::watch::Watch;
 
-/// Positions at which a model is asked, along a line and along each side of a plane.
+/// Positions where a model is evaluated, along a line and along each side of a plane.
 const ASKED: usize = 60;
 const ASKED_ON_A_PLANE: usize = 14;
-/// Noise of a sensor whose channel has none, as a share of its full scale: what is then left is the error of
-/// interpolating.
+/// Noise of a sensor without noise, as a share of its full scale: the error that remains is that of interpolation.
 const NOMINAL_NOISE: f64 = 1e-4;
-/// Correlations of the process that are tried, from the roughest to the smoothest.
+/// Candidate correlations of the process, from the roughest to the smoothest.
 const KERNELS: [Kernel; 3] = [Kernel::Matern32, Kernel::Matern52, Kernel::SquaredExponential];
 
 /// Whitened readings as functions of position.
 pub(super) struct ForwardModel {
     process: GaussianProcess,
-    /// Correlation: of the kernels that were tried, the one under which the readings are the most probable.
+    /// Correlation: the candidate kernel with the largest marginal likelihood.
     kernel: Kernel,
-    /// The variance of the functions before any press, the sensors' mean.
+    /// The prior variance of the functions, averaged over the sensors.
     signal_variance: f64,
     extent: Extent,
     force: Force,
 }
 
 impl ForwardModel {
-    /// Model of a bench from the clean readings that its mechanics give.
+    /// Forward model of a bench from the noise-free readings of its mechanics.
     pub fn from_mechanics(setup: &Setup, force: Force, watch: Watch) -> Result<Self, PositionError> {
         let surface = setup.surface().model().ok_or(PositionError::NoModel)?;
         let force_n = setup.force_n().ok_or(PositionError::NoForce)?;
@@ -57,11 +56,11 @@ impl ForwardModel {
             _ => (NOMINAL_NOISE * full_scale(j)).max(f64::MIN_POSITIVE),
         };
         let sds: Vec<f64> = living.iter().enumerate().map(sd).collect();
-        // The model is exact: regressions take as much noise as rounding leaves.
+        // The model is exact: the regression has only as much noise as rounding causes.
         Self::fit(&positions, &clean, &sds, &vec![0.0; positions.len()], extent, force, watch)
     }
 
-    /// Model of a bench from the presses of a recording begun.
+    /// Forward model of a bench from the presses of a recording.
     pub fn from_presses(presses: &Presses, setup: &Setup, watch: Watch) -> Result<Self, PositionError> {
         let Presses { positions, readings, reading_sds, .. } = presses;
         let variances: Vec<f64> = (0..positions.len()).map(|row| presses.variance_of(row)).collect();
@@ -76,7 +75,8 @@ impl ForwardModel {
         )
     }
 
-    /// Fits to readings of the living channels at some positions: divided by the standard deviations, each has its one of `variances`.
+    /// Fits to readings of the enabled channels at some positions. Readings divided by the standard deviations have the variances
+    /// `variances`, one per position.
     fn fit(
         positions: &[Position],
         readings: &[Vec<f64>],
@@ -107,7 +107,7 @@ impl ForwardModel {
         Ok(Self { process, kernel, signal_variance, extent, force })
     }
 
-    /// The covariance of a whitened reading's function at two positions before any press.
+    /// The prior covariance of a whitened reading's function at two positions.
     pub fn covariance(&self, a: Position, b: Position) -> f64 {
         let scales = &self.process.hyperparameters().length_scales;
         let r2: f64 =
@@ -115,7 +115,7 @@ impl ForwardModel {
         self.signal_variance * self.kernel.correlation(r2)
     }
 
-    /// Expected whitened reading at a position, and its slopes in 1/m: those of a channel by x, and on a plane by y, side by side.
+    /// Expected whitened reading at a position, and its slopes in 1/m: for each channel by x, and on a plane by y, side by side.
     fn mean_and_slopes(&self, at: Position) -> (Vec<f64>, Vec<f64>) {
         let (outputs, d) = (self.process.outputs(), self.process.coordinates());
         let (mut means, mut slopes) = (vec![0.0; outputs], vec![0.0; outputs * d]);
@@ -129,8 +129,9 @@ impl ForwardModel {
         (means, slopes)
     }
 
-    /// Variance of each channel's whitened reading at a place that is missed by a standard deviation of `sd_m` in each direction:
-    /// |I′|²·σ², to first order. Where the force is unknown, the part of the slope along the reading is a change of force and no error.
+    /// Variance of each channel's whitened reading at a place with a placement error of standard deviation `sd_m` in each
+    /// direction: |I′|²·σ², to first order. If the force is unknown, the part of the slope along the reading is a change of force
+    /// and not an error.
     pub fn placement_variances(&self, at: Position, sd_m: f64) -> Vec<f64> {
         let d = self.process.coordinates();
         let (means, mut slopes) = self.mean_and_slopes(at);
@@ -148,12 +149,12 @@ impl ForwardModel {
             .collect()
     }
 
-    /// Fisher information of a position in one reading once everything is calibrated, by the expected readings' slopes.
+    /// Fisher information of a position in one reading of a calibrated bench, from the slopes of the expected readings.
     pub fn information(&self, at: Position) -> Information {
         let (outputs, d) = (self.process.outputs(), self.process.coordinates());
         let (means, slopes) = self.mean_and_slopes(at);
         let dot = |f: &dyn Fn(usize) -> (f64, f64)| (0..outputs).map(f).map(|(a, b)| a * b).sum::<f64>();
-        // By ln W a reading that is linear in the force changes as much as it is.
+        // The derivative by ln W of a reading that is linear in the force is the reading itself.
         let by_force = dot(&|j| (means[j], means[j])).max(f64::MIN_POSITIVE);
         let entry = |k: usize, l: usize| {
             let plain = dot(&|j| (slopes[j * d + k], slopes[j * d + l]));
@@ -172,7 +173,7 @@ impl ForwardModel {
     }
 }
 
-/// The Fisher information of a position in one reading, in 1/m²; of a line only `xx`.
+/// The Fisher information of a position in one reading, in 1/m²; on a line only `xx`.
 #[derive(Clone, Copy)]
 pub(super) struct Information {
     xx: f64,
@@ -181,8 +182,8 @@ pub(super) struct Information {
 }
 
 impl Information {
-    /// The standard deviation, in metres, of a position that is told with this noise variance, in units of a reading's: the
-    /// information divided by it, and what the surface's size tells. In two dimensions that of the distance.
+    /// Standard deviation, in metres, of a position from a reading with this noise variance, relative to that of a reading: the
+    /// information divided by it, plus that of the surface's size. In two dimensions, the standard deviation of the distance.
     pub fn sd_m(self, noise_variance: f64, extent: Extent) -> f64 {
         let told = |information: f64| information / noise_variance;
         let size = |side_m: f64| 12.0 / (side_m * side_m);

@@ -1,4 +1,4 @@
-//! Placement of presses: training positions for an estimator and a budget of presses.
+//! Placement of presses: training positions for an estimator and a number of presses.
 //!
 //! ```
 //! use palpate_design::positions::{PositionDesign, PositionProblem, best_placed};
@@ -18,10 +18,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Rules (even, edge-dense, Chebyshev's nodes) stand beside two optima: positions that leave the least variance of
-//! influence functions learnt as Gaussian processes, and positions that give the least error after simulated calibrations of
-//! the estimator itself. All are judged alike, by calibrations with noise that no search has seen. With a recording begun,
-//! [`next_press`] says where to press next, and when to stop.
+//! Rules (even, edge-dense, Chebyshev's nodes) are compared with two optima: positions with the least variance of influence
+//! functions learnt as Gaussian processes, and positions with the least error after simulated calibrations of the estimator itself.
+//! All are evaluated in the same way, by calibrations with noise that no search has used. For a recording that is not complete,
+//! [`next_press`] advises where to press next, and when to stop.
 
 mod design;
 mod forward;
@@ -51,31 +51,31 @@ use search::{PatternSearch, evaluate};
 
 /// Name of the search in progress messages.
 const SEARCHING: &str = "search by calibrations";
-/// Readings that a calibration is judged by, about: while searching, and when verifying.
+/// Approximate number of readings that evaluate a calibration: in a search, and in the verification.
 const READINGS_IN_SEARCH: usize = 1000;
 const READINGS: usize = 4000;
-/// Positions in the middle portion of the edge-dense arrangement, the founding paper's better choice.
+/// Positions in the middle portion of the edge-dense arrangement, as the founding paper recommends.
 const IN_THE_MIDDLE: usize = 4;
-/// Steps from even positions to Chebyshev's and beyond that searches start from.
+/// Starts of the searches: 0 is the even positions, 1 is Chebyshev's, and larger values are denser towards the ends.
 const DENSITIES: [f64; 4] = [0.4, 0.8, 1.2, 1.6];
-/// The seeds of searches lie so far from those that verify.
+/// Offset between the seeds of searches and those of verifications.
 const SEARCH_SEEDS: u64 = 1 << 32;
 
-/// Training positions and what they are worth.
+/// Training positions and their verification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
-    /// Rule or search that placed them.
+    /// Rule or search that gave them.
     pub placement: Placement,
     /// Training positions; on a line from left to right.
     pub positions: Vec<Position>,
     /// Result of calibrations with fresh noise.
     pub verification: Verification,
-    /// Their mean error at each contact, in metres.
+    /// Mean error of these calibrations at each contact, in metres.
     pub errors_m: Vec<f64>,
 }
 
-/// The arrangement with the least mean error; of those that are as good within twice the standard error, the first, so that
-/// noise decides nothing.
+/// The arrangement with the least mean error. Of those within twice the standard error it is the first, so that noise does not
+/// decide.
 pub fn best_placed(placed: &[Placed]) -> Option<&Placed> {
     let error = |placed: &Placed| placed.verification.mean_error_m;
     let least = placed.iter().min_by(|a, b| error(a).total_cmp(&error(b)))?;
@@ -86,12 +86,12 @@ pub fn best_placed(placed: &[Placed]) -> Option<&Placed> {
     placed.iter().find(as_good)
 }
 
-/// A setup whose training positions are designed, checked.
+/// A setup and the design task of its training positions, checked.
 pub struct PositionProblem {
     design: PositionDesign,
     /// The setup with the force of the presses.
     pressed: Setup,
-    /// Calibration that is simulated, without its training positions.
+    /// The simulated calibration, without its training positions.
     calibration: Calibration,
     extent: Extent,
     force: Force,
@@ -99,10 +99,10 @@ pub struct PositionProblem {
 }
 
 impl PositionProblem {
-    /// Checks that the setup can be simulated and the estimator fitted with so many presses.
+    /// Checks that the setup can be simulated and that the estimator can be fitted with this number of presses.
     ///
     /// # Errors
-    /// [`PositionError`], with what is missing.
+    /// [`PositionError`], which names what is missing.
     pub fn new(setup: &Setup, design: &PositionDesign) -> Result<Self, PositionError> {
         if setup.surface().model().is_none() {
             return Err(PositionError::NoModel);
@@ -130,17 +130,17 @@ impl PositionProblem {
         Ok(Self { design: design.clone(), pressed, calibration, extent, force, contacts })
     }
 
-    /// The task.
+    /// The design task.
     pub fn design(&self) -> &PositionDesign {
         &self.design
     }
 
-    /// The contacts that are located after calibrating.
+    /// Contacts that are located after the calibration.
     pub fn contacts(&self) -> &WeightedContacts {
         &self.contacts
     }
 
-    /// Knowledge of the force that the locator has: as the design says, if the setup knows it.
+    /// Whether the force is known to the locator: as in the design, if it is known to the setup.
     pub fn force(&self) -> Force {
         self.force
     }
@@ -150,10 +150,10 @@ impl PositionProblem {
         self.extent
     }
 
-    /// Every arrangement, by rule and by search, each verified.
+    /// All arrangements, by rule and by search, each verified.
     ///
     /// # Errors
-    /// [`PositionError`] when the estimator cannot be fitted to such presses, or the watch stopped it.
+    /// [`PositionError`] if the estimator cannot be fitted to such presses, or if the watch stopped it.
     pub fn all(&self, watch: Watch) -> Result<Vec<Placed>, PositionError> {
         let mut arrangements = self.by_rule()?;
         arrangements.push((Placement::VarianceOptimal, self.variance_optimal(watch)?));
@@ -168,7 +168,7 @@ impl PositionProblem {
         verified.collect()
     }
 
-    /// The arrangements that rules give, the even one first.
+    /// The arrangements of the rules, the even one first.
     fn by_rule(&self) -> Result<Vec<(Placement, Vec<Position>)>, PositionError> {
         let (extent, count) = (self.extent, self.design.count);
         let (columns, rows) = squarest(extent, count);
@@ -189,7 +189,7 @@ impl PositionProblem {
         Ok(arrangements)
     }
 
-    /// Between even positions and Chebyshev's, and denser yet towards the ends.
+    /// Arrangements between even positions and Chebyshev's, and some denser towards the ends.
     fn densities(&self) -> impl Iterator<Item = Vec<Position>> {
         let (extent, (columns, rows)) = (self.extent, squarest(self.extent, self.design.count));
         DENSITIES.into_iter().map(move |density| {
@@ -210,7 +210,7 @@ impl PositionProblem {
         Ok(variance::least(&forward, &self.contacts, self.extent, &self.design, watch)?)
     }
 
-    /// The best of some arrangements by simulated calibrations, and then with its positions moved about.
+    /// The best of some arrangements by simulated calibrations, followed by a pattern search over its positions.
     fn search(&self, starts: &[Vec<Position>], watch: Watch) -> Result<Vec<Position>, PositionError> {
         let (design, first) = (&self.design, self.design.seed.wrapping_add(SEARCH_SEEDS));
         let score = |positions: &[Position], share: f64| -> Result<f64, PositionError> {
@@ -229,7 +229,7 @@ impl PositionProblem {
         search.run(&score, starts[best].clone(), scores[best])
     }
 
-    /// Whether the setup reads the same, sensors in reverse, when the contact is mirrored.
+    /// Whether a mirrored contact gives the same readings with the sensors in reverse order.
     fn is_mirrored(&self) -> bool {
         let setup = &self.pressed;
         let (Some(surface), Some(force_n)) = (setup.surface().model(), setup.force_n()) else { return false };
@@ -255,8 +255,8 @@ impl PositionProblem {
         })
     }
 
-    /// Simulated calibrations at some positions, a seed each from the first on, judged by about so many readings of the contacts. A
-    /// seed has the same noise whatever the positions.
+    /// Simulated calibrations at some positions, one per seed from the first on, each evaluated with about `readings` readings of
+    /// the contacts. A seed gives the same noise for any positions.
     fn calibrate(
         &self,
         positions: &[Position],

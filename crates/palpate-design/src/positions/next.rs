@@ -1,4 +1,4 @@
-//! The next press of a recording begun, and when to stop.
+//! The next press of a recording, and when to stop.
 
 use super::design::{PositionDesign, PositionError};
 use super::forward::ForwardModel;
@@ -10,69 +10,72 @@ use palpate_mechanics::contact::Position;
 use palpate_numerics::watch::Watch;
 use palpate_numerics::{OutOfRange, mean, random_order};
 
-/// Presses that are looked ahead, at most.
+/// Largest number of future presses.
 const MOST_AHEAD: usize = 200;
-/// Positions of a recording that are looked at, at most: of more, that many drawn at random, which leave a little more to gain than all do.
+/// Largest number of recorded positions that are used. With more, this number is drawn at random, which slightly overstates the
+/// gain.
 const MOST_PRESSED: usize = 1000;
 
-/// Share of a guess's error that endlessly many presses must go below; else what differs between positions is noise.
+/// The error after infinitely many presses must be below this share of a guess's error; otherwise readings differ between positions
+/// only by noise.
 const MOST_OF_A_GUESS: f64 = 0.5;
 
-/// A press to come.
+/// A future press.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NextPress {
     /// Position to press.
     pub position: Position,
-    /// The error that is expected after it, in metres.
+    /// Expected error after this press, in metres.
     pub error_m: f64,
 }
 
-/// Advice on a recording begun: its expected error, and what more presses would gain.
+/// Advice on a recording: its expected error, and the gain from more presses.
 ///
-/// Errors are standard deviations, in metres, averaged over the contacts: the limit, where what is left unknown of the
-/// influence functions counts as noise.
+/// Errors are standard deviations, in metres, averaged over the contacts: the limit, with the posterior variance of the influence
+/// functions counted as noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Advice {
-    /// Rows of the recording in which something touched.
+    /// Number of rows with a contact.
     pub presses: usize,
-    /// Places that were pressed.
+    /// Number of pressed places.
     pub positions: usize,
-    /// The error that is expected of a locator fitted now.
+    /// Expected error of a locator fitted now.
     pub error_m: f64,
-    /// The error after endlessly many presses: the limit.
+    /// Error after infinitely many presses: the limit.
     pub endless_error_m: f64,
-    /// The next presses, each the one that helps most, until the rule says to stop; empty where it says so now, and
-    /// not longer than [`Advice::MOST_AHEAD`].
+    /// The next presses, each the most useful one, until the stopping rule is met; empty if it is met now, and not longer than
+    /// [`Advice::MOST_AHEAD`].
     pub next: Vec<NextPress>,
-    /// The rule: stop once endlessly many presses would lower the error by less than this, in %.
+    /// The rule: stop if infinitely many more presses would lower the error by less than this, in %.
     pub stop_percent: f64,
 }
 
 impl Advice {
-    /// Presses that are looked ahead.
+    /// Largest number of future presses.
     pub const MOST_AHEAD: usize = MOST_AHEAD;
 
-    /// By how much endlessly many presses would lower the error, in %.
+    /// Reduction of the error by infinitely many more presses, in %.
     pub fn remaining_gain_percent(&self) -> f64 {
         100.0 * (1.0 - self.endless_error_m / self.error_m)
     }
 
-    /// Whether the rule says to stop.
+    /// True if the stopping rule is met.
     pub fn is_enough(&self) -> bool {
         self.remaining_gain_percent() < self.stop_percent
     }
 
-    /// Whether the presses to come reach what the rule asks for.
+    /// Whether the stopping rule is met after the presses in `next`.
     pub fn reaches_goal(&self) -> bool {
         let last_m = self.next.last().map_or(self.error_m, |press| press.error_m);
         100.0 * (1.0 - self.endless_error_m / last_m) < self.stop_percent
     }
 }
 
-/// Advice on where to press next, for the contacts of a design and until its rule says to stop.
+/// Advises where to press next, for the contacts of a design and until its stopping rule is met.
 ///
-/// Influence functions are Gaussian processes whose smoothness and noise the recording tells; no model of the surface is needed.
-/// Where the recording, or else the design's training, says how well places are met, a press has the variance |I′|²·σ² beside its noise.
+/// Influence functions are Gaussian processes with smoothness and noise estimated from the recording; no model of the surface is
+/// needed. If the recording, or else the design's training, states the placement error, a press has the variance |I′|²·σ² besides
+/// its noise.
 ///
 /// ```
 /// use palpate_design::positions::{PositionDesign, next_press};
@@ -92,7 +95,7 @@ impl Advice {
 /// ```
 ///
 /// # Errors
-/// [`PositionError`] when the recording is not the setup's, or too short to learn from, or the watch stopped it.
+/// [`PositionError`] if the recording does not belong to the setup or is too short, or if the watch stopped it.
 pub fn next_press(
     setup: &Setup,
     recording: &Recording,
@@ -114,7 +117,7 @@ pub fn next_press(
         presses.place_with(&placed);
         forward = ForwardModel::from_presses(&presses, setup, watch)?;
     }
-    // Variance of a press at a place, in units of a reading's: of its noise, and of the place itself.
+    // Variance of a press at a place, relative to that of a reading: of its noise, and of its placement.
     let press_variance = |at: Position| {
         let placed = placement_sd_m.map_or(0.0, |sd_m| mean(forward.placement_variances(at, sd_m)));
         presses.variance + placed
@@ -152,7 +155,7 @@ pub fn next_press(
     Ok(advice)
 }
 
-/// All positions up to [`MOST_PRESSED`], and of more that many.
+/// All positions up to [`MOST_PRESSED`], or a random selection of this number.
 fn few_of(places: &[(Position, usize)]) -> Vec<(Position, usize)> {
     let mut drawn: Vec<usize> = random_order(places.len(), 0).into_iter().take(MOST_PRESSED).collect();
     drawn.sort_unstable();

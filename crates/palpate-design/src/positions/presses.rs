@@ -1,6 +1,6 @@
-//! Presses of a recording begun as readings of the position alone, and their noise.
+//! Presses of a recording as readings of the position alone, and their noise.
 //!
-//! Readings are taken beyond what the channels read untouched, and brought to one force; where the force is unknown in use, to one amplitude.
+//! Readings have the offsets subtracted, and are scaled to one force; if the force is unknown in use, to one amplitude.
 
 use super::design::PositionError;
 use palpate_estimators::recording::{Recording, Row, is_one_force};
@@ -12,46 +12,46 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean;
 use palpate_numerics::small::dot;
 
-/// Distinct positions without which nobody knows how smooth a function is.
+/// Least number of distinct positions from which the smoothness of a function can be estimated.
 const FEWEST_POSITIONS: usize = 4;
-/// Share of a surface's side over which the presses must reach.
+/// Share of a surface's side that the presses must cover.
 const LEAST_REACH: f64 = 0.1;
-/// Untouched rows up to which nothing is learnt of their noise.
+/// Number of untouched rows up to which their noise is not estimated.
 const FEWEST_UNTOUCHED: usize = 4;
 /// Quantile of the standard normal distribution at 95 %.
 const ONE_SIDED_95: f64 = 1.644_853_626_951_472_2;
-/// Rounds in which presses are brought to one amplitude.
+/// Rounds in which presses are scaled to one amplitude.
 const AMPLITUDE_ROUNDS: usize = 8;
-/// Variance of the forces at one position, of their squared mean, below which they are one force.
+/// Relative variance of the forces at one position (by their squared mean) below which they count as one force.
 const NEGLIGIBLE_SPREAD: f64 = 1e-12;
 
-/// Presses of the living channels.
+/// Presses of the enabled channels.
 pub(super) struct Presses {
     /// Position of each press.
     pub positions: Vec<Position>,
-    /// Reading of each press beyond the offsets, a value for each living channel.
+    /// Reading of each press minus the offsets, one value per enabled channel.
     pub readings: Vec<Vec<f64>>,
     /// Distinct positions, each with the number of its presses.
     pub places: Vec<(Position, usize)>,
-    /// Standard deviation of a reading in use, of each living channel.
+    /// Standard deviation of a reading in use, per enabled channel.
     pub reading_sds: Vec<f64>,
-    /// Noise variance of a press, in units of a reading's: less than 1 where a press is the mean of many readings.
+    /// Noise variance of a press, relative to that of a reading: less than 1 if a press is the mean of many readings.
     pub variance: f64,
-    /// Standard deviation of a press and that which the setup states for a reading, of each living channel.
+    /// Standard deviation of a press, and the one that the setup states for a reading, per enabled channel.
     press_sds: Vec<f64>,
     stated_sds: Vec<f64>,
-    /// Noise that is known apart from the presses: the stated one, or that of the untouched rows; 0 where there is none.
+    /// Noise that is known apart from the presses: the stated noise, or that of the untouched rows; 0 if there is none.
     quiet_sds: Vec<f64>,
-    /// Presses of places that were pressed more than once, and the degrees of freedom of their scatter.
+    /// Presses at places that were pressed more than once, and the degrees of freedom of their scatter.
     repeated: Vec<usize>,
     freedom: usize,
-    /// Variance that the placement adds to each press, in units of a reading's; empty where nobody says how well places are met.
+    /// Variance of each press due to its placement error, relative to that of a reading; empty if the placement error is unknown.
     placement_variances: Vec<f64>,
 }
 
 impl Presses {
-    /// Presses of a recording of a setup. Their noise is that of repeats, or else the setup's, and no reading in use has less than the
-    /// setup states; the sensors of a model have no offsets.
+    /// Presses of a recording of a setup. Their noise is estimated from repeats, or else taken from the setup. No reading in use
+    /// has less noise than the setup states; the sensors of a model have no offsets.
     pub fn new(recording: &Recording, setup: &Setup) -> Result<Self, PositionError> {
         let layout = setup.layout();
         if recording.channels.len() != layout.len() {
@@ -67,7 +67,7 @@ impl Presses {
             return Err(PositionError::NoOffset);
         }
         let offsets = offsets.unwrap_or_default();
-        // A channel that never changes tells nothing.
+        // A constant channel has no information.
         let changes = |s: &usize| touched.iter().any(|row| row.reading[*s] != touched[0].reading[*s]);
         let living: Vec<usize> = living(layout).filter(changes).collect();
         if living.is_empty() {
@@ -110,7 +110,7 @@ impl Presses {
         Ok(presses)
     }
 
-    /// Noise of a reading in use, and of a press in its units, by the scatter of presses and what is stated.
+    /// Sets the noise of a reading in use, and of a press relative to it, from the scatter of presses and the stated noise.
     fn whiten(&mut self) {
         let sds = self.press_sds.iter().zip(&self.stated_sds);
         self.reading_sds = sds.map(|(sd, stated)| sd.max(*stated)).collect();
@@ -118,17 +118,17 @@ impl Presses {
             mean(self.press_sds.iter().zip(&self.reading_sds).map(|(press, sd)| (press / sd).powi(2)));
     }
 
-    /// Variance of a press, in units of a reading's: of its noise and of its placement.
+    /// Variance of a press, relative to that of a reading: of its noise and of its placement.
     pub fn variance_of(&self, press: usize) -> f64 {
         self.variance + self.placement_variances.get(press).unwrap_or(&0.0)
     }
 
-    /// Takes the part of the placement in the scatter of repeats out of the noise, and gives each press the variance of its place.
-    /// `placed` is the variance of each channel's whitened reading that the placement makes at each press.
+    /// Removes the contribution of the placement from the scatter of repeats, and gives each press the variance of its place.
+    /// `placed` is the variance of each channel's whitened reading due to the placement at each press.
     ///
-    /// Repeats are placed one by one, so that their scatter s² is noise and placement together: the noise is s²·(1 − p), where p·s² is the
-    /// mean of the placement's variance at the places with repeats. Of ν degrees of freedom s² is known to s²·√(2/ν); a noise that this
-    /// does not resolve is the stated one or that of the untouched rows, or its bound of 95 %.
+    /// Repeats are placed one by one, so their scatter s² contains both noise and placement: the noise is s²·(1 − p), where p·s² is
+    /// the mean of the placement's variance at the places with repeats. With ν degrees of freedom the standard error of s² is
+    /// s²·√(2/ν). If this does not resolve the noise, it is the stated noise or that of the untouched rows, or its bound of 95 %.
     pub fn place_with(&mut self, placed: &[Vec<f64>]) {
         let before = self.reading_sds.clone();
         if self.freedom > 0 {
@@ -149,7 +149,7 @@ impl Presses {
         self.placement_variances = placed.iter().map(variance).collect();
     }
 
-    /// Checks that the presses reach over enough of a surface to tell how readings change on it.
+    /// Checks that the presses cover enough of a surface to determine how readings change on it.
     pub fn check_reach(&self, extent: Extent) -> Result<(), PositionError> {
         let check = |axis: char, coordinate: fn(Position) -> f64, side_m: f64| {
             let along = || self.places.iter().map(|(position, _)| coordinate(*position));
@@ -164,7 +164,7 @@ impl Presses {
     }
 }
 
-/// Indices of the sensors that are alive.
+/// Indices of the enabled sensors.
 pub(super) fn living(layout: &Layout) -> impl Iterator<Item = usize> {
     (0..layout.len()).filter(|s| !layout.sensors()[*s].channel.dead)
 }
@@ -177,18 +177,18 @@ fn by_position(presses: &[&Row]) -> Vec<Vec<usize>> {
     indices.chunk_by(|a, b| order(a, b).is_eq()).map(<[usize]>::to_vec).collect()
 }
 
-/// True where presses have forces, and not all the same.
+/// True if the presses have forces that differ.
 fn forces_differ(presses: &[&Row]) -> bool {
     !is_one_force(presses.iter().filter_map(|row| row.force_n))
 }
 
-/// Offsets of the channels by presses of one position at several forces: least squares of reading = offset + force × g(position), with a g of its own
-/// for each position. `None` where the forces do not tell them.
+/// Offsets of the channels from presses of one position at several forces: least squares of reading = offset + force × g(position),
+/// with a separate g for each position. `None` if the forces do not determine them.
 fn offsets(presses: &[&Row], groups: &[Vec<usize>], channels: usize) -> Option<Vec<f64>> {
     let (mut sums, mut weight) = (vec![0.0; channels], 0.0);
     for group in groups {
         let forces: Vec<f64> = group.iter().map(|&i| presses[i].force_n).collect::<Option<_>>()?;
-        // What is left of 1 beside the force at the position: the part by which a reading tells the offset.
+        // The part of 1 that is orthogonal to the forces at the position: it determines the offset.
         let slope = forces.iter().sum::<f64>() / dot(&forces, &forces);
         for (&i, force_n) in group.iter().zip(&forces) {
             let left = 1.0 - slope * force_n;
@@ -200,7 +200,7 @@ fn offsets(presses: &[&Row], groups: &[Vec<usize>], channels: usize) -> Option<V
     is_told.then(|| sums.into_iter().map(|sum| sum / weight).collect())
 }
 
-/// Readings of some channels beyond their offsets, where there are any, brought to the mean force where forces are known.
+/// Readings of some channels minus their offsets, if there are any, scaled to the mean force if forces are known.
 fn at_one_force(presses: &[&Row], channels: &[usize], offsets: &[f64]) -> Vec<Vec<f64>> {
     let forces: Option<Vec<f64>> =
         presses.iter().map(|row| row.force_n.filter(|force_n| *force_n > 0.0)).collect();
@@ -224,7 +224,7 @@ fn scatter(readings: &[Vec<f64>], repeated: &[Vec<usize>], channel: usize) -> Op
     (freedom > 0).then(|| (squares / freedom as f64).sqrt()).filter(|sd| *sd > 0.0)
 }
 
-/// Noise of a channel by the differences of untouched rows that follow one another, to which a slow drift adds little; 0 of too few.
+/// Noise of a channel from the differences of successive untouched rows, to which a slow drift adds little; 0 with too few rows.
 fn scatter_of_successive(untouched: &[&Row], channel: usize) -> f64 {
     if untouched.len() <= FEWEST_UNTOUCHED {
         return 0.0;
@@ -234,13 +234,13 @@ fn scatter_of_successive(untouched: &[&Row], channel: usize) -> f64 {
     (0.5 * mean(squares)).sqrt()
 }
 
-/// Brings the presses of each position to one amplitude, as locating at an unknown force looks at the shape of a reading alone: however hard
-/// they were, or at whatever depth, is no noise. Updates the channels' standard deviations, by what is left across the mean.
+/// Scales the presses of each position to one amplitude, as location at an unknown force uses only the shape of a reading: their
+/// different forces or depths are not noise. Updates the channels' standard deviations from the residuals orthogonal to the mean.
 ///
-/// With readings in units of their noise, u, and their mean m at the position, u becomes u − (u·m/m·m − 1)·m; of a channel's
-/// variance 1 − m_j²/m·m is left.
+/// With whitened readings u and their mean m at the position, u becomes u − (u·m/m·m − 1)·m; the share 1 − m_j²/m·m of a channel's
+/// variance remains.
 fn bring_to_one_amplitude(readings: &mut [Vec<f64>], repeated: &[Vec<usize>], sds: &mut [f64]) {
-    // What counts as across the mean depends on the noise, and converges in a few rounds.
+    // The direction orthogonal to the mean depends on the noise; a few rounds converge.
     for _ in 0..AMPLITUDE_ROUNDS {
         let (mut squares, mut freedom) = (vec![0.0; sds.len()], vec![0.0; sds.len()]);
         for group in repeated {

@@ -1,4 +1,4 @@
-//! Positions moved about while simulated calibrations get better.
+//! Pattern search of positions by simulated calibrations.
 
 use super::design::PositionError;
 use palpate_estimators::simulate::CleanSensors;
@@ -8,15 +8,15 @@ use palpate_mechanics::surface::{Extent, Surface};
 
 /// A move must lower the score by more than this share of it.
 const LEAST_GAIN: f64 = 1e-3;
-/// The search ends with steps of this share of the length.
+/// Final step of the search, as a share of the length.
 const FINEST_STEP: f64 = 1e-3;
-/// Positions stay this share of the length apart from the edges.
+/// Least distance of positions from the edges, as a share of the length.
 const EDGE: f64 = 1e-3;
 
-/// The score of an arrangement, the smaller the better; is told the share of the search that is done.
+/// The score of an arrangement, the smaller the better. The second argument is the completed share of the search.
 pub(super) type Score<'a> = dyn Fn(&[Position], f64) -> Result<f64, PositionError> + Sync + 'a;
 
-/// The scores of some arrangements, found side by side.
+/// The scores of some arrangements, computed in parallel.
 pub(super) fn evaluate(
     score: &Score,
     arrangements: &[Vec<Position>],
@@ -31,7 +31,7 @@ pub(super) fn evaluate(
             started.into_iter().map(|thread| thread.join()).collect()
         });
         for one in found {
-            // A panic of a thread goes on in this one.
+            // A panic of a thread continues in this thread.
             scores.push(one.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
         }
     }
@@ -41,9 +41,9 @@ pub(super) fn evaluate(
 /// Pattern search by ever smaller steps of one position at a time, or of one and its mirror image (Hooke and Jeeves 1961).
 pub(super) struct PatternSearch {
     pub extent: Extent,
-    /// Whether positions that mirror each other are moved together.
+    /// Whether positions that mirror each other move together.
     pub mirrored: bool,
-    /// Arrangements that may be tried.
+    /// Largest number of arrangements.
     pub most_trials: usize,
 }
 
@@ -88,7 +88,7 @@ impl PatternSearch {
         Ok(best)
     }
 
-    /// Positions that are moved together, by their places in the list: pairs where all of them mirror each other.
+    /// Positions that move together, by their indices: pairs if all of them mirror each other.
     fn groups(&self, positions: &[Position]) -> Vec<(usize, Option<usize>)> {
         let last = positions.len() - 1;
         let slack_m = 1e-9 * self.extent.length_m();
@@ -103,8 +103,8 @@ impl PatternSearch {
         }
     }
 
-    /// The arrangement with one group moved either way, on a plane along both sides; what would leave the surface or pass
-    /// another position is left out.
+    /// The arrangements with one group moved in either direction, on a plane along both sides. Moves off the surface or past
+    /// another position are omitted.
     fn moves(
         &self,
         positions: &[Position],
@@ -134,8 +134,8 @@ impl PatternSearch {
     }
 }
 
-/// Whether a bench along a line reads the same, sensors in reverse, when the contact is mirrored; up to signs, which slopes
-/// and the like change.
+/// Whether a mirrored contact on a line gives the same readings with the sensors in reverse order; up to signs, which slopes and
+/// some other kinds change.
 pub(super) fn reads_mirrored(surface: &dyn Surface, layout: &Layout, force_n: f64) -> bool {
     const ASKED: usize = 7;
     let length_m = surface.extent().length_m();

@@ -14,7 +14,7 @@ use palpate_numerics::watch::{Cancelled, Progress};
 
 use crate::fixtures::{Example, noisy, paper, plate};
 
-/// So many positions, pressed once each, in a short search.
+/// This number of positions, pressed once each, in a short search.
 fn short(design: PositionDesign, count: usize) -> PositionDesign {
     PositionDesign { count, repeats: 1, calibrations: 2, trials: 20, verifications: 4, ..design }
 }
@@ -23,7 +23,7 @@ fn problem(example: Example, count: usize) -> Result<PositionProblem, PositionEr
     PositionProblem::new(&example.setup, &short(example.design, count))
 }
 
-/// The score of a layout of positions by themselves: how far each is from where it should be.
+/// A score by the positions themselves: the distance of each from its wanted place.
 fn off(wanted_m: &[f64]) -> impl Fn(&[Position], f64) -> Result<f64, PositionError> + Sync {
     move |positions, _| {
         Ok(positions.iter().zip(wanted_m).map(|(at, wanted_m)| (at.x_m - wanted_m).powi(2)).sum())
@@ -51,7 +51,7 @@ fn mirrored_positions_stay_mirrored() {
     for (a, b) in found.iter().zip(found.iter().rev()) {
         assert!((a.x_m + b.x_m - 0.4).abs() < 1e-12, "{found:?}");
     }
-    // Between what the two of a pair ask for.
+    // Between the wanted places of the two in a pair.
     assert!((found[0].x_m - 0.04).abs() < 2e-3, "{found:?}");
 }
 
@@ -91,7 +91,7 @@ fn presses_at_one_place_add_up_and_tell_their_neighbours() {
     twice.condition(0, 1.0);
     once.condition(0, 0.5);
     for place in 0..3 {
-        // What is left is the small difference of large numbers.
+        // The result is the small difference of large numbers.
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-6 * before.variance(place);
         let (a, b) = (twice.variance(place), once.variance(place));
         assert!(close(a, b), "{a} {b}");
@@ -216,7 +216,7 @@ fn the_next_press_is_where_nobody_pressed_and_lowers_the_error() {
 #[test]
 fn the_expected_error_is_never_more_than_a_guess() {
     let guess_m = 0.4 / 12f64.sqrt();
-    // Presses in the middle tell next to nothing of the readings near the ends.
+    // Presses in the middle carry almost no information on the readings near the ends.
     let advice = advised(&[0.175, 0.1875, 0.2, 0.2125, 0.225], 5);
     assert!(advice.error_m < guess_m && advice.error_m > 0.3 * guess_m, "{} {guess_m}", advice.error_m);
     let forward = forward(&noisy().setup);
@@ -229,11 +229,11 @@ fn the_expected_error_is_never_more_than_a_guess() {
 /// Ten positions all over the beam.
 const TEN_M: [f64; 10] = [0.02, 0.06, 0.1, 0.14, 0.18, 0.22, 0.26, 0.3, 0.34, 0.38];
 
-/// Presses of 1, 2 and 4 N at every position on channels of counts, which read 5,000 while nothing touches.
+/// Presses of 1, 2 and 4 N at every position on channels of counts, which read 5,000 without contact.
 fn in_counts(positions_m: &[f64], untouched: usize) -> (Setup, Recording) {
     let (setup, mut recording) = begun(positions_m, 3);
     for (row, force_n) in recording.rows.iter_mut().zip([1.0, 2.0, 4.0].into_iter().cycle()) {
-        // The simulated ones are of 3 N; their noise stays, so what a count is differs little from press to press.
+        // The simulated presses have 3 N. Their noise stays, so the scale of a count differs little from press to press.
         row.reading.iter_mut().for_each(|value| *value = 5e3 + 1e6 * *value * force_n / 3.0);
         row.force_n = Some(force_n);
     }
@@ -292,7 +292,7 @@ fn presses_that_are_means_of_readings_promise_no_better_readings() {
     assert!((0.9..1.1).contains(&ratio), "{advice:?} beside {plain:?}");
 }
 
-/// A beam's readings are smoother than the roughest functions that are tried, so a few places tell the rest.
+/// A beam's readings are smoother than the roughest candidate functions, so a few places determine the rest.
 #[test]
 fn smooth_readings_leave_little_to_gain_after_few_presses() {
     let advice = advised(&[0.04, 0.12, 0.2, 0.28, 0.36], 3);
@@ -328,7 +328,7 @@ fn a_recording_that_tells_too_little_is_refused() {
 fn forces_that_differ_need_a_reading_without_contact() {
     let positions_m: Vec<f64> = (0..12).map(|i| 0.02 + 0.03 * f64::from(i)).collect();
     let (_, mut recording) = in_counts(&positions_m, 0);
-    // One press of each position, of 1, 2 and 4 N in turn.
+    // One press at each position, of 1, 2 and 4 N in turn.
     let rows = recording.rows.into_iter().enumerate();
     recording.rows = rows.filter(|(i, _)| i % 3 == i / 3 % 3).map(|(_, row)| row).collect();
     let setup = Setup::measured(0.4, &["1", "2", "3", "4", "5", "6", "7", "8"]).unwrap();
@@ -345,7 +345,7 @@ fn presses_that_do_not_tell_places_apart_are_refused() {
     let error = refused(&setup, &near);
     assert!(matches!(error, PositionError::SmallPart { axis: 'x', .. }), "{error}");
     assert!(error.to_string().contains("over 3.0 mm of 400.0 mm"), "{error}");
-    // Noise alone, of three draws.
+    // Noise alone, in three draws.
     for seed in 0..3 {
         let positions: Vec<Position> = TEN_M.map(Position::along).to_vec();
         let setup = noisy().setup.with_force(Some(1e-9)).unwrap();
@@ -370,7 +370,7 @@ fn a_channel_that_never_changes_is_left_out() {
     assert_eq!(advice(&setup, &recording), advice(&dead, &recording));
 }
 
-/// Presses of ten places that are missed by 2 mm (root mean square), under the places that were asked for.
+/// Presses of ten places with a placement error of 2 mm (root mean square), recorded under the intended places.
 fn beside_the_places(repeats: usize) -> (Setup, Recording) {
     let beside_m = [2.4e-3, -1.5e-3, -2.4e-3, 1.5e-3];
     let asked = TEN_M.iter().flat_map(|x_m| std::iter::repeat_n(Position::along(*x_m), repeats));
@@ -392,7 +392,7 @@ fn stated_placement_is_taken_out_of_the_noise_of_repeats() {
     let unstated = advice(&recording);
     recording.provenance.placement_sd_m = Some(2e-3);
     let stated = advice(&recording);
-    // Without it the scatter of the places passes for noise of the readings: the limit is then that of a hand.
+    // Without the stated error, the scatter of the places counts as noise of the readings: the limit is then that of a hand.
     assert!(unstated.endless_error_m > 3.0 * ideal.endless_error_m, "{unstated:?} beside {ideal:?}");
     let limit = stated.endless_error_m / ideal.endless_error_m;
     assert!((0.7..1.8).contains(&limit), "{stated:?} beside {ideal:?}");
@@ -409,6 +409,6 @@ fn placement_of_single_presses_is_added_to_their_noise() {
         advice.error_m
     });
     assert!(errors_m[0] < errors_m[1] && errors_m[1] < errors_m[2], "{errors_m:?}");
-    // Ten places that are missed by 4 mm cannot tell a contact to much better than a third of that.
+    // Ten places with a placement error of 4 mm cannot locate a contact much better than a third of that.
     assert!(errors_m[2] > 4e-3 / 10f64.sqrt() * 0.5, "{errors_m:?}");
 }

@@ -1,9 +1,9 @@
-//! Positions that leave the least variance of influence functions learnt as Gaussian processes.
+//! Positions with the least posterior variance of influence functions learnt as Gaussian processes.
 //!
-//! With noise of 1 a reading and a variance v left in what it should be, a locator sees noise of √(1 + v): a reading tells
-//! 1/(1 + v) of the information that it has at the limit, and the surface's size the rest, so where nothing is known yet the error is
-//! that of a guess. The mean over the contacts is made small by greedy choice and exchange (Krause, Singh and Guestrin, *Journal of
-//! Machine Learning Research* 9, 2008, choose sensors of fields so).
+//! The noise variance of a reading is 1, and the expected reading has a posterior variance v. A locator therefore has noise of √(1
+//! + v), and a reading contributes 1/(1 + v) of its information at the limit. The surface's size contributes the rest, so without
+//! any presses the error is that of a guess. Greedy choice and exchange minimize the mean over the contacts (Krause, Singh and
+//! Guestrin, *Journal of Machine Learning Research* 9, 2008, choose sensors of fields in this way).
 
 use ndarray::Array2;
 
@@ -18,12 +18,12 @@ use palpate_numerics::watch::{Cancelled, Watch};
 /// Candidate sites along a line, and along each side of a plane.
 const SITES: usize = 200;
 const SITES_ON_A_PLANE: usize = 20;
-/// Contacts that are looked at, at most.
+/// Largest number of contacts that are used.
 const MOST_CONTACTS: usize = 400;
-/// Rounds of exchange, far more than any search takes.
+/// Limit of the rounds of exchange, far above that of any search.
 const MOST_ROUNDS: usize = 50;
 
-/// Sites to press at, contacts to locate, and what is expected of the error there.
+/// Sites to press, contacts to locate, and the expected error at the contacts.
 pub(super) struct ExpectedError {
     /// The sites, then the contacts.
     pub places: Vec<Position>,
@@ -52,12 +52,12 @@ impl ExpectedError {
         }
     }
 
-    /// Indices of the places that can be pressed.
+    /// Indices of the sites.
     pub fn sites(&self) -> std::ops::Range<usize> {
         0..self.sites
     }
 
-    /// The mean over the contacts of the standard deviation with which they are located, in metres; `variance` is of a place.
+    /// Mean over the contacts of the standard deviation of their estimated positions, in metres; `variance` is that at a place.
     pub fn error_m(&self, variance: impl Fn(usize) -> f64) -> f64 {
         let contacts = self.weights.iter().zip(&self.information).enumerate();
         contacts
@@ -65,7 +65,7 @@ impl ExpectedError {
             .sum()
     }
 
-    /// The site at which presses help most, and the error that is then expected; `noise` is their variance at a site.
+    /// The best site for the next presses, and the expected error after them; `noise` is their variance at a site.
     pub fn best(&self, posterior: &Posterior, noise: impl Fn(usize) -> f64) -> (usize, f64) {
         let after = |site: usize| self.error_m(|place| posterior.variance_after(place, site, noise(site)));
         let all = self.sites().map(|site| (site, after(site)));
@@ -73,7 +73,7 @@ impl ExpectedError {
     }
 }
 
-/// Covariances of a whitened reading's function at some places, given the presses so far.
+/// Covariances of a whitened reading's function at some places, given the presses.
 #[derive(Clone)]
 pub(super) struct Posterior {
     covariance: Array2<f64>,
@@ -88,7 +88,7 @@ impl Posterior {
         Self { covariance }
     }
 
-    /// Conditions on the mean of presses at a place, whose noise has this `variance` in units of one press's:
+    /// Conditions on the mean of presses at a place, with a noise `variance` relative to that of a reading:
     /// C − c·cᵀ/(C_pp + variance), c = C's column of the place.
     pub fn condition(&mut self, place: usize, variance: f64) {
         let column = self.covariance.column(place).to_owned();
@@ -98,19 +98,19 @@ impl Posterior {
         }
     }
 
-    /// The variance that is left at a place.
+    /// The posterior variance at a place.
     pub fn variance(&self, place: usize) -> f64 {
         self.covariance[[place, place]].max(0.0)
     }
 
-    /// The variance that would be left at `place` after presses at another.
+    /// The posterior variance at `place` after presses at another place.
     pub fn variance_after(&self, place: usize, pressed: usize, variance: f64) -> f64 {
         let c = self.covariance[[place, pressed]];
         (self.variance(place) - c * c / (self.variance(pressed) + variance)).max(0.0)
     }
 }
 
-/// The positions that leave the least expected error: greedy choice, then exchange until nothing improves.
+/// The positions with the least expected error: greedy choice, then exchange until the error stays.
 pub(super) fn least(
     forward: &ForwardModel,
     contacts: &WeightedContacts,

@@ -1,4 +1,4 @@
-//! Assessment of a layout, whoever placed its sensors: by the limit, by simulated calibrations, and against fewer sensors.
+//! Assessment of a layout by any method: by the limit, by simulated calibrations, and against fewer sensors.
 
 use std::ops::RangeInclusive;
 
@@ -21,42 +21,43 @@ use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
 
-/// Training positions along a line, and along each side of a plane, of the calibrations that verify a layout; each is pressed as
-/// often.
+/// Training positions along a line, and along each side of a plane, of the calibrations that verify a layout; and the number of
+/// presses at each.
 const TRAINING_ALONG_A_LINE: usize = 30;
 const TRAINING_ALONG_A_PLANE: usize = 8;
 const PRESSES: usize = 20;
-/// Readings that a calibration is judged by, about.
+/// Approximate number of readings that evaluate a calibration.
 const READINGS: usize = 4000;
-/// The score of so many sensors is good enough when it lies within this share of the score of the most.
+/// A number of sensors is sufficient if its score lies within this share of the score of the largest number.
 const ENOUGH: f64 = 0.1;
 
-/// Figures of merit of a layout for the contacts of a design; of an unknown force, for those that are not over a support.
+/// Figures of merit of a layout for the contacts of a design. With an unknown force, contacts over a support are excluded.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Assessment {
-    /// The criterion's value, the smaller the better: in metres of a limit, a share, or ½·ln det.
+    /// Value of the criterion, the smaller the better: a limit in metres, a share, or ½·ln det.
     pub score: f64,
-    /// The mean limit in metres; `None` where the readings do not tell some contact at all.
+    /// The mean limit in metres; `None` if the readings do not determine some contact.
     pub mean_limit_m: Option<f64>,
-    /// The largest limit in metres; `None` where the readings do not tell some contact at all.
+    /// The largest limit in metres; `None` if the readings do not determine some contact.
     pub worst_limit_m: Option<f64>,
-    /// Mean over the contacts of the mean error of an estimator at the limit, in metres; `None` as before.
+    /// Mean over the contacts of the mean error of an estimator at the limit, in metres; `None` if the readings do not determine
+    /// some contact.
     pub mean_error_m: Option<f64>,
-    /// Share of the contacts whose limit is within the tolerance, in %.
+    /// Share of the contacts with a limit within the tolerance, in %.
     pub within_tolerance_percent: f64,
-    /// The worst score when one of the sensors dies; `None` for a single sensor.
+    /// The worst score with one sensor missing; `None` for a single sensor.
     pub score_one_dead: Option<f64>,
     /// Cost of the sensors.
     pub cost: f64,
-    /// Whether it keeps all constraints.
+    /// Whether the layout meets all constraints.
     pub keeps_constraints: bool,
 }
 
 impl SensorProblem<'_> {
-    /// Judges a layout, its own or any other of the same surface.
+    /// Assesses a layout of this problem or any other layout on the surface.
     ///
     /// # Errors
-    /// [`DesignError::Limit`] where a sensor has no noise or all are dead.
+    /// [`DesignError::Limit`] if a sensor has no noise or all sensors are disabled.
     pub fn assess(&self, layout: &Layout) -> Result<Assessment, DesignError> {
         let Sensitivity { surface, contacts, force_n, force } = &self.sensitivity;
         let weights = self.sensitivity.judged_weights();
@@ -89,7 +90,7 @@ impl SensorProblem<'_> {
         })
     }
 
-    /// The criterion's value, and the worst when one sensor is dead.
+    /// The criterion's value, and the worst value with one sensor missing.
     fn scores(&self, layout: &Layout) -> (f64, Option<f64>) {
         let live = layout.sensors().iter().filter(|sensor| !sensor.channel.dead);
         let rows = self.sensitivity.rows(&live.map(SensorAt::from).collect::<Vec<_>>());
@@ -106,7 +107,7 @@ impl SensorProblem<'_> {
         (value(None), one_dead.filter(|_| rows.len() > 1))
     }
 
-    /// By the costs of the kinds that are offered; other kinds cost nothing.
+    /// Cost of a layout by the offers; other kinds cost 0.
     fn cost(&self, layout: &Layout) -> f64 {
         layout
             .sensors()
@@ -120,8 +121,8 @@ impl SensorProblem<'_> {
         self.pool.design.offers.iter().position(|offer| offer.kind == sensor.kind)
     }
 
-    /// Whether a layout has the wanted count and keeps spacing, zones, budget, symmetry and what every layout has. Its sites need
-    /// not be candidates.
+    /// Whether a layout has the requested count, includes the fixed sensors, and meets spacing, zones, budget and symmetry. Sites
+    /// of the layout need not be candidates.
     fn keeps_constraints(&self, layout: &Layout) -> bool {
         let (design, extent) = (&self.pool.design, self.pool.extent);
         let placed: Option<Vec<PlacedSensor>> = layout
@@ -152,9 +153,9 @@ impl SensorProblem<'_> {
 }
 
 impl SensorProblem<'_> {
-    /// Calibrates the layout at even training positions with the design's force, `calibrations` times with fresh noise, and
-    /// locates readings of the design's contacts, whose force the locator knows or does not as the design says. The estimator is
-    /// `estimator` where that inverts influence functions, else the best guess for the surface.
+    /// Calibrates the layout at even training positions with the design's force, `calibrations` times with fresh noise, and locates
+    /// readings of the design's contacts. The design states whether their force is known to the locator. The estimator is
+    /// `estimator` if that inverts influence functions, else the default for the surface.
     ///
     /// # Errors
     /// [`EvaluationError`] when the locator cannot be fitted, or the watch stopped it.
@@ -195,14 +196,14 @@ impl SensorProblem<'_> {
     /// Even and designed layouts for each number of sensors.
     ///
     /// # Errors
-    /// [`DesignError`] for the largest number or else the first that no layout can have.
+    /// [`DesignError`] for the largest number, or else for the first number without a layout.
     pub fn counts(
         &self,
         range: RangeInclusive<usize>,
         seed: u64,
         watch: Watch,
     ) -> Result<Vec<CountPoint>, DesignError> {
-        // What no layout can have is told before the work, not in its midst.
+        // A number without a layout fails here, before the long work.
         if !range.is_empty() {
             self.with_count(*range.end())?;
         }
@@ -220,13 +221,13 @@ impl SensorProblem<'_> {
 pub struct CountPoint {
     /// Number of sensors.
     pub count: usize,
-    /// The even layout; `None` where there is none.
+    /// The even layout; `None` if there is none.
     pub even: Option<Assessment>,
     /// The layout by greedy choice and exchange.
     pub designed: Assessment,
 }
 
-/// The least number of sensors whose score lies within 10 % of the score of the most; `None` of no points.
+/// The least number of sensors with a score within 10 % of the score of the largest number; `None` without points.
 pub fn enough(points: &[CountPoint]) -> Option<usize> {
     let least = points.last()?.designed.score;
     let bound = least + ENOUGH * least.abs();

@@ -1,4 +1,4 @@
-//! Candidates of searches: the sensors that a layout may have, one or two at a time, and which go together.
+//! Candidates of searches: the sensors that a layout may have, one or two at a time, and which of them exclude each other.
 
 use std::collections::HashMap;
 
@@ -8,20 +8,20 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{SensorKind, even_positions};
 use palpate_mechanics::surface::{Extent, Surface};
 
-/// Places closer than this share of the length are the same.
+/// Places closer than this share of the length are equal.
 const SAME: f64 = 1e-6;
 
-/// A sensor of one of the offered kinds somewhere on the surface.
+/// A sensor of one of the offered kinds at a position of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedSensor {
-    /// Which of the design's offers.
+    /// Index of the offer.
     pub offer: usize,
     /// Position.
     pub position: Position,
 }
 
 impl PlacedSensor {
-    /// Whether both are of one offer and at one place.
+    /// Whether both have one offer and one place.
     pub(super) fn is_same(&self, other: &Self, extent: Extent) -> bool {
         self.offer == other.offer && self.position.distance_m(other.position) <= SAME * extent.length_m()
     }
@@ -31,12 +31,12 @@ impl PlacedSensor {
 #[derive(Clone)]
 pub(super) struct Candidates {
     pub sensors: Vec<PlacedSensor>,
-    /// Indices of those that every layout has.
+    /// Indices of the fixed sensors.
     pub must_have: Vec<usize>,
 }
 
 impl Candidates {
-    /// All offers at all sites where they read something and nothing forbids them, and what every layout has.
+    /// The fixed sensors, and all offers at all sites where they can read something and no constraint forbids them.
     pub fn new(surface: &dyn Surface, design: &SensorDesign) -> Result<Self, DesignError> {
         let extent = surface.extent();
         let sites = sites(&design.sites, extent);
@@ -77,7 +77,7 @@ impl Candidates {
         }
         let index = self.add(PlacedSensor { offer, position }, extent);
         self.must_have.push(index);
-        // Its twin need not be one of the sites either.
+        // The mirror image need not be one of the sites either.
         let twin = mirrored(position, extent);
         let reads = !design.keeps_out(twin, extent) && reads_something(surface, kind, twin);
         if design.symmetry == Symmetry::Wanted && reads {
@@ -86,7 +86,7 @@ impl Candidates {
         Ok(())
     }
 
-    /// Index of a sensor among the candidates, of which it becomes one if it is none.
+    /// Index of a sensor among the candidates; adds it if it is missing.
     fn add(&mut self, sensor: PlacedSensor, extent: Extent) -> usize {
         self.sensors.iter().position(|other| other.is_same(&sensor, extent)).unwrap_or_else(|| {
             self.sensors.push(sensor);
@@ -94,7 +94,7 @@ impl Candidates {
         })
     }
 
-    /// For each candidate the one that is its mirror image, itself in the middle.
+    /// For each candidate the index of its mirror image; in the middle, its own.
     pub fn twins(&self, extent: Extent) -> Vec<Option<usize>> {
         let grain_m = SAME * extent.length_m();
         let key = |sensor: &PlacedSensor| {
@@ -106,7 +106,7 @@ impl Candidates {
         let twin = |sensor: &PlacedSensor| {
             let mirrored = PlacedSensor { position: mirrored(sensor.position, extent), ..*sensor };
             let (offer, x, y) = key(&mirrored);
-            // Rounding may put the same place into the next cell.
+            // Rounding may put one place into the next cell.
             [0, -1, 1].into_iter().find_map(|step| by_place.get(&(offer, x + step, y)).copied())
         };
         self.sensors.iter().map(twin).collect()
@@ -133,14 +133,14 @@ fn sites(sites: &Sites, extent: Extent) -> Vec<Position> {
     }
 }
 
-/// Whether a sensor reads anything at a place, wherever the surface is touched.
+/// Whether a sensor at a place responds to a contact anywhere on the surface.
 pub(super) fn reads_something(surface: &dyn Surface, kind: SensorKind, position: Position) -> bool {
     let still = surface.insensitive_sensor(kind, position).is_some();
     let carried = kind != SensorKind::Reaction || surface.is_supported_at(position);
     !still && carried && kind != SensorKind::Raw
 }
 
-/// Checks that no two sensors of every layout exclude each other.
+/// Checks that no two fixed sensors exclude each other.
 fn check_must_haves(
     candidates: &Candidates,
     design: &SensorDesign,
@@ -178,16 +178,16 @@ impl Unit {
     }
 }
 
-/// Candidates with the constraints that layouts of them keep.
+/// Candidates, with the constraints of their layouts.
 pub(super) struct Pool {
     pub design: SensorDesign,
     pub extent: Extent,
     pub sensors: Vec<PlacedSensor>,
     /// Units that can be chosen.
     pub units: Vec<Unit>,
-    /// Units that every layout has.
+    /// Units of the fixed sensors.
     pub fixed: Vec<usize>,
-    /// The least that a sensor costs.
+    /// Cost of the cheapest sensor.
     cheapest: f64,
 }
 
@@ -223,7 +223,7 @@ impl Pool {
         selection.iter().map(|unit| self.units[*unit].size()).sum()
     }
 
-    /// Whether a selection has as many sensors as are wanted.
+    /// Whether a selection has the requested number of sensors.
     pub fn is_whole(&self, selection: &[usize]) -> bool {
         self.size(selection) == self.design.count
     }
@@ -243,9 +243,9 @@ impl Pool {
         self.units[unit].members().map(cost).sum()
     }
 
-    /// Whether a layout may have both units.
+    /// Whether a layout may include both units.
     pub fn go_together(&self, a: usize, b: usize) -> bool {
-        // Of very many candidates this is asked very often.
+        // With very many candidates this is called very often.
         if a == b || excludes_nothing(&self.design) {
             return a != b;
         }
@@ -257,12 +257,12 @@ impl Pool {
         })
     }
 
-    /// Whether a unit may join a selection that is to become a whole layout.
+    /// Whether a unit may join a selection that is still to be completed.
     pub fn may_join(&self, selection: &[usize], unit: usize) -> bool {
         !self.joinable(selection, &[unit], None).is_empty()
     }
 
-    /// The same of many units at once; `selection` lacks sensors of `size` only, or of any.
+    /// The units that may join a selection; `selection` lacks only sensors of `size`, or of any if `None`.
     pub fn joinable(&self, selection: &[usize], among: &[usize], size: Option<usize>) -> Vec<usize> {
         let room = self.design.count - self.size(selection);
         let cost = self.cost(selection);
@@ -275,21 +275,20 @@ impl Pool {
         among.iter().copied().filter(|unit| fits(unit)).collect()
     }
 
-    /// Whether there is room for a unit. Layouts that mirror themselves are pairs, and one in the middle where their count
-    /// is odd.
+    /// Whether there is room for a unit. A symmetric layout consists of pairs, and of one sensor in the middle if its count is odd.
     fn leaves_pairs(&self, room: usize, unit: usize) -> bool {
         let alone = self.units[unit].twin.is_none();
         room >= self.units[unit].size()
             && (self.design.symmetry != Symmetry::Wanted || !alone || !room.is_multiple_of(2))
     }
 
-    /// Whether the budget lasts for a unit and for the cheapest sensors besides.
+    /// Whether the budget covers a unit and the cheapest sensors for the remaining room.
     fn is_affordable(&self, spent: f64, room: usize, unit: usize) -> bool {
         let rest = (room - self.units[unit].size()) as f64 * self.cheapest;
         self.design.affords(spent + self.unit_cost(unit) + rest)
     }
 
-    /// Whether as many sensors as are wanted come in pairs and from the middle.
+    /// Checks that pairs and middle sensors can give the requested number of sensors.
     fn check_symmetry(&self) -> Result<(), DesignError> {
         if self.design.symmetry != Symmetry::Wanted {
             return Ok(());
@@ -303,12 +302,12 @@ impl Pool {
     }
 }
 
-/// Whether any two different sensors may be in one layout.
+/// True if a layout may include any two different sensors.
 fn excludes_nothing(design: &SensorDesign) -> bool {
     design.spacing_m == 0.0 && design.symmetry != Symmetry::Forbidden
 }
 
-/// Reason for which two different sensors cannot both be in a layout, if there is one.
+/// Reason why two different sensors exclude each other; `None` if a layout may include both.
 pub(super) fn exclusion(
     a: &PlacedSensor,
     b: &PlacedSensor,
@@ -333,8 +332,8 @@ pub(super) fn exclusion(
     None
 }
 
-/// Least distance of a sensor from the mirror image of another where symmetry is forbidden: the spacing, or more than half
-/// the distance of sites, so that sites next to each other are distinguished.
+/// Least distance between a sensor and the mirror image of another if symmetry is forbidden: the spacing, or more than half the
+/// distance of sites, so that neighbouring sites are distinguished.
 fn mirror_distance(design: &SensorDesign, extent: Extent) -> f64 {
     let pitch_m = design.sites.distance_m(extent.length_m()).unwrap_or(0.0);
     design.spacing_m.max(0.5 * pitch_m).max(2e-9 * extent.length_m())
@@ -354,7 +353,7 @@ fn mirrored_units(candidates: &Candidates, design: &SensorDesign, extent: Extent
     twins.iter().enumerate().filter_map(unit).collect()
 }
 
-/// The units of what every layout has.
+/// The units of the fixed sensors.
 fn fixed_units(
     candidates: &Candidates,
     units: &[Unit],

@@ -11,17 +11,17 @@ use crate::contacts::{ContactPrior, check_count, check_positions, spacing};
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Cancelled;
 
-/// Candidate sites that a line has where a design does not say: every millimetre of the paper's beam.
+/// Default number of candidate sites along a line: every millimetre of the paper's beam.
 const SITES_ALONG_A_LINE: f64 = 400.0;
-/// The same along the longer side of a plane, where each site is a solution of the plate.
+/// Default number of candidate sites along the longer side of a plane, where each site needs a solution of the plate.
 const SITES_ALONG_A_PLANE: f64 = 30.0;
-/// An error up to this is good enough, as for the effective length.
+/// Default tolerance of the location error, as for the effective length.
 pub(crate) const TOLERANCE_M: f64 = 2e-3;
 
 /// Task of placing sensors: candidate sites, kinds and number, constraints, and the contacts. [`SensorProblem::new`](super::SensorProblem::new) checks it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorDesign {
-    /// Sensors to place, those that the layout must have included; at least 1.
+    /// Number of sensors to place, including `must_have`; at least 1.
     pub count: usize,
     /// The kinds to choose from; at least one.
     pub offers: Vec<SensorOffer>,
@@ -29,62 +29,62 @@ pub struct SensorDesign {
     pub sites: Sites,
     /// Prior of the contacts.
     pub contacts: ContactPrior,
-    /// Whether the locator will know the force of its contacts.
+    /// Whether the force of the contacts is known to the locator.
     pub force: Force,
     /// Criterion by which layouts are compared.
     pub criterion: DesignCriterion,
-    /// A limit up to this is good enough, in metres; greater than 0.
+    /// Tolerance of the limit, in metres; greater than 0.
     pub tolerance_m: f64,
-    /// Least distance of two sensors, in metres; at least 0. A reaction sensor is part of its support and takes no room.
+    /// Least distance between two sensors, in metres; at least 0. A reaction sensor is part of its support and needs no room.
     pub spacing_m: f64,
-    /// Zones where no sensor may sit, except reaction sensors, which are asked for by their kind.
+    /// Zones without sensors. Reaction sensors are exempt; they are requested by their kind.
     pub keep_out: Vec<KeepOut>,
     /// Sensors that every layout has.
     pub must_have: Vec<MustHave>,
-    /// Today's sensors, where they stay: the first of `must_have` are these.
+    /// Existing sensors that stay; they are the first of `must_have`.
     pub kept: Vec<Sensor>,
-    /// Largest cost of all sensors together, in the unit of their costs; no bound where `None`.
+    /// Largest total cost of the sensors, in the unit of their costs; unlimited if `None`.
     pub budget: Option<f64>,
-    /// Whether layouts are to be their own mirror image.
+    /// Symmetry of the layouts across the middle of the length.
     pub symmetry: Symmetry,
 }
 
-/// A kind of sensor that can be had.
+/// A kind of sensor that is available.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorOffer {
-    /// Quantity that it measures; never raw.
+    /// Quantity that the sensor measures; never raw.
     pub kind: SensorKind,
     /// Noise and faults.
     pub channel: ChannelModel,
-    /// Cost of one; at least 0, in any unit.
+    /// Cost of one sensor; at least 0, in any unit.
     pub cost: f64,
-    /// Whether further ones can be had.
+    /// Whether more sensors of this kind are available.
     pub supply: Supply,
 }
 
 /// Source of the sensors of an offer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Supply {
-    /// As many as are wanted can be had.
+    /// Any number of sensors is available.
     #[default]
     Any,
-    /// There are today's alone.
+    /// Only the existing sensors are available.
     Kept,
 }
 
 /// Candidate sites.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sites {
-    /// At 0 and every so many metres from there, along each side of the surface; greater than 0.
+    /// Sites at 0 and at every multiple of this distance in metres, along each side of the surface; greater than 0.
     Every(f64),
-    /// As many, evenly between the ends of a line and not on them.
+    /// This number of sites, evenly between the ends of a line and not on them.
     Count(usize),
-    /// These, each on the surface.
+    /// The listed sites, each on the surface.
     At(Vec<Position>),
 }
 
 impl Sites {
-    /// The distance of neighbouring sites along a surface of this length, in metres; `None` of listed ones.
+    /// Distance between neighbouring sites along a surface of this length, in metres; `None` for listed sites.
     pub(super) fn distance_m(&self, length_m: f64) -> Option<f64> {
         match self {
             Self::Every(every_m) => Some(*every_m),
@@ -94,7 +94,7 @@ impl Sites {
     }
 }
 
-/// Part of the surface where no sensor may sit, its boundary excluded.
+/// Part of the surface without sensors, its boundary excluded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeepOut {
     /// The left end, or lower left corner.
@@ -104,7 +104,7 @@ pub struct KeepOut {
 }
 
 impl KeepOut {
-    /// Whether a position lies inside it; rounding errors are forgiven.
+    /// Whether a position lies inside the zone, with a margin for rounding errors.
     pub fn holds(&self, position: Position, extent: Extent) -> bool {
         let slack_m = 1e-9 * extent.length_m();
         let inside = |at_m: f64, low_m: f64, high_m: f64| low_m + slack_m < at_m && at_m < high_m - slack_m;
@@ -116,7 +116,7 @@ impl KeepOut {
 /// A sensor that every layout has.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MustHave {
-    /// Which of the offers.
+    /// Index of the offer.
     pub offer: usize,
     /// Position.
     pub position: Position,
@@ -126,13 +126,13 @@ pub struct MustHave {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DesignCriterion {
-    /// A small mean limit.
+    /// Minimizes the mean limit.
     MeanLimit,
-    /// A small largest limit.
+    /// Minimizes the largest limit.
     WorstLimit,
-    /// Few contacts whose limit is above the tolerance.
+    /// Minimizes the share of contacts with a limit above the tolerance.
     WithinTolerance,
-    /// Much information on all that is unknown of a contact: a small mean of ½·ln det of its least covariance.
+    /// Maximizes the information on all unknowns of a contact: the mean of ½·ln det of the bound of their covariance is minimized.
     DOptimality,
 }
 
@@ -147,7 +147,7 @@ impl DesignCriterion {
         }
     }
 
-    /// Factor from a score to the unit that people read: limits in millimetres, shares in %.
+    /// Factor from a score to its displayed unit: limits in millimetres, shares in %.
     pub const fn score_scale(self) -> f64 {
         match self {
             Self::MeanLimit | Self::WorstLimit => 1e3,
@@ -157,20 +157,21 @@ impl DesignCriterion {
     }
 }
 
-/// Whether a layout is its own image in the mirror across the middle of the length.
+/// Symmetry of a layout across the middle of the length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Symmetry {
-    /// It may be, or not.
+    /// No condition.
     Any,
-    /// It is: every sensor has a twin of its kind, or sits in the middle.
+    /// Every sensor has a mirror image of its kind, or lies in the middle.
     Wanted,
-    /// No sensor comes as close to the mirror image of another of its kind as sensors may come to each other.
+    /// The mirror image of a sensor keeps the least distance of two sensors from every other sensor of its kind.
     Forbidden,
 }
 
 impl SensorDesign {
-    /// As many sensors as a setup has, of its kinds, for contacts all over its surface whose force is as known as the setup's.
+    /// A design with the number and kinds of a setup's sensors, and with contacts all over its surface. The force is known if the
+    /// setup's force is.
     ///
     /// # Errors
     /// [`LimitError::NoModel`] where no model explains the sensors.
@@ -203,17 +204,18 @@ impl SensorDesign {
         })
     }
 
-    /// The same with another number of sensors.
+    /// This design with another number of sensors.
     #[must_use]
     pub fn count(self, count: usize) -> Self {
         Self { count, ..self }
     }
 
-    /// The same with every living sensor of today's layout and `count` more. `must_have` sensors that are among today's are not wanted twice.
+    /// This design with every enabled sensor of the existing layout `today` and `count` more. A `must_have` sensor of that layout
+    /// is listed once.
     ///
     /// # Errors
-    /// [`DesignError::KeptDiffers`] where the noise of one of today's sensors is not that of its kind's offer, as a layout has one channel
-    /// a kind; [`LimitError::NoModel`] for a raw channel.
+    /// [`DesignError::KeptDiffers`] if the noise of an existing sensor differs from the offer of its kind, since a layout has one
+    /// channel per kind; [`LimitError::NoModel`] for a raw channel.
     pub fn adding(mut self, count: usize, today: &Layout) -> Result<Self, DesignError> {
         let living = |sensor: &&Sensor| !sensor.channel.dead;
         let mut kept = Vec::new();
@@ -224,7 +226,7 @@ impl SensorDesign {
             }
             let offered = self.offers.iter().position(|offer| offer.kind == kind);
             let offer = offered.unwrap_or_else(|| {
-                // Sensors that there are, and that the design does not offer, cost nothing.
+                // An existing sensor costs 0 if the design does not offer its kind.
                 self.offers.push(SensorOffer { kind, channel, cost: 0.0, supply: Supply::Kept });
                 self.offers.len() - 1
             });
@@ -245,45 +247,46 @@ impl SensorDesign {
         Ok(self)
     }
 
-    /// The list that a sensor of `must_have` is of, by its index.
+    /// The list of a fixed sensor, by its index in `must_have`.
     pub(super) fn list_of(&self, index: usize) -> FixedList {
         if index < self.kept.len() { FixedList::Kept } else { FixedList::MustHave }
     }
 
-    /// The same with other candidate sites.
+    /// This design with other candidate sites.
     #[must_use]
     pub fn sites(self, sites: Sites) -> Self {
         Self { sites, ..self }
     }
 
-    /// The same for other contacts.
+    /// This design for other contacts.
     #[must_use]
     pub fn contacts(self, contacts: ContactPrior) -> Self {
         Self { contacts, ..self }
     }
 
-    /// The same for contacts whose force the locator will not know.
+    /// This design for contacts of a force that is unknown to the locator.
     #[must_use]
     pub fn unknown_force(self) -> Self {
         Self { force: Force::Unknown, ..self }
     }
 
-    /// Whether costs tell layouts apart: sensors differ in theirs, or a budget limits them.
+    /// Whether costs distinguish layouts: the costs of the offers differ, or a budget limits them.
     pub fn has_costs(&self) -> bool {
         self.budget.is_some() || self.offers.windows(2).any(|pair| pair[0].cost != pair[1].cost)
     }
 
-    /// Whether no sensor may sit at a position, except reaction sensors.
+    /// True where no sensor may be placed, except reaction sensors.
     pub(super) fn keeps_out(&self, position: Position, extent: Extent) -> bool {
         self.keep_out.iter().any(|zone| zone.holds(position, extent))
     }
 
-    /// Whether the budget suffices for a cost, to rounding.
+    /// Whether the budget covers a cost, to rounding.
     pub(super) fn affords(&self, cost: f64) -> bool {
         self.budget.is_none_or(|budget| cost <= budget * (1.0 + 1e-12))
     }
 
-    /// Checks every number against its bound and every position against the surface; the contacts check themselves.
+    /// Checks every number against its bound and every position against the surface. The contacts are checked in
+    /// `WeightedContacts::from_prior`.
     pub(super) fn check(&self, extent: Extent) -> Result<(), OutOfRange> {
         OutOfRange::check_positive([
             ("the number of sensors", self.count as f64),
@@ -314,19 +317,19 @@ impl SensorDesign {
     }
 }
 
-/// A constraint that cannot be met, or a setup that nothing can be designed for.
+/// A constraint that cannot be met, or a setup without a possible design.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DesignError {
-    /// There is no limit to design by.
+    /// The limit of the setup does not exist.
     #[error(transparent)]
     Limit(#[from] LimitError),
     /// The design was stopped.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
-    /// A number that is not in its range.
+    /// A number out of its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// A number of an offered sensor that is not in its range.
+    /// A number of an offered sensor out of its range.
     #[error(transparent)]
     Layout(#[from] LayoutError),
     /// A kind without noise.
@@ -334,21 +337,21 @@ pub enum DesignError {
         "{kind} sensors have no noise and no resolution; one of them must be greater than 0, or the limit is 0 wherever they sit"
     )]
     SingularNoise {
-        /// Quantity that they measure.
+        /// Quantity that the sensors measure.
         kind: SensorKind,
     },
-    /// Contacts over supports alone.
-    #[error("all {contacts} contacts are over supports, where no layout tells a force that is not known")]
+    /// All contacts are over supports.
+    #[error("all {contacts} contacts are over supports, where no layout determines an unknown force")]
     OverSupports {
         /// Number of contacts.
         contacts: usize,
     },
     /// Fewer sites than sensors.
-    #[error("{count} sensors are wanted, but only {sites} sites can hold one")]
+    #[error("{count} sensors are wanted, but only {sites} sites can have one")]
     TooFewSites {
-        /// Sensors that are wanted.
+        /// Requested number of sensors.
         count: usize,
-        /// Sites that are left.
+        /// Available sites.
         sites: usize,
     },
     /// The spacing leaves no room.
@@ -358,19 +361,19 @@ pub enum DesignError {
         if *most == 0 { "none".to_owned() } else { format!("at most {most}") }
     )]
     Spacing {
-        /// Sensors that are wanted.
+        /// Requested number of sensors.
         count: usize,
-        /// Their least distance, in metres.
+        /// Least distance between sensors, in metres.
         spacing_m: f64,
-        /// As many as found place.
+        /// Largest number that could be placed.
         most: usize,
     },
-    /// Sensors that do not mirror each other, and too few of them.
+    /// Too few sensors can be placed if none may mirror another.
     #[error("{count} sensors do not fit when none may mirror another: at most {most} found place")]
     NoMirror {
-        /// Sensors that are wanted.
+        /// Requested number of sensors.
         count: usize,
-        /// As many as found place.
+        /// Largest number that could be placed.
         most: usize,
     },
     /// The budget does not suffice.
@@ -378,119 +381,119 @@ pub enum DesignError {
     Budget {
         /// The budget, in the unit of the costs.
         budget: f64,
-        /// Sensors that are wanted.
+        /// Requested number of sensors.
         count: usize,
         /// Cost of the cheapest layout found.
         least: f64,
     },
-    /// More sensors that every layout has than the layout is to have.
+    /// `must_have` has more sensors than the layout.
     #[error("`must_have` lists {listed} sensors{}, but only {count} are wanted", if *mirrored { " with their mirror images" } else { "" })]
     TooManyMustHaves {
-        /// As many are listed.
+        /// Number of listed sensors.
         listed: usize,
-        /// Sensors that are wanted.
+        /// Requested number of sensors.
         count: usize,
         /// True where mirror images are counted too.
         mirrored: bool,
     },
-    /// A sensor that every layout has, where it would read nothing.
-    #[error("the {kind} sensor of {list} at {} would read nothing there", extent.place_in_words(*position))]
+    /// A fixed sensor at a position where it would always read 0.
+    #[error("the {kind} sensor of {list} at {} would always read 0 there", extent.place_in_words(*position))]
     MustHaveReadsNothing {
-        /// The list that it is of.
+        /// The list that contains it.
         list: FixedList,
-        /// Quantity that it measures.
+        /// Quantity that the sensor measures.
         kind: SensorKind,
         /// Position.
         position: Position,
         /// The surface.
         extent: Extent,
     },
-    /// A sensor that every layout has, where none may sit.
+    /// A fixed sensor in a zone without sensors.
     #[error("the {kind} sensor of {list} at {} lies in a `keep_out` zone", extent.place_in_words(*position))]
     MustHaveKeptOut {
-        /// The list that it is of.
+        /// The list that contains it.
         list: FixedList,
-        /// Quantity that it measures.
+        /// Quantity that the sensor measures.
         kind: SensorKind,
         /// Position.
         position: Position,
         /// The surface.
         extent: Extent,
     },
-    /// Two sensors that every layout has, and that exclude each other.
+    /// Two fixed sensors that exclude each other.
     #[error("the sensors of {list} at {} and {} exclude each other: {}", extent.place_in_words(*first), extent.place_in_words(*second), reason)]
     MustHavesExclude {
-        /// The list that they are of.
+        /// The list that contains them.
         list: FixedList,
-        /// Position of the one.
+        /// Position of the first sensor.
         first: Position,
-        /// Position of the other.
+        /// Position of the second sensor.
         second: Position,
-        /// Reason for which they do.
+        /// Reason for the exclusion.
         reason: Exclusion,
         /// The surface.
         extent: Extent,
     },
-    /// A sensor that every layout has, without a place for its twin.
-    #[error("symmetry is wanted, but the mirror image of the {kind} sensor of {list} at {} is no place for one", extent.place_in_words(*position))]
+    /// A fixed sensor with a mirror image where no sensor can be.
+    #[error("symmetry is wanted, but the mirror image of the {kind} sensor of {list} at {} is not a place for one", extent.place_in_words(*position))]
     MustHaveWithoutTwin {
-        /// The list that it is of.
+        /// The list that contains it.
         list: FixedList,
-        /// Quantity that it measures.
+        /// Quantity that the sensor measures.
         kind: SensorKind,
         /// Position.
         position: Position,
         /// The surface.
         extent: Extent,
     },
-    /// One of today's sensors, whose noise is not that of its kind.
+    /// An existing sensor with noise that differs from the offer of its kind.
     #[error(
         "sensor {number} of today's layout is a {kind} sensor of another noise, resolution or fault than the {kind} sensors that are offered"
     )]
     KeptDiffers {
-        /// Which sensor, from 1.
+        /// Number of the sensor, from 1.
         number: usize,
-        /// Quantity that it measures.
+        /// Quantity that the sensor measures.
         kind: SensorKind,
     },
-    /// No site has its mirror image among the sites.
+    /// Too few sites have their mirror image among the sites.
     #[error(
         "symmetry is wanted, but {count} sensors cannot be placed symmetrically: {pairs} pairs of sites mirror each other, {middle} sites lie in the middle"
     )]
     Symmetry {
-        /// Sensors that are wanted.
+        /// Requested number of sensors.
         count: usize,
         /// Pairs of sites.
         pairs: usize,
         /// Sites in the middle.
         middle: usize,
     },
-    /// A method that has no layout to give.
+    /// A method that gives no layout.
     #[error("the method `{method}` has no layout for these sensors and constraints")]
     NoLayout {
-        /// Name.
+        /// Name of the method.
         method: &'static str,
     },
     /// More candidates and contacts than fit into memory.
-    #[error("{sites} candidate sites and {contacts} contacts need {:.1} GB; at most {:.1} GB can be held", bytes / 1e9, most / 1e9)]
+    #[error("{sites} candidate sites and {contacts} contacts need {:.1} GB; at most {:.1} GB are available", bytes / 1e9, most / 1e9)]
     TooLarge {
-        /// Candidates.
+        /// Number of candidates.
         sites: usize,
-        /// Contact positions.
+        /// Number of contact positions.
         contacts: usize,
-        /// Bytes that they need.
+        /// Bytes needed.
         bytes: f64,
-        /// Bytes at most.
+        /// Largest number of bytes.
         most: f64,
     },
 }
 
-/// A list of sensors that every layout has.
+/// A list of sensors that every layout includes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FixedList {
-    /// Those that the design asks for.
+    /// The sensors that the design requests.
     MustHave,
-    /// Those that there are.
+    /// The existing sensors.
     Kept,
 }
 
@@ -503,18 +506,18 @@ impl std::fmt::Display for FixedList {
     }
 }
 
-/// Reason for which two sensors exclude each other.
+/// Reason why two sensors exclude each other.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Exclusion {
-    /// They are the same.
+    /// Both are one sensor.
     #[error("they are the same sensor")]
     Same,
-    /// They are closer than the spacing.
+    /// They are closer to each other than the spacing.
     #[error("they are {} apart, and `spacing` is {}", format_length_mm(*distance_m), format_length_mm(*spacing_m))]
     Spacing {
-        /// Their distance, in metres.
+        /// Distance between them, in metres.
         distance_m: f64,
-        /// The least distance, in metres.
+        /// Least distance, in metres.
         spacing_m: f64,
     },
     /// One is the mirror image of the other, which is forbidden.

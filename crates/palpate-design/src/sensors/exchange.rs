@@ -1,13 +1,13 @@
 //! Greedy choice and exchange: the main search.
 //!
-//! Sensors are added one at a time, each the one that improves the score most; then each in turn is exchanged for the best
-//! other one, until no exchange improves (Fedorov 1972 for designs of experiments; greedy choice of sensors by their
-//! information: Krause, Singh and Guestrin, *Journal of Machine Learning Research* 9, 2008). What it ends in no single exchange
-//! improves; several starts make it likely that nothing else does either.
+//! Sensors are added one at a time, each the one that improves the score most. Then each in turn is exchanged for the best other
+//! one, until no exchange improves the score (Fedorov 1972 for designs of experiments; greedy choice of sensors by their
+//! information: Krause, Singh and Guestrin, *Journal of Machine Learning Research* 9, 2008). No single exchange improves the
+//! result. Several starts make a better layout elsewhere unlikely.
 //!
-//! Of very many sites a coarse sample is searched from all starts, and a finer one from the best layout of these. Then the
-//! layout is exchanged among the neighbours of its sites, which settles it to the last site, and among all units, which finds
-//! what the samples missed; these two again and again, until the latter finds nothing that matters.
+//! With very many sites, a coarse sample is searched from all starts, and a finer one from the best of these layouts. Then two
+//! steps alternate. Exchanges among the neighbours of the layout's sites settle it to the exact site; exchanges among all units
+//! find sites that the samples missed. The search ends when the second step gains no significant improvement.
 
 use super::candidates::Pool;
 use super::design::{DesignError, Symmetry};
@@ -15,19 +15,18 @@ use super::objective::{Block, ForceBelief, Objective, State};
 use palpate_numerics::random_order;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// With more units than this, searches begin in samples of them: coarse ones from every start, of this size from the best.
+/// With more units than this, searches begin in samples of them: coarse samples for every start, this size for the best.
 const SAMPLE: usize = 2000;
 const COARSE_SAMPLE: usize = 250;
-/// Random layouts from which the exchange starts too.
+/// Number of random layouts from which the exchange starts, besides the others.
 const RANDOM_STARTS: u64 = 6;
 /// An exchange must improve the score by more than this share of it.
 const LEAST_GAIN: f64 = 1e-10;
-/// The same of an exchange for one of very many: a millionth of a limit of 2 mm is 2 nm, and nobody drills a hole so finely
-/// that it mattered.
+/// Least gain of an exchange with very many sites: a millionth of a limit of 2 mm is 2 nm, far below any drilling tolerance.
 const LEAST_GAIN_OF_MANY: f64 = 1e-6;
-/// Units that are judged for every slot while their rows are in the processor's nearer caches.
+/// Units that are evaluated for every slot while their rows are in the processor's nearer caches.
 const CHUNK: usize = 64;
-/// Rounds of exchange, far more than any search takes.
+/// Limit of the rounds of exchange, far above that of any search.
 const MOST_ROUNDS: usize = 100;
 
 /// A layout and its score.
@@ -44,7 +43,7 @@ impl Found {
     }
 }
 
-/// A search for layouts: the units to choose from, the criterion, and who watches.
+/// A search for layouts: the units to choose from, the criterion, and the watch.
 #[derive(Clone, Copy)]
 pub(super) struct Search<'a> {
     pub pool: &'a Pool,
@@ -52,7 +51,7 @@ pub(super) struct Search<'a> {
     pub watch: Watch<'a>,
 }
 
-/// A layout but for one unit.
+/// A layout without one of its units.
 struct Without {
     leaving: usize,
     others: Vec<usize>,
@@ -66,14 +65,14 @@ impl Search<'_> {
         Found { score: self.objective.score(&state), selection }
     }
 
-    /// The state of knowledge with the sensors of a selection.
+    /// The state with the sensors of a selection.
     pub fn state(&self, selection: &[usize], belief: ForceBelief) -> State {
         let candidates = self.pool.candidates(selection);
         let rows: Vec<&[Block]> = candidates.iter().map(|candidate| self.objective.row(*candidate)).collect();
         self.objective.state(&rows, belief)
     }
 
-    /// The best layout of several starts; `feasible` is one that keeps all constraints.
+    /// The best layout of several starts; `feasible` meets all constraints.
     pub fn greedy_exchange(&self, feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
         if self.pool.units.len() <= SAMPLE {
             return self.best_of_starts(&self.pool.all(), feasible, seed);
@@ -99,7 +98,7 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Exchanges units for neighbours until nothing improves and then for any others, until none of these gains enough.
+    /// Exchanges units for neighbours until the score stays, then for any others, until no exchange gains enough.
     fn exchange_among_many(&self, mut found: Found) -> Result<Found, Cancelled> {
         for _ in 0..MOST_ROUNDS {
             for _ in 0..MOST_ROUNDS {
@@ -121,8 +120,8 @@ impl Search<'_> {
         Ok(found)
     }
 
-    /// For each slot that may change the unit that it is best exchanged for, the slot that gains most first. One pass over all
-    /// units serves all slots, since fetching so many rows takes about as long as judging one.
+    /// The best exchange of the unit in each slot that may change, the slot with the greatest gain first. One pass over all units
+    /// serves all slots, since fetching so many rows takes about as long as evaluating one.
     fn best_of_each_slot(&self, found: &Found) -> Result<Vec<(usize, usize)>, Cancelled> {
         let slots: Vec<usize> = (self.pool.fixed.len()..found.selection.len()).collect();
         let without: Vec<Without> = slots.iter().map(|slot| self.without(found, *slot)).collect();
@@ -142,11 +141,11 @@ impl Search<'_> {
         Ok(bests.into_iter().map(|(slot, (unit, _))| (slot, unit)).collect())
     }
 
-    /// The layout that grows by the best unit at a time; `None` where it gets stuck.
+    /// The layout built up by the best unit at a time; `None` if no unit can join.
     pub fn greedy(&self, among: &[usize]) -> Option<Vec<usize>> {
         let mut selection = self.pool.fixed.clone();
         while !self.pool.is_whole(&selection) {
-            // Two sensors are the least that tell a position and a force.
+            // At least two sensors are needed to determine a position and a force.
             let early = self.pool.size(&selection) < 3;
             let belief = if early { ForceBelief::Rough } else { ForceBelief::Vague };
             let state = self.state(&selection, belief);
@@ -156,7 +155,7 @@ impl Search<'_> {
         Some(selection)
     }
 
-    /// Exchanges one unit after the other for the best, until nothing improves.
+    /// Exchanges one unit after the other for the best, until the score stays.
     pub fn exchange(&self, among: &[usize], selection: Vec<usize>) -> Result<Found, Cancelled> {
         let mut found = self.scored(selection);
         let fixed = self.pool.fixed.len();
@@ -186,20 +185,20 @@ impl Search<'_> {
         improves
     }
 
-    /// The layout but for the unit in one slot.
+    /// The layout without the unit in one slot.
     fn without(&self, found: &Found, slot: usize) -> Without {
         let mut others = found.selection.clone();
         let leaving = others.remove(slot);
         Without { leaving, state: self.state(&others, ForceBelief::Vague), others }
     }
 
-    /// The best unit to fill the gap, of the size of the one that left.
+    /// The best unit to fill the gap, of the size of the removed one.
     fn best_to_fill(&self, without: &Without, among: &[usize]) -> Option<(usize, f64)> {
         let size = self.pool.units[without.leaving].size();
         self.best_of(&without.state, &self.pool.joinable(&without.others, among, Some(size)))
     }
 
-    /// The unit whose addition scores best, the first of equals.
+    /// The unit with the best score when added, the first of equals.
     fn best_of(&self, state: &State, units: &[usize]) -> Option<(usize, f64)> {
         let mut best: Option<(usize, f64)> = None;
         for unit in units {
@@ -224,7 +223,7 @@ impl Search<'_> {
     }
 }
 
-/// The units between a layout's own and the next ones of the sample.
+/// The units within one step of the sample around the units of a layout.
 fn nearby(pool: &Pool, layout: &[usize]) -> Vec<usize> {
     let count = pool.units.len();
     let step = count.div_ceil(SAMPLE);
@@ -235,7 +234,7 @@ fn nearby(pool: &Pool, layout: &[usize]) -> Vec<usize> {
     nearby
 }
 
-/// About so many units evenly out of all of them, with those of a layout.
+/// About `size` units, evenly from all of them, and those of a layout.
 fn sample(pool: &Pool, size: usize, layout: &[usize]) -> Vec<usize> {
     let count = pool.units.len();
     let mut sample: Vec<usize> = (0..count).step_by(count.div_ceil(size)).collect();
@@ -245,10 +244,10 @@ fn sample(pool: &Pool, size: usize, layout: &[usize]) -> Vec<usize> {
     sample
 }
 
-/// A layout that is filled from the left, the cheapest kinds first.
+/// A layout filled from the left, the cheapest kinds first.
 ///
 /// # Errors
-/// The constraint that leaves no room for as many sensors as are wanted.
+/// The constraint that leaves too few sensors.
 pub(super) fn feasible(pool: &Pool) -> Result<Vec<usize>, DesignError> {
     let mut order = pool.all();
     let cost = |unit: &usize| pool.cost(&[*unit]) / pool.units[*unit].size() as f64;
@@ -258,7 +257,7 @@ pub(super) fn feasible(pool: &Pool) -> Result<Vec<usize>, DesignError> {
     if pool.is_whole(&selection) { Ok(selection) } else { Err(why_not(pool, &order)) }
 }
 
-/// Adds units in this order, each that may join.
+/// Adds units in this order, each if it may join.
 fn joined(pool: &Pool, order: &[usize]) -> Vec<usize> {
     let mut selection = pool.fixed.clone();
     for unit in order {
@@ -272,7 +271,7 @@ fn joined(pool: &Pool, order: &[usize]) -> Vec<usize> {
     selection
 }
 
-/// The constraint that such a layout fails by: the budget, when without it there is one.
+/// The constraint that excludes such a layout: the budget, if a layout exists without it.
 fn why_not(pool: &Pool, order: &[usize]) -> DesignError {
     let count = pool.design.count;
     let mut most = pool.fixed.clone();
@@ -292,11 +291,11 @@ fn why_not(pool: &Pool, order: &[usize]) -> DesignError {
     }
 }
 
-/// A layout spread evenly along the surface, as far as the sites and constraints let it; `None` where it gets stuck.
+/// A layout as even along the surface as the sites and constraints allow; `None` if no unit can join.
 fn even_start(pool: &Pool, among: &[usize]) -> Option<Vec<usize>> {
     let mut selection = pool.fixed.clone();
     let place = |unit: usize| pool.sensors[pool.units[unit].first].position;
-    // Units that mirror each other are known by their left halves.
+    // A pair of units that mirror each other is represented by its left half.
     let paired = pool.design.symmetry == Symmetry::Wanted;
     let room_m = if paired { 0.5 * pool.extent.length_m() } else { pool.extent.length_m() };
     let left = pool.design.count - pool.size(&selection);
@@ -317,7 +316,7 @@ fn even_start(pool: &Pool, among: &[usize]) -> Option<Vec<usize>> {
     pool.is_whole(&selection).then_some(selection)
 }
 
-/// A random layout; `None` where it gets stuck.
+/// A random layout; `None` if no unit can join.
 pub(super) fn random_start(pool: &Pool, among: &[usize], seed: u64) -> Option<Vec<usize>> {
     let order: Vec<usize> = random_order(among.len(), seed).into_iter().map(|i| among[i]).collect();
     let selection = joined(pool, &order);

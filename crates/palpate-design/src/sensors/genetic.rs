@@ -1,8 +1,8 @@
-//! A genetic search, after Elliott et al., who chose the sensing positions of a plate so.
+//! A genetic search, after Elliott et al., who chose the sensing positions of a plate with it.
 //!
-//! A layout is a set of units. Two parents, each the best of a few drawn at random, have a child that takes its units from
-//! both in random order as far as the constraints let it; now and then a unit is exchanged for any other. The best layouts of
-//! a generation live on.
+//! A layout is a set of units. Two parents, each the best of a few drawn at random, have a child. It takes its units from both in
+//! random order as far as the constraints allow; at random a unit is exchanged for any other. The best layouts of a generation
+//! survive.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -15,14 +15,14 @@ use palpate_numerics::watch::Cancelled;
 pub(super) const STAGE: &str = "genetic search";
 const POPULATION: usize = 60;
 const GENERATIONS: usize = 120;
-/// Layouts that live on unchanged.
+/// Layouts that survive unchanged.
 const ELITE: usize = 4;
-/// Layouts of which the best becomes a parent.
+/// Layouts in a draw; the best of them becomes a parent.
 const TOURNAMENT: usize = 3;
 /// Probability that a child exchanges one of its units for any other.
 const MUTATION: f64 = 0.4;
 
-/// The best layout after so many generations; `feasible` is one that keeps all constraints.
+/// The best layout after a fixed number of generations; `feasible` meets all constraints.
 pub(super) fn search(search: &Search, feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let (pool, all) = (search.pool, search.pool.all());
@@ -38,7 +38,7 @@ pub(super) fn search(search: &Search, feasible: &[usize], seed: u64) -> Result<F
         let mut next: Vec<Found> = population[..ELITE].to_vec();
         while next.len() < POPULATION {
             let [one, other] = [parent(&population, &mut rng), parent(&population, &mut rng)];
-            // Where the constraints leave no way to complete a child, a parent lives on.
+            // If the constraints leave no way to complete a child, a parent survives.
             let layout = child(pool, one, other, &mut rng).unwrap_or_else(|| one.selection.clone());
             next.push(search.scored(layout));
         }
@@ -69,7 +69,7 @@ fn child(pool: &Pool, one: &Found, other: &Found, rng: &mut impl Rng) -> Option<
             layout.push(unit);
         }
     }
-    // What the parents do not fill, chance does.
+    // Random units fill the slots that the parents do not fill.
     for _ in 0..20 * pool.design.count {
         if pool.is_whole(&layout) {
             return Some(layout);

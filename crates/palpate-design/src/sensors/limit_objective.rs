@@ -1,18 +1,18 @@
-//! The limit as a criterion: a few numbers a contact say how much the sensors so far leave unknown, and one sensor more
+//! The limit as a criterion. A few numbers per contact describe the covariance that the chosen sensors leave, and one more sensor
 //! changes them by a rank-1 term.
 //!
-//! At a contact the unknowns are θ = (ln W, x, y), of which a known force W and a line's y are left out: P of them. A sensor
-//! with derivatives j = ∂y/∂θ / σ adds j·jᵀ to the information (see [`palpate_mechanics::limit`]). Beforehand something is known as well:
-//! that the contact is on the surface, which has the variance l²/12 of a flat prior along each side, and next to nothing of
-//! the force (a standard deviation of 1000 times its value). So the covariance C = (prior + Σ j·jᵀ)⁻¹ exists for every
-//! layout, and along a line its entry of the position is 1/(1/s² + 12/l²), where s is the limit: never above the prior's,
-//! also where a layout cannot tell. One more sensor makes it
+//! At a contact the P unknowns are θ = (ln W, x, y), without a known force W and without y on a line. A sensor with derivatives
+//! j = ∂y/∂θ / σ adds j·jᵀ to the information (see [`palpate_mechanics::limit`]). A prior states that the contact is on the surface,
+//! with the variance l²/12 of a flat prior along each side. The prior of the force is nearly uninformative (a standard deviation of
+//! 1000 times its value). So the covariance C = (prior + Σ j·jᵀ)⁻¹ exists for every layout. Along a line its entry of the position
+//! is 1/(1/s² + 12/l²), where s is the limit: never above the prior's variance, even if the layout does not determine the position.
+//! One more sensor changes it to
 //!
 //! ```text
 //! C − (C·j)·(C·j)ᵀ / (1 + jᵀ·C·j)        (Sherman and Morrison)
 //! ```
 //!
-//! which for P ≤ 3 is some twenty multiplications a contact, so that all candidates are judged in one pass over their rows.
+//! For P ≤ 3 this takes about twenty multiplications per contact, so one pass over their rows evaluates all candidates.
 
 mod sums;
 
@@ -23,31 +23,31 @@ use super::objective::{Block, ForceBelief, LANES, Objective, State};
 use palpate_numerics::small::{Ldl, add_outer};
 use sums::{Contacts, Mean, Shrinking, Sums, Without, Worst, folded};
 
-/// Information on ln W beforehand: of a standard deviation of 1000 times the force, and of 1 time.
+/// Prior information on ln W: for a standard deviation of 1000 times the force, and of 1 time.
 const VAGUE: f64 = 1e-6;
 const ROUGH: f64 = 1.0;
-/// Weight of the mean limit, as a share of the criterion's size, which decides between layouts that the criterion does not distinguish.
+/// Weight of the mean limit, as a share of the criterion's size. It decides between layouts with equal criteria.
 const TIE_BREAK: f64 = 1e-3;
 
 /// Rows of all candidates, and the criterion.
 pub(super) struct LimitObjective<const P: usize, const FIRST: usize> {
     /// [candidate][unknown][block of contacts]
     table: Arc<Vec<Block>>,
-    /// Blocks of contacts.
+    /// Number of blocks of contacts.
     blocks: usize,
     weights: Vec<Block>,
-    /// 12/l² of each side, 0 for the force, whose belief varies.
+    /// 12/l² of each side, 0 for the force, which has one of two priors.
     prior: [f64; P],
     criterion: DesignCriterion,
     /// The variance at the tolerance.
     good_enough: f64,
-    /// The prior's standard deviation of the position.
+    /// Prior standard deviation of the position.
     unknown_m: f64,
 }
 
 impl<const P: usize, const FIRST: usize> LimitObjective<P, FIRST> {
-    /// `table` holds a row of P·⌈contacts/8⌉ blocks a candidate; `sides_m` are the surface's sides, as many as there are
-    /// unknowns of the position.
+    /// `table` has one row of P·⌈contacts/8⌉ blocks per candidate. `sides_m` has one side of the surface for each unknown of the
+    /// position.
     pub fn new(
         table: Arc<Vec<Block>>,
         weights: &[f64],
@@ -92,7 +92,7 @@ impl<const P: usize, const FIRST: usize> LimitObjective<P, FIRST> {
         vec![[0.0; LANES]; P * self.blocks]
     }
 
-    /// The whole of a score from its sums.
+    /// The score from its sums.
     fn search_score(&self, [sum, mean_m]: [f64; 2]) -> f64 {
         match self.criterion {
             DesignCriterion::MeanLimit | DesignCriterion::DOptimality => sum,
@@ -136,7 +136,7 @@ impl<const P: usize, const FIRST: usize> Objective for LimitObjective<P, FIRST> 
                 constant -= 0.5 * self.weights[at][lane] * factors.log_determinant();
             }
         }
-        // Padding counts for nothing, also where only the largest variance counts.
+        // Padding has no effect, also if only the largest variance counts.
         for block in values.chunks_exact_mut(n.max(1)) {
             for (value, weight) in block.iter_mut().flatten().zip(self.weights.iter().flatten()) {
                 if *weight == 0.0 {

@@ -1,4 +1,4 @@
-//! The ways in which layouts come about, and the layouts that each gives.
+//! Methods that make layouts, and the layouts of each.
 
 use std::sync::Arc;
 
@@ -19,23 +19,23 @@ use palpate_numerics::watch::{Cancelled, Watch};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Evenly, whatever the constraints: what the others are compared with.
+    /// Evenly spaced, for any constraints: the reference of the others.
     Even,
-    /// As the setup has it.
+    /// The setup's own layout.
     #[serde(skip_deserializing)]
     Existing,
-    /// Greedy choice, then exchange until nothing improves.
+    /// Greedy choice, then exchange until the score stays.
     GreedyExchange,
     /// The best of all layouts.
     #[serde(skip_deserializing)]
     Exhaustive,
     /// A genetic search.
     Genetic,
-    /// The best of those before, moved off the candidate sites.
+    /// The best of the methods above, moved off the candidate sites.
     Refined,
-    /// The most information, by greedy choice and exchange.
+    /// Greedy choice and exchange for the most information.
     DOptimal,
-    /// The best reconstruction from principal components, by greedy choice and exchange.
+    /// Greedy choice and exchange for the best reconstruction from principal components.
     PrincipalComponents,
     /// QR factorisation with column pivoting on principal components.
     QrPivoting,
@@ -57,7 +57,7 @@ impl Method {
         }
     }
 
-    /// The layout that others are compared with, in words: "the even layout's".
+    /// The reference layout of comparisons, in words: "the even layout's".
     pub const fn reference_in_words(self) -> &'static str {
         match self {
             Self::Existing => "today's",
@@ -65,38 +65,38 @@ impl Method {
         }
     }
 
-    /// Whether it searches by the design's criterion, so that its best layout is the design.
+    /// Whether the method searches by the design's criterion, so that its best layout is the design.
     pub const fn is_search(self) -> bool {
         matches!(self, Self::GreedyExchange | Self::Exhaustive | Self::Genetic | Self::Refined)
     }
 }
 
-/// A layout and its worth.
+/// A layout and its assessment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Designed {
     /// Method that placed the sensors.
     pub method: Method,
-    /// The sensors, kind by kind as they are offered, from left to right.
+    /// The sensors, kind by kind in the order of the offers, from left to right.
     pub layout: Layout,
     /// Figures of merit.
     pub assessment: Assessment,
 }
 
-/// The best of the layouts that searches by the criterion found.
+/// The best layout of the searches by the criterion.
 pub fn best_design(designed: &[Designed]) -> Option<&Designed> {
     let searched = designed.iter().filter(|designed| designed.method.is_search());
     searched.min_by(|a, b| a.assessment.score.total_cmp(&b.assessment.score))
 }
 
-/// Layouts that simulated calibrations should verify: those that the design is compared with, and the best that searches by the criterion found,
-/// as several may have found the same.
+/// Layouts to verify by simulated calibrations: those that the design is compared with, and the best of the searches by the
+/// criterion, as several may have found one layout.
 pub fn to_verify(designed: &[Designed]) -> impl Iterator<Item = &Designed> {
     let best = best_design(designed).map(|best| best.method);
     designed.iter().filter(move |designed| !designed.method.is_search() || Some(designed.method) == best)
 }
 
 impl SensorProblem<'_> {
-    /// Every layout: even, the setup's own, by all searches that suit, by the historical methods.
+    /// All layouts: even, the setup's own, of all suitable searches, and of the historical methods.
     ///
     /// # Errors
     /// As [`SensorProblem::assess`], or when the watch stopped it.
@@ -126,18 +126,18 @@ impl SensorProblem<'_> {
         Ok(designed)
     }
 
-    /// The layout by one method; a refined one starts from the better of exchange and genetic search.
+    /// The layout of one method. Refinement starts from the better layout of exchange and genetic search.
     ///
     /// # Errors
-    /// As [`SensorProblem::all`], and [`DesignError::NoLayout`] where the method has none: even layouts of reaction sensors, QR
-    /// layouts that constraints leave no room for.
+    /// As [`SensorProblem::all`], and [`DesignError::NoLayout`] if the method has no layout: an even layout of reaction sensors, or
+    /// a QR layout that the constraints exclude.
     pub fn by_method(&self, method: Method, seed: u64, watch: Watch) -> Result<Designed, DesignError> {
         let none = || DesignError::NoLayout { method: method.name() };
         let found = match method {
             Method::Even => return self.even(),
             Method::Existing => return self.existing(),
             Method::GreedyExchange => self.search(watch).greedy_exchange(&self.feasible, seed)?,
-            // Then it is what the criterion asks for.
+            // Here the criterion is D-optimality itself.
             Method::DOptimal if self.pool.design.criterion == DesignCriterion::DOptimality => {
                 self.search(watch).greedy_exchange(&self.feasible, seed)?
             }
@@ -159,7 +159,7 @@ impl SensorProblem<'_> {
         self.designed(method, &found.selection)
     }
 
-    /// The layout by greedy choice and exchange, the search that is nearly always the best and by far the fastest.
+    /// The layout by greedy choice and exchange, by far the fastest search and nearly always the best.
     ///
     /// # Errors
     /// As [`SensorProblem::all`].
@@ -167,8 +167,8 @@ impl SensorProblem<'_> {
         self.by_method(Method::GreedyExchange, seed, watch)
     }
 
-    /// The even layout, of the first kind that is not tied to supports: at i·l/(k+1), on a plane the grid whose cells are
-    /// closest to squares.
+    /// The even layout, of the first kind that is not tied to supports: at i·l/(k+1), on a plane the grid with cells closest to
+    /// squares.
     ///
     /// # Errors
     /// As [`SensorProblem::assess`], and [`DesignError::NoLayout`] where only reactions are offered.
@@ -176,7 +176,7 @@ impl SensorProblem<'_> {
         self.even_if_any()?.ok_or(DesignError::NoLayout { method: Method::Even.name() })
     }
 
-    /// The even layout, where one kind is not tied to supports.
+    /// The even layout, if one kind is not tied to supports.
     pub(super) fn even_if_any(&self) -> Result<Option<Designed>, DesignError> {
         let design = &self.pool.design;
         let is_free = |offer: &SensorOffer| offer.kind != SensorKind::Reaction && offer.supply == Supply::Any;
@@ -194,8 +194,8 @@ impl SensorProblem<'_> {
         self.judged(Method::Even, sensors).map(Some)
     }
 
-    /// A sensor of a layout, moved to the nearest candidate that is no other sensor's place where it would read nothing, as on a support; of
-    /// two as near, the first. `None` where there is none.
+    /// A sensor of a layout. If it would always read 0, as on a support, it moves to the nearest candidate that no other sensor
+    /// occupies, the first of two as near. `None` if there is none.
     fn nearest_that_reads(&self, sensors: &[PlacedSensor], which: usize) -> Option<PlacedSensor> {
         let sensor = sensors[which];
         let kind = self.pool.design.offers[sensor.offer].kind;
@@ -231,12 +231,12 @@ impl SensorProblem<'_> {
         genetic::search(&self.search(watch), &self.feasible, seed)
     }
 
-    /// Number of units of a layout that are free to be chosen.
+    /// Number of units of a layout that the search chooses.
     fn free_slots(&self) -> usize {
         self.feasible.len() - self.pool.fixed.len()
     }
 
-    /// Layouts by other people's criteria.
+    /// Layouts by published criteria.
     fn historical(&self, seed: u64, watch: Watch) -> Result<Vec<Designed>, DesignError> {
         let design = &self.pool.design;
         let mut designed = Vec::new();
@@ -250,7 +250,7 @@ impl SensorProblem<'_> {
         }
         let candidates = SensorAt::of_design(&self.pool.sensors, design);
         let components = PrincipalComponents::from_readings(&self.sensitivity.readings(&candidates, watch)?);
-        // Readings that are all 0 in their noise, or beyond all numbers, have none.
+        // Readings that are all 0 to within noise, or not finite, have no components.
         if components.modes.is_empty() {
             return Ok(designed);
         }
@@ -274,7 +274,7 @@ impl SensorProblem<'_> {
         Ok(Designed { method, layout, assessment })
     }
 
-    /// Layout of some sensors: today's, where those are kept, then kind by kind, from left to right.
+    /// Layout of some sensors: first the existing ones if they are kept, then kind by kind, from left to right.
     fn layout(&self, mut placed: Vec<PlacedSensor>) -> Result<Layout, DesignError> {
         placed.sort_by(|a, b| {
             let by_offer = a.offer.cmp(&b.offer);
@@ -294,7 +294,7 @@ impl SensorProblem<'_> {
         Ok(Layout::new(sensors)?)
     }
 
-    /// Today's sensors, where all of them are placed, and takes those out.
+    /// The existing sensors, if all of them are placed. They are removed from `placed`.
     fn kept_among(&self, placed: &mut Vec<PlacedSensor>) -> Vec<Sensor> {
         let design = &self.pool.design;
         let is_kept = |sensor: &PlacedSensor, wanted: &MustHave| {
@@ -309,13 +309,13 @@ impl SensorProblem<'_> {
         design.kept.clone()
     }
 
-    /// Whether a sensor is one of today's that the design keeps.
+    /// Whether a sensor is an existing one that the design keeps.
     pub fn is_kept(&self, sensor: &Sensor) -> bool {
         let kept = &self.pool.design.kept;
         kept.iter().any(|kept| kept.kind == sensor.kind && kept.position == sensor.position)
     }
 
-    /// Positions of the sensors of a layout, in words; where today's are kept, of the new ones apart.
+    /// Positions of the sensors of a layout, in words; if existing sensors are kept, the new ones separately.
     pub fn places_in_words(&self, layout: &Layout) -> String {
         let words = |new: bool| {
             let sensors = layout.sensors().iter().filter(|sensor| self.is_kept(sensor) != new);
@@ -331,14 +331,14 @@ impl SensorProblem<'_> {
         }
     }
 
-    /// The layout that the others are compared with: today's where it is kept, else the even one.
+    /// The reference layout: the existing one if it is kept, else the even one.
     pub fn reference<'d>(&self, designed: &'d [Designed]) -> Option<&'d Designed> {
         let method = if self.pool.design.kept.is_empty() { Method::Even } else { Method::Existing };
         designed.iter().find(|designed| designed.method == method)
     }
 }
 
-/// i·l/(k+1) on a line; on a plane the inner crossings of the grid whose cells are closest to squares.
+/// i·l/(k+1) on a line; on a plane the inner crossings of the grid with cells closest to squares.
 fn even_positions(count: usize, extent: Extent) -> Vec<Position> {
     if let Extent::Line { .. } = extent {
         return sensing::even_positions(count, extent.length_m()).collect();

@@ -1,4 +1,4 @@
-//! Placement of sensors: k of many candidate sites, of several kinds, for the contacts that are expected.
+//! Placement of sensors: k of many candidate sites, of several kinds, for the expected contacts.
 //!
 //! ```
 //! use palpate_design::sensors::{ContactPrior, SensorDesign, SensorProblem, Sites};
@@ -19,13 +19,14 @@
 //! ```
 //!
 //! A layout is judged by the limit (see [`palpate_mechanics::limit`]) over those contacts, by one of four criteria
-//! ([`DesignCriterion`]). Searches put layouts together that keep every constraint of a [`SensorDesign`]; what cannot be kept
-//! is a [`DesignError`] that names it. Beside them stand layouts by the historical methods, and the even layout.
+//! ([`DesignCriterion`]). Searches build layouts that meet every constraint of a [`SensorDesign`]; a [`DesignError`] names a
+//! constraint that cannot be met. Layouts by the historical methods and the even layout are compared with them.
 //!
-//! Contacts over a support, of a force that is not known, no layout tells: they are left out. Where readings do not tell another contact there is no limit, and a mean would not exist. Criteria therefore reckon with what is
-//! known without any reading, that the contact lies on the surface: a flat prior of variance l²/12. Along a line the score of a
-//! contact is then 1/√(1/s² + 12/l²), with s the limit. The mean, the largest limit and the share within a tolerance that an
-//! [`Assessment`] has are those of the limit itself.
+//! With an unknown force, no layout can locate a contact over a support, so these contacts are excluded. At any other contact that
+//! the readings do not determine there is no limit, and a mean would not exist. Criteria therefore include the prior information
+//! that the contact lies on the surface: a flat prior of variance l²/12. Along a line the score of a contact is then
+//! 1/√(1/s² + 12/l²), with s the limit. The mean, the largest limit and the share within a tolerance in an [`Assessment`] are
+//! those of the limit itself.
 
 mod assessment;
 mod candidates;
@@ -63,7 +64,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
 use sensitivity::{Sensitivity, SensorAt};
 
-/// A design made ready: the sensitivity of every candidate to every contact, and a layout that keeps all constraints.
+/// A prepared design: the sensitivity of every candidate to every contact, and a layout that meets all constraints.
 pub struct SensorProblem<'a> {
     setup: &'a Setup,
     sensitivity: Sensitivity<'a>,
@@ -71,26 +72,26 @@ pub struct SensorProblem<'a> {
     table: Arc<Vec<Block>>,
     pool: Pool,
     objective: Box<dyn Objective + 'a>,
-    /// A layout that keeps all constraints.
+    /// A layout that meets all constraints.
     feasible: Vec<usize>,
 }
 
 impl<'a> SensorProblem<'a> {
-    /// Makes a design for a setup ready; the setup's own layout is only what [`Method::Existing`] gives.
+    /// Prepares a design for a setup. The setup's own layout is used only by [`Method::Existing`].
     ///
-    /// Of more candidates on a plate than three times the contacts, it is solved for these: by reciprocity three solutions for a contact tell
-    /// what every sensor reads there and its derivatives.
+    /// On a plate with more candidates than three times the contacts, the model is solved for the contacts. By reciprocity three
+    /// solutions per contact give the readings of all sensors there and their derivatives.
     ///
     /// # Errors
-    /// [`DesignError`], with the constraint that no layout can keep or the number that is out of its range, or when the watch
-    /// stopped it.
+    /// [`DesignError`] with the constraint that no layout can meet, with the number that is out of range, or when the watch stopped
+    /// it.
     pub fn new(setup: &'a Setup, design: &SensorDesign, watch: Watch) -> Result<Self, DesignError> {
         let (sensitivity, candidates) = checked(setup, design)?;
         let table = sensitivity.table(&SensorAt::of_design(&candidates.sensors, design), watch)?;
         Self::with_table(setup, sensitivity, candidates, Arc::new(table), design)
     }
 
-    /// Work and memory of [`SensorProblem::new`] and [`SensorProblem::all`], by an estimate that solves nothing.
+    /// Work and memory of [`SensorProblem::new`] and [`SensorProblem::all`], estimated without solving the model.
     ///
     /// # Errors
     /// [`DesignError`] for a number out of its range, or a constraint on candidates that contradicts the surface.
@@ -99,7 +100,7 @@ impl<'a> SensorProblem<'a> {
         Ok(sensitivity.cost(candidates.sensors.len(), design.count))
     }
 
-    /// The same for another number of sensors.
+    /// This problem with another number of sensors.
     ///
     /// # Errors
     /// As [`SensorProblem::new`].
@@ -122,28 +123,28 @@ impl<'a> SensorProblem<'a> {
         Ok(Self { setup, sensitivity, candidates, table, pool, objective, feasible })
     }
 
-    /// The task.
+    /// The design task.
     pub fn design(&self) -> &SensorDesign {
         &self.pool.design
     }
 
-    /// The contacts that it is designed for.
+    /// Contacts for which the layout is designed.
     pub fn contacts(&self) -> &WeightedContacts {
         &self.sensitivity.contacts
     }
 
-    /// Positions of contacts over supports, where no layout tells an unknown force: neither searches nor assessments count them.
+    /// Positions of contacts over supports, where no layout determines an unknown force. Searches and assessments exclude them.
     pub fn contacts_over_supports(&self) -> Vec<Position> {
         let positions = self.sensitivity.contacts.positions.iter().copied();
         positions.filter(|position| !self.sensitivity.is_judged(*position)).collect()
     }
 
-    /// Knowledge that the locator has of the contacts' force.
+    /// Whether the locator is given the force of the contacts.
     pub fn force(&self) -> Force {
         self.sensitivity.force
     }
 
-    /// Their force, in newtons.
+    /// Force of the contacts, in newtons.
     pub fn force_n(&self) -> f64 {
         self.sensitivity.force_n
     }
@@ -164,7 +165,7 @@ impl<'a> SensorProblem<'a> {
     }
 }
 
-/// The contacts and candidates of a design whose numbers are in their ranges.
+/// The contacts and candidates of a design, after its numbers are checked against their ranges.
 fn checked<'a>(
     setup: &'a Setup,
     design: &SensorDesign,

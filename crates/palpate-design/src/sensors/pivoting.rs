@@ -1,9 +1,9 @@
 //! Sites by QR factorisation with column pivoting, as PySensors chooses them.
 //!
-//! Of a matrix with a column a site and a row a mode, the column that reaches farthest out of those chosen before is chosen
-//! next (Businger and Golub, *Numerische Mathematik* 7, 1965; for sensors Manohar, Brunton, Kutz and Brunton, *IEEE Control
-//! Systems* 38, 2018). With q the unit vector of what is new in that column, every column's distance² falls by (q·column)²:
-//! as q is at right angles to all before, the columns themselves need not be touched, and a step costs one product.
+//! The matrix has one column per site and one row per mode. Each step chooses the column farthest from the span of the chosen ones
+//! (Businger and Golub, *Numerische Mathematik* 7, 1965; for sensors Manohar, Brunton, Kutz and Brunton, *IEEE Control Systems* 38,
+//! 2018). With q the unit vector of the new part of that column, the distance² of every column falls by (q·column)². As q is
+//! orthogonal to all earlier ones, the columns themselves stay unchanged, and a step costs one product.
 
 use ndarray::Array2;
 
@@ -11,14 +11,14 @@ use super::candidates::Pool;
 use palpate_numerics::small::{add_multiple, dot};
 use palpate_numerics::symmetric_eigen;
 
-/// Columns that are worked on at once, so that their distances stay in the nearest cache.
+/// Columns that are processed together, so that their distances stay in the nearest cache.
 const BLOCK: usize = 1024;
-/// A column that reaches less far than this share of the longest lies in the span of those before.
+/// A column with a smaller distance than this share of the longest lies in the span of the chosen ones.
 const NOTHING_NEW: f64 = 1e-20;
 
-/// Columns of a matrix, and how far each reaches out of the span of those chosen.
+/// Columns of a matrix, and their distances from the span of the chosen ones.
 struct Pivoting<'a> {
-    /// A row a mode.
+    /// One row per mode.
     modes: &'a [Vec<f64>],
     /// Squared distances from the span.
     left: Vec<f64>,
@@ -34,13 +34,13 @@ impl<'a> Pivoting<'a> {
         Self { modes, left, span: Vec::new(), longest }
     }
 
-    /// Whether no column reaches out of the span any more.
+    /// Whether all columns lie in the span.
     fn is_exhausted(&self) -> bool {
         self.span.len() == self.modes.len()
             || self.left.iter().all(|left| *left <= NOTHING_NEW * self.longest)
     }
 
-    /// Begins anew, as for the first column.
+    /// Resets the state, as for the first column.
     fn restart(&mut self) {
         self.left = squares(self.modes);
         self.span.clear();
@@ -82,7 +82,7 @@ fn squares(modes: &[Vec<f64>]) -> Vec<f64> {
     squares
 }
 
-/// The first `count` pivots of the matrix with these rows, at most as many as it has rows; the first of equals.
+/// The first `count` pivots of the matrix with these rows, at most one per row; the first of equals.
 pub fn pivoted_columns(modes: &[Vec<f64>], count: usize) -> Vec<usize> {
     let mut pivoting = Pivoting::new(modes);
     let mut pivots = Vec::new();
@@ -91,15 +91,15 @@ pub fn pivoted_columns(modes: &[Vec<f64>], count: usize) -> Vec<usize> {
             .reduce(|best, column| if pivoting.left[column] > pivoting.left[best] { column } else { best });
         let Some(column) = farthest else { break };
         pivoting.choose(column);
-        // What rounding leaves of its own distance must not let it be chosen again.
+        // Rounding errors in its own distance must not let the column be chosen again.
         pivoting.left[column] = 0.0;
         pivots.push(column);
     }
     pivots
 }
 
-/// The ratio of the largest and the least singular value of some columns of the matrix with these rows, as many as there are
-/// rows at least; infinite where they do not span them.
+/// The ratio of the largest to the least singular value of some columns of the matrix with these rows; at least as many columns as
+/// rows. Infinite if they do not span the rows.
 pub fn condition_number(modes: &[Vec<f64>], columns: &[usize]) -> f64 {
     let chosen = Array2::from_shape_fn((modes.len(), columns.len()), |(i, k)| modes[i][columns[k]]);
     let (squares, _) = symmetric_eigen(&chosen.dot(&chosen.t()));
@@ -109,8 +109,7 @@ pub fn condition_number(modes: &[Vec<f64>], columns: &[usize]) -> f64 {
     }
 }
 
-/// A layout by pivoting on the first modes, as many as it has sensors, each step among the units that may join; `None` where
-/// it gets stuck.
+/// A layout by pivoting on the first modes, one per sensor, each step among the units that may join; `None` if no unit can join.
 pub(super) fn search(pool: &Pool, modes: &[Vec<f64>]) -> Option<Vec<usize>> {
     let modes = &modes[..modes.len().min(pool.design.count)];
     let mut pivoting = Pivoting::new(modes);
@@ -147,7 +146,7 @@ mod tests {
         (1..=modes).map(mode).collect()
     }
 
-    /// The definition: at every step the column farthest from the span of those before, by Gram and Schmidt on all columns.
+    /// The definition: at every step the column farthest from the span of the chosen ones, by Gram and Schmidt on all columns.
     #[test]
     fn every_pivot_reaches_farthest_out_of_those_before() {
         let modes = sines(6, 97);
@@ -171,7 +170,7 @@ mod tests {
         let stretched = vec![vec![3.0, 0.0, 9.0], vec![0.0, 2.0, 9.0]];
         assert!((condition_number(&stretched, &[0, 1]) - 1.5).abs() < 1e-12);
         assert_eq!(condition_number(&stretched, &[0]), f64::INFINITY);
-        // Sines at the multiples of a ninth are at right angles and equally long.
+        // Sines at the multiples of a ninth are orthogonal and of equal length.
         assert!((condition_number(&sines(8, 8), &[0, 1, 2, 3, 4, 5, 6, 7]) - 1.0).abs() < 1e-9);
     }
 

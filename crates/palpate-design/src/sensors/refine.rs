@@ -1,4 +1,4 @@
-//! Positions between the candidate sites.
+//! Sensor positions between the candidate sites.
 
 use super::SensorProblem;
 use super::candidates::{PlacedSensor, exclusion, mirrored, reads_something};
@@ -9,15 +9,16 @@ use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Steps begin at the distance of sites and are halved as often; on a plane, where each is a solution, less often.
+/// Number of halvings of the step, on a line and on a plane. The first step is the distance of sites. On a plane each step needs a
+/// solution.
 const HALVINGS: usize = 9;
 const HALVINGS_ON_A_PLANE: usize = 3;
-/// Rounds over all sensors for one step size, at most.
+/// Largest number of rounds over all sensors for one step size.
 const MOST_ROUNDS: usize = 20;
 
-/// A compass search: each sensor in turn goes a step along each direction if that improves the score; when none does, the step
-/// is halved (Kolda, Lewis and Torczon, *SIAM Review* 45, 2003). Sensors that mirror each other go together, and those of a
-/// kind stay as far apart as sites are.
+/// A compass search: each sensor in turn moves a step along each direction if that improves the score. If none moves, the step is
+/// halved (Kolda, Lewis and Torczon, *SIAM Review* 45, 2003). Sensors that mirror each other move together. Sensors of one kind
+/// stay at least the distance of sites apart.
 pub(super) fn refine(
     problem: &SensorProblem,
     selection: &[usize],
@@ -51,7 +52,7 @@ pub(super) fn refine(
     Ok(groups.into_iter().flat_map(|group| group.sensors).collect())
 }
 
-/// Sensors that move together, with the row of each: on a plate that is a solution.
+/// Sensors that move together, with the row of each; on a plate a row needs a solution.
 struct Group {
     sensors: Vec<PlacedSensor>,
     rows: Vec<Vec<Block>>,
@@ -62,7 +63,7 @@ impl Group {
         Self { rows: problem.rows(&sensors), sensors }
     }
 
-    /// The score of others with this group.
+    /// The score of the other sensors with this group.
     fn score(&self, problem: &SensorProblem, others: &State) -> f64 {
         match self.rows.as_slice() {
             [one] => problem.objective.score_with(others, one),
@@ -100,8 +101,8 @@ fn improve(problem: &SensorProblem, groups: &mut [Group], index: usize, step_m: 
     moved
 }
 
-/// The first of a group moved, and its twin as its mirror image. One alone in the middle of a layout that mirrors itself stays
-/// there along the length.
+/// The group with its first sensor moved, and the second at the mirror image. A single sensor in the middle of a symmetric layout
+/// keeps its place along the length.
 fn shifted(problem: &SensorProblem, group: &[PlacedSensor], [x_m, y_m]: [f64; 2]) -> Vec<PlacedSensor> {
     let extent = problem.pool.extent;
     let is_mirrored = problem.pool.design.symmetry == Symmetry::Wanted;
@@ -117,7 +118,7 @@ fn shifted(problem: &SensorProblem, group: &[PlacedSensor], [x_m, y_m]: [f64; 2]
 
 fn is_allowed(problem: &SensorProblem, group: &[PlacedSensor], others: &[PlacedSensor]) -> bool {
     let pool = &problem.pool;
-    // Sites keep sensors of a kind apart; without them nothing would stop them from meeting in one place.
+    // Sites keep sensors of one kind apart; this distance replaces them, so that sensors do not meet in one place.
     let apart_m = pool.design.sites.distance_m(pool.extent.length_m()).unwrap_or(0.0);
     let slack_m = 1e-9 * pool.extent.length_m();
     let together = |a: &PlacedSensor, b: &PlacedSensor| {

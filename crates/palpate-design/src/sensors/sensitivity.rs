@@ -1,4 +1,4 @@
-//! Sensitivities of sensors to contacts: the rows that criteria work on.
+//! Sensitivities of sensors to contacts: the rows that criteria use.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -18,25 +18,25 @@ use palpate_mechanics::surface::{
 };
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// More bytes than the rows of all candidates may take.
+/// Upper bound of the bytes of all candidates' rows.
 const MOST_BYTES: f64 = 4e9;
-/// Sensors whose response functions are had together: a plate solves for them in few sweeps, and each fills some 200 kB there.
+/// Response functions that are computed together: a plate solves for them in few sweeps, and each takes some 200 kB there.
 const TOGETHER: usize = 48;
-/// Contacts that principal components are taken over, at most.
+/// Largest number of contacts for principal components.
 const MOST_SNAPSHOTS: usize = 64;
 
-/// Work and memory of placing sensors, by an estimate.
+/// Estimated work and memory of a sensor design.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DesignCost {
-    /// Candidate sensors.
+    /// Number of candidate sensors.
     pub candidates: usize,
-    /// Memory at its peak, in bytes, besides the program itself.
+    /// Peak memory, in bytes, besides the program itself.
     pub memory_bytes: f64,
-    /// Time of the searches, in seconds of a core of some 3 GHz; simulated calibrations come on top.
+    /// Time of the searches, in seconds of a core of some 3 GHz; simulated calibrations are extra.
     pub seconds: f64,
 }
 
-/// A sensor somewhere on the surface.
+/// A sensor at a position of the surface.
 #[derive(Clone, Copy)]
 pub(super) struct SensorAt<'a> {
     pub kind: SensorKind,
@@ -61,7 +61,7 @@ impl<'a> From<&'a Sensor> for SensorAt<'a> {
     }
 }
 
-/// The contacts of a design on its surface: what sensitivities are to.
+/// The contacts of a design on its surface, for which sensitivities are computed.
 #[derive(Clone)]
 pub(super) struct Sensitivity<'a> {
     pub surface: &'a dyn Surface,
@@ -71,14 +71,14 @@ pub(super) struct Sensitivity<'a> {
 }
 
 impl Sensitivity<'_> {
-    /// True of a contact by which layouts are judged. Over a support nothing but its reaction tells an unknown force: no layout is compared with
-    /// another there, as [`palpate_mechanics::limit::LimitCurve::summary`] leaves such contacts out.
+    /// True for a contact that counts in the score of layouts. Over a support only its reaction determines an unknown force.
+    /// Layouts are not compared there; [`palpate_mechanics::limit::LimitCurve::summary`] excludes such contacts too.
     pub fn is_judged(&self, position: Position) -> bool {
         self.force == Force::Known
             || self.surface.insensitive_sensor(SensorKind::Deflection, position).is_none()
     }
 
-    /// Shares of the contacts in what layouts are judged by: 0 of those that are left out.
+    /// Weights of the contacts in the score of layouts; 0 for excluded contacts.
     pub fn judged_weights(&self) -> Vec<f64> {
         let WeightedContacts { positions, weights } = &self.contacts;
         let mut judged = weights.clone();
@@ -100,8 +100,8 @@ impl Sensitivity<'_> {
         self.unknowns() * self.contacts.len().div_ceil(LANES)
     }
 
-    /// Rows of some sensors: derivatives of the whitened reading at every contact by ln W where the force is unknown, by x, and by y on
-    /// a plane; 0 where it is saturated.
+    /// Rows of some sensors: derivatives of the whitened reading at every contact with respect to ln W if the force is unknown, to
+    /// x, and to y on a plane; 0 where the reading is saturated.
     pub fn rows(&self, sensors: &[SensorAt]) -> Vec<Vec<Block>> {
         let mut rows = vec![vec![[0.0; LANES]; self.row_size()]; sensors.len()];
         let filled = for_each_response(self.surface, sensors, Watch::NONE, |i, response| {
@@ -112,7 +112,7 @@ impl Sensitivity<'_> {
         rows
     }
 
-    /// Writes the row of a sensor where zeros are.
+    /// Writes the row of a sensor into zeros.
     fn fill_row(&self, row: &mut [Block], response: &dyn ResponseFunction, channel: &ChannelModel) {
         for (i, &position) in self.contacts.positions.iter().enumerate() {
             let contact = Contact { position, force_n: self.force_n };
@@ -120,7 +120,7 @@ impl Sensitivity<'_> {
         }
     }
 
-    /// Writes what a sensor tells of one contact into its row.
+    /// Writes the sensitivity of a sensor to one contact into its row.
     fn put(
         &self,
         row: &mut [Block],
@@ -140,7 +140,7 @@ impl Sensitivity<'_> {
         }
     }
 
-    /// The rows of all candidates, one after the other, solved for in the way that is sooner.
+    /// The rows of all candidates, one after the other, by the faster of two ways to solve for them.
     pub fn table(&self, candidates: &[SensorAt], watch: Watch) -> Result<Vec<Block>, DesignError> {
         self.table_by(Solving::sooner(candidates.len(), self.contacts.len()), candidates, watch)
     }
@@ -194,12 +194,13 @@ impl Sensitivity<'_> {
         Ok(table)
     }
 
-    /// Work and memory of the rows of so many candidates, and of searching layouts of so many sensors among them.
+    /// Work and memory of the rows of `candidates` sensors, and of searching layouts of `count` sensors among them.
     pub fn cost(&self, candidates: usize, count: usize) -> DesignCost {
-        /// Sums that a search takes over all candidates, for each sensor of a layout; and what a number of a row costs in one.
+        /// Passes of a search over all candidates, per sensor of a layout; and the time per number of a row in one pass.
         const PASSES: f64 = 12.0;
         const SECONDS_EACH: f64 = 1e-9;
-        /// Solutions that refining takes for each sensor of a layout, one by one, as many of those that are had together.
+        /// Solutions that the refinement takes per sensor of a layout. They are solved one by one; the number is in solutions
+        /// solved together.
         const REFINING: f64 = 200.0;
         let table = self.table_bytes(candidates);
         let sums = PASSES * count as f64 * table / size_of::<f64>() as f64;
@@ -222,12 +223,12 @@ impl Sensitivity<'_> {
         }
     }
 
-    /// Bytes of the rows of so many candidates.
+    /// Bytes of the rows of `candidates` sensors.
     fn table_bytes(&self, candidates: usize) -> f64 {
         (candidates * self.row_size() * size_of::<Block>()) as f64
     }
 
-    /// What solves for contacts, where that is the way and the surface has it.
+    /// The solver by contacts, if that way is chosen and the surface provides it.
     fn by_contact(&self, solving: Solving, sensors: &[SensorAt]) -> Option<Arc<dyn ReadingsByContact + '_>> {
         if solving == Solving::BySensor {
             return None;
@@ -236,7 +237,7 @@ impl Sensitivity<'_> {
         self.surface.readings_by_contact(&places)
     }
 
-    /// A criterion on such rows.
+    /// A criterion on a table of rows.
     pub fn objective(
         &self,
         table: Arc<Vec<Block>>,
@@ -261,8 +262,8 @@ impl Sensitivity<'_> {
         }
     }
 
-    /// Whitened readings of all candidates, a contact a row, each row times the root of the contact's share; of many contacts
-    /// an even sample.
+    /// Whitened readings of all candidates, one row per contact, each row times the root of the contact's share. With many
+    /// contacts, an even sample.
     pub fn readings(&self, candidates: &[SensorAt], watch: Watch) -> Result<Array2<f64>, Cancelled> {
         let sample = self.contacts.sample(MOST_SNAPSHOTS);
         self.readings_by(Solving::sooner(candidates.len(), sample.len()), candidates, &sample, watch)
@@ -304,7 +305,7 @@ impl Sensitivity<'_> {
     }
 }
 
-/// Calls with the index and response function of each sensor, a few of which are solved for together.
+/// Calls `take` with the index and response function of each sensor. A few response functions are solved together.
 fn for_each_response(
     surface: &dyn Surface,
     sensors: &[SensorAt],
@@ -333,7 +334,7 @@ mod tests {
     use palpate_mechanics::sensing::SensorKind::{Deflection, Slope, Strain};
     use palpate_mechanics::surface::Extent;
 
-    /// Sensors of three kinds, one of which saturates.
+    /// Sensors of three kinds. One of them saturates.
     fn sensors<'a>(channels: &'a [ChannelModel; 2], extent: Extent) -> Vec<SensorAt<'a>> {
         let place = |i: usize| {
             let [x, y] = [i as f64 * 0.618, i as f64 * 0.755].map(|share| share.fract().clamp(0.01, 0.99));
@@ -364,7 +365,7 @@ mod tests {
             });
             let rows = sensitivity.rows(&candidates).concat();
             assert_eq!(rows, one.0);
-            // Of one sensor all numbers of one unknown have one unit.
+            // All numbers of one sensor and one unknown have one unit.
             let blocks = contacts.len().div_ceil(LANES);
             for (i, (a, b)) in one.0.chunks(blocks).zip(other.0.chunks(blocks)).enumerate() {
                 let (a, b) = (a.as_flattened(), b.as_flattened());

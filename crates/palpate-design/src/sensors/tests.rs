@@ -61,7 +61,7 @@ fn the_papers_beam_gains_at_least_18_percent() {
     assert!(limit <= 0.82 * even && limit <= 2.15e-3, "{limit}: {:?}", places(&designed));
 }
 
-/// The assessment agrees with the limit, and scores never exceed those of the surface's size alone.
+/// The assessment agrees with the limit, and scores never exceed the score of the prior alone.
 #[test]
 fn scores_agree_with_the_limit() {
     let (setup, mut design) = sensor_design();
@@ -80,7 +80,7 @@ fn scores_agree_with_the_limit() {
     assert!((one.score / (0.4 / 12f64.sqrt()) - 1.0).abs() < 1e-3, "{one:?}");
 }
 
-/// C(20, 4) at random: kinds, noise, contacts, criterion, knowledge of the force.
+/// C(20, 4) at random: kinds, noise, contacts, criterion, known or unknown force.
 fn random_problem(setup: &Setup, design: &SensorDesign, rng: &mut impl Rng) -> SensorDesign {
     let kinds = [
         offer(SensorKind::Deflection, 10f64.powf(rng.random_range(-6.0..-5.0)), 1.0),
@@ -216,7 +216,7 @@ fn what_cannot_be_met_is_named() {
     ];
     let told = cases.map(|(what, design)| format!("{what}: {}", refusal(&setup, &design)));
     insta::assert_snapshot!(told.join("\n"));
-    // As many as the message says do fit.
+    // The largest number in the message does fit.
     assert!(matches!(refusal(&setup, &spaced), DesignError::Spacing { most: 7, .. }));
     problem(&setup, &SensorDesign { count: 7, ..spaced });
     let unknown = setup.clone().unknown_force();
@@ -291,7 +291,7 @@ fn contacts_over_supports_count_for_nothing_where_the_force_is_unknown() {
     assert_eq!(refused, DesignError::OverSupports { contacts: 2 });
 }
 
-/// With an unknown force, two reaction sensors tell the position at the supports that deflections do not.
+/// With an unknown force, two reaction sensors determine the position at the supports, which deflections do not.
 #[test]
 fn mixed_kinds_go_beyond_deflections() {
     let (setup, mut design) = sensor_design();
@@ -323,7 +323,7 @@ fn many_sites_are_searched_as_few_are() {
     assert!((many / few - 1.0).abs() < 0.005, "{many} {few}");
 }
 
-/// Units that the samples left out are found all the same: exchanged one by one, no unit of all gains a millionth of the score.
+/// Units outside the samples are included too: no single exchange for any unit improves the score by a millionth.
 #[test]
 fn no_exchange_for_one_of_very_many_matters() {
     let (setup, mut design) = sensor_design();
@@ -376,7 +376,7 @@ fn plates_are_designed_too() {
     for force in [Force::Known, Force::Unknown] {
         design.force = force;
         let problem = problem(&setup, &design);
-        // 11 × 11 sites, of which those on the simply supported edges never move.
+        // 11 × 11 sites; those on the simply supported edges never move.
         assert_eq!((problem.candidates(), problem.contacts().len()), (81, 81));
         let even = problem.even().unwrap();
         assert_eq!(&even.layout, setup.layout());
@@ -388,7 +388,7 @@ fn plates_are_designed_too() {
 #[test]
 fn a_layout_does_what_its_score_promises() {
     let (setup, mut design) = sensor_design();
-    // Nearer to the ends force and place trade off, and the estimate errs less than the limit of unbiased ones.
+    // Nearer to the ends force and position trade off, and the error is less than the limit of unbiased estimators.
     design.contacts = ContactPrior::along(0.03, 0.37, 0.02);
     let problem = problem(&setup, &design);
     let estimator = palpate_estimators::estimator::Estimator::Influence(Default::default());
@@ -413,7 +413,7 @@ fn a_search_can_be_stopped() {
     assert_eq!(stopped, Err(DesignError::Cancelled(Cancelled)));
 }
 
-/// One method alone has the layout that it has among all.
+/// A method called alone gives the layout that it gives among all.
 #[test]
 fn a_method_that_is_asked_for_gives_its_own_layout() {
     let (setup, mut design) = sensor_design();
@@ -427,7 +427,7 @@ fn a_method_that_is_asked_for_gives_its_own_layout() {
         let asked = problem.by_method(method, 0, Watch::NONE).unwrap();
         let among = all.iter().find(|designed| designed.method == method).unwrap();
         if method == Method::Refined {
-            // Where there are few sites, the refined one of all starts from the exhaustive search.
+            // With few sites, the refined layout of all starts from the exhaustive search.
             assert!(asked.assessment.score < 1.01 * among.assessment.score, "{asked:?}");
         } else {
             assert_eq!((asked.method, &asked.layout), (method, &among.layout));

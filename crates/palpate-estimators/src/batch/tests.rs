@@ -13,7 +13,7 @@ use palpate_mechanics::sensing::ChannelModel;
 use palpate_mechanics::surface::ForceDirection;
 use palpate_mechanics::units::{newtons, um};
 
-/// Locators of every method that suits a setup; networks are trained for as long as a test may take.
+/// Locators of every method that suits a setup. Networks are trained briefly, to keep the test short.
 fn locators(setup: &Setup, presses: &Recording) -> Vec<Locator> {
     let all = contenders(setup, &Estimator::default(), 200 * presses.rows.len());
     all.iter()
@@ -21,7 +21,8 @@ fn locators(setup: &Setup, presses: &Recording) -> Vec<Locator> {
         .collect()
 }
 
-/// Readings of a recording; and of nothing, of three times as much, of the first and the last together, and far beyond all that is read.
+/// Readings of a recording. Further readings are zeros, readings times 3, sums of a reading and the mirrored one from the end, and readings
+/// times 1e300.
 fn readings(recording: &Recording) -> Vec<f64> {
     let rows: Vec<&[f64]> = recording.rows.iter().map(|row| row.reading.as_slice()).collect();
     let mut readings = rows.concat();
@@ -37,7 +38,7 @@ fn readings(recording: &Recording) -> Vec<f64> {
     readings
 }
 
-/// Asserts that a batch, whichever way it is asked for, is what readings one by one give; the statuses that were seen.
+/// Asserts that all ways to locate a batch give the estimates of single readings, and returns their statuses.
 fn assert_agree(locator: &Locator, readings: &[f64]) -> Vec<Status> {
     let kind = locator.kind();
     let each = readings.chunks_exact(locator.layout().len());
@@ -153,7 +154,7 @@ fn the_first_bad_reading_is_named_whatever_the_number_of_threads() {
 fn values_that_make_no_whole_readings_are_refused() {
     let (locator, _) = several_blocks();
     let error = locator.locate_batch(&[0.0; 15]).unwrap_err();
-    assert_eq!(error.to_string(), "15 values are no whole number of readings; the locator has 8 channels");
+    assert_eq!(error.to_string(), "15 values are not a whole number of readings; the locator has 8 channels");
     assert_eq!(locator.locate_batch(&[]).unwrap(), []);
     locator.locate_blocks(&[], BatchOptions::default(), &|_, _| panic!("nothing was located")).unwrap();
 }

@@ -15,8 +15,8 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{Cholesky, NotPositiveDefinite};
 
-/// The calibrated centroid. Channel i weighs w_i = |r_i| / Σ|r_j|, its reading taken in units of the largest that its
-/// kind has in the training recording.
+/// The calibrated centroid. Channel i has the weight w_i = |r_i| / Σ|r_j|, its reading in units of the largest that its kind has in the training
+/// recording.
 ///
 /// With sensors at known positions p_i the estimate is A·(Σ w_i·p_i) + b, with A and b from least squares over the
 /// training recording. Raw channels have no positions, so least squares gives each one a position of its own:
@@ -39,7 +39,7 @@ pub struct Centroid;
 /// A recording that the centroid cannot be calibrated by.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CentroidFitError {
-    /// One sensor has the same centroid wherever the contact is.
+    /// One sensor has the same centroid for any contact.
     #[error("a centroid needs at least 2 sensors that are not dead; the layout has {found}")]
     TooFewSensors {
         /// Live sensors of the layout.
@@ -48,14 +48,14 @@ pub enum CentroidFitError {
     /// Fewer positions than unknowns of the map.
     #[error(transparent)]
     Positions(#[from] TooFewPositions),
-    /// Nothing is ever read by the sensors of one kind.
+    /// All readings of the sensors of one kind are 0.
     #[error("every {kind} reading of the recording is 0; a centroid weighs sensors by what they read")]
     Silent {
         /// The kind.
         kind: SensorKind,
     },
-    /// Every sensor sits at the same place, or all readings are alike.
-    #[error("the centroids of the recording do not tell its positions apart: {0}")]
+    /// All sensors are at the same place, or all readings are alike.
+    #[error("the centroids of the recording do not distinguish its positions: {0}")]
     Alike(#[from] NotPositiveDefinite),
     /// The recording's channels are not the setup's.
     #[error(transparent)]
@@ -81,7 +81,7 @@ impl Fit for Centroid {
     }
 }
 
-/// A locator whose map is still empty.
+/// A locator with an empty map.
 fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator, CentroidFitError> {
     let sensors = setup.layout().sensors();
     let live = sensors.iter().filter(|sensor| !sensor.channel.dead).count();
@@ -138,8 +138,8 @@ fn calibrate(locator: &CentroidLocator, rows: &[Row]) -> Result<Vec<Vec<f64>>, N
     Ok(right[..locator.extent.dimensions()].iter().map(|right| cholesky.solve(right).to_vec()).collect())
 }
 
-/// Errors (x, y) in metres at positions that the map was not calibrated on, of at most [`FOLDS`] maps; none where
-/// a fold leaves fewer positions than terms.
+/// Errors (x, y) in metres at positions that the map was not calibrated on, of at most [`FOLDS`] maps; empty where a fold leaves fewer positions
+/// than terms.
 fn held_out_errors(
     locator: &CentroidLocator,
     recording: &Recording,
@@ -175,12 +175,12 @@ pub struct CentroidLocator {
     pub extent: Extent,
     /// One over the largest training reading of the channel's kind, in the inverse of its unit; 0 for a dead channel.
     pub channel_scales: Vec<f64>,
-    /// Points of which the centroid is taken.
+    /// Points of the weighted centroid.
     pub weighing: Weighing,
     /// A row for x, and one for y on a two-dimensional surface: with [`Weighing::Positions`] the factor of the
     /// centroid's x (and y), then a constant in metres; with [`Weighing::Channels`] a position in metres a channel.
     pub map: Vec<Vec<f64>>,
-    /// The contact's force in newtons, where the bench knows it.
+    /// The contact's force in newtons, where it is known.
     pub force_n: Option<f64>,
     /// Errors of maps at positions that they were not calibrated on.
     pub spread: Option<HeldOutErrors>,

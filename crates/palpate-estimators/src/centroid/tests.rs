@@ -1,4 +1,4 @@
-//! The centroid on readings for which it is exact, and on those for which it is not.
+//! The centroid on readings for which it is exact, and on others.
 
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};

@@ -1,8 +1,8 @@
 //! Contact position and force from the beam's own equations, without training: after Ellis and his colleagues (1994) and
 //! Stone and Brett (1995), who solved the equations of a supported strip for the contact.
 //!
-//! Between two neighbouring sensors every influence function of a beam is a cubic polynomial of the contact position,
-//! so what explains a reading best is a root of a polynomial: all roots are found, and all are reported.
+//! Between two neighbouring sensors every influence function of a beam is a cubic polynomial of the contact position.
+//! So the best explanation of a reading is a root of a polynomial. All roots are computed, and all are reported.
 
 mod polynomial;
 
@@ -27,14 +27,14 @@ use palpate_numerics::watch::Cancelled;
 use palpate_numerics::{NORMAL_95, clamped_interval, normal_interval_95};
 use polynomial::Polynomial;
 
-/// The closed form: it needs a beam and its sensors, and learns nothing from a recording.
+/// The closed form: it needs a beam and its sensors, and does not learn from a recording.
 ///
-/// - Scales under both supports and nothing else: the moment balance a = l·R_right/(R_left + R_right), W = R_left + R_right.
+/// - Only scales under both supports: the moment balance a = l·R_right/(R_left + R_right), W = R_left + R_right.
 /// - Otherwise every deflection, slope, strain and reaction that the layout has: position, and force where it is unknown, by
 ///   least squares weighted by the channels' noise; with two readings and an unknown force this is the root of their ratio.
 ///
-/// Uncertainty is propagated from the channels' noise (and quantisation) to first order; where the layout gives a channel no noise
-/// there is none, and a reading that is off by more than a tenth of itself is outside the model.
+/// Uncertainty is propagated from the channels' noise (and quantisation) to first order. Where the layout gives no noise for a channel, there is no
+/// uncertainty, and a reading with a residual above a tenth of itself is outside the model.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, closed_form::ClosedForm};
@@ -49,7 +49,7 @@ use polynomial::Polynomial;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ClosedForm {
-    /// Share of untouched readings that may be taken for a contact.
+    /// False-alarm rate: share of untouched readings that may be detected as a contact.
     pub false_alarm_rate: FalseAlarmRate,
 }
 
@@ -70,7 +70,7 @@ pub enum ClosedFormFitError {
         /// Quantity that the channel measures.
         kind: SensorKind,
     },
-    /// Too few sensors that see a contact.
+    /// Too few sensors that respond to a contact.
     #[error(
         "the closed form needs at least {needed} sensors that see a contact ({}); the layout has {found}",
         if *needed == 1 { "the force is known" } else { "the force is unknown" }
@@ -78,7 +78,7 @@ pub enum ClosedFormFitError {
     TooFewSensors {
         /// Unknowns: 1 for the position, and 1 for a force that is unknown.
         needed: usize,
-        /// Sensors that are not dead and whose influence is not 0 everywhere.
+        /// Sensors that are not dead, with an influence other than 0 somewhere.
         found: usize,
     },
     /// The recording's channels are not the setup's.
@@ -132,19 +132,19 @@ pub struct ClosedFormLocator {
     pub layout: Layout,
     /// The contact's force in newtons, where it is known.
     pub force_n: Option<f64>,
-    /// Greatest force of a contact of unknown force, in newtons, where the calibration tells it.
+    /// Greatest force of a contact of unknown force, in newtons; `None` where neither the setup nor the calibration gives one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub greatest_force_n: Option<f64>,
-    /// Share of untouched readings that may be taken for a contact.
+    /// False-alarm rate: share of untouched readings that may be detected as a contact.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
-    /// Offset of each channel, in its SI unit; none where no untouched row told them.
+    /// Offset of each channel, in its SI unit; empty where the recording has no untouched row.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub offsets: Vec<f64>,
 }
 
 impl ClosedFormLocator {
-    /// Channels that are not dead and that see a contact somewhere.
+    /// Channels that are not dead and respond to a contact somewhere.
     fn seeing(&self) -> Vec<usize> {
         let sees = |sensor: &Sensor| {
             let quarters = [0.25, 0.5, 0.75].map(|share| Position::along(share * self.beam.length_m()));
@@ -154,7 +154,7 @@ impl ClosedFormLocator {
         (0..self.layout.len()).filter(|i| sees(&self.layout.sensors()[*i])).collect()
     }
 
-    /// Whether the layout says the noise of every channel, by which an untouched reading is told.
+    /// True when the layout gives the noise of every channel, by which an untouched reading is detected.
     pub fn knows_noise(&self) -> bool {
         self.weights(&self.seeing()).1 == Noise::Known
     }
@@ -183,7 +183,7 @@ impl ClosedFormLocator {
         ends.windows(2).map(|pair| Segment::new(pair[0], pair[1], channels.len(), influence)).collect()
     }
 
-    /// The channels under the left and the right support, where the layout sees a contact by these two alone.
+    /// The channels under the left and the right support, where only these two respond to a contact.
     fn scales(&self, channels: &[usize]) -> Option<(usize, usize)> {
         let &[first, second] = channels else { return None };
         let sensor = |i: usize| &self.layout.sensors()[i];
@@ -193,7 +193,7 @@ impl ClosedFormLocator {
         (reactions && apart).then_some(if a < b { (first, second) } else { (second, first) })
     }
 
-    /// The moment balance of two supports that weigh; the position may come to lie beyond them.
+    /// The moment balance of two supports with scales; the position may lie beyond them.
     ///
     /// For an unknown force W a = l·R_right/W and W = R_left + R_right, and to first order ∂a/∂R_left = −a/W, ∂a/∂R_right = (l − a)/W,
     /// ∂W/∂R = 1; for a known one a is from weighted least squares of R_left = W·(1 − a/l) and R_right = W·a/l.
@@ -232,7 +232,7 @@ impl ClosedFormLocator {
         let (status, held_m) = if force_n <= 0.0 || is_too_hard || misfit_n.powi(2) > tolerated {
             (Status::OutsideModel, position_m)
         } else if on_surface || near(0.0) || near(length_m) {
-            // Noise may carry a contact at the very edge a little beyond it.
+            // Noise may move a contact at the very edge a little beyond it.
             (Status::Located, position_m.clamp(0.0, length_m))
         } else {
             (Status::OutsideSurface, position_m)
@@ -248,7 +248,7 @@ impl ClosedFormLocator {
     }
 }
 
-/// Whether the layout says how noisy its channels are.
+/// Noise of the channels: given by the layout, or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Noise {
     Known,
@@ -282,7 +282,7 @@ impl Locate for ClosedFormLocator {
         if let (false, Some(scales)) = (rule.is_within_noise(size), scales) {
             return self.balance(scales, reading, noise);
         }
-        // No contact leaves less than 0, so that most of what is noise needs no search.
+        // χ² of a contact is at least 0, so that most readings of noise need no search.
         if rule.is_no_contact(size, 0.0) {
             return NO_CONTACT;
         }
@@ -326,10 +326,10 @@ impl Locate for ClosedFormLocator {
     }
 }
 
-/// Explanations whose χ² is so much above the least have a share of e⁻¹² of the probability.
+/// Explanations with χ² above the least by this have a share of e⁻¹² of the probability.
 const NEGLIGIBLE: f64 = 24.0;
 
-/// The greatest force of contacts of unknown force: as it was said, or a multiple of a recording's hardest press; `None` where there is neither.
+/// The greatest force of contacts of unknown force: the setup's, or a multiple of a recording's hardest press; `None` where there is neither.
 fn greatest_force_n(setup: &Setup, recording: &Recording) -> Option<f64> {
     let hardest = recording.rows.iter().filter_map(|row| row.force_n).fold(0.0, f64::max);
     setup.greatest_force_n().or((hardest > 0.0).then_some(DECADE * hardest))
@@ -343,12 +343,12 @@ struct Posterior<'a> {
     segments: &'a [Segment],
     reading: &'a [f64],
     force_n: Option<f64>,
-    /// Bound of a force that is not known, in newtons.
+    /// Upper bound of an unknown force, in newtons.
     greatest_force_n: Option<f64>,
     noise: Noise,
 }
 
-/// A position that explains the reading better than its neighbours do, or a stretch of positions that explain it alike.
+/// A position that explains the reading better than its neighbours do, or a stretch of positions that explain it equally well.
 #[derive(Clone, Copy, Debug)]
 struct Explanation {
     from_m: f64,
@@ -388,7 +388,7 @@ impl Posterior<'_> {
         estimate
     }
 
-    /// The estimate where a place that competes is so near to an end, or told so little of, that force and place trade off; `None`
+    /// The estimate where force and place trade off: a competing place is near an end, or its force is above the greatest. `None`
     /// elsewhere, and where the noise is not known.
     fn trade_off(&self, found: &[Explanation], rule: &StatusRule) -> Option<Estimate> {
         if self.noise == Noise::Unknown {
@@ -430,7 +430,7 @@ impl Posterior<'_> {
         Some(estimate)
     }
 
-    /// True for the reading of a contact that is spread, about every place that competes; false where the noise is not known.
+    /// True for the reading of a distributed contact, about every competing place; false where the noise is not known.
     fn is_spread(&self, found: &[Explanation]) -> bool {
         let least = found.iter().fold(f64::INFINITY, |least, at| least.min(at.chi_squared));
         let competes = |at: &&Explanation| at.chi_squared <= least + NEGLIGIBLE;
@@ -440,7 +440,7 @@ impl Posterior<'_> {
         self.noise == Noise::Known && found.iter().filter(competes).all(is_spread)
     }
 
-    /// Score of a [spread](crate::spread) about a place.
+    /// Score of a [distributed contact](crate::spread) about a place.
     fn spread(&self, Explanation { position_m, force_n, .. }: &Explanation) -> f64 {
         let reads = |[x_m, _, force_n]: [f64; 3]| -> Vec<f64> {
             self.influence_at(x_m).iter().map(|(f, _)| force_n * f).collect()
@@ -465,8 +465,8 @@ impl Posterior<'_> {
         self.reading.iter().map(|r| r * r).sum()
     }
 
-    /// Local minima of the squared residual over the beam. Between neighbouring candidates it is monotone, as all its turns
-    /// and all the ends of segments are candidates.
+    /// Local minima of the squared residual over the beam. Between neighbouring candidates it is monotone, as all its stationary points and all the
+    /// ends of segments are candidates.
     fn explanations(&self) -> Vec<Explanation> {
         let mut candidates: Vec<Explanation> = Vec::new();
         for segment in self.segments {
@@ -480,7 +480,7 @@ impl Posterior<'_> {
             match stretches.last_mut() {
                 Some(last) if (last.chi_squared - next.chi_squared).abs() <= same => {
                     last.to_m = next.to_m;
-                    // The middle of a stretch that one position explains as well as the next.
+                    // The middle of a stretch of positions that explain the reading equally well.
                     last.position_m = 0.5 * (last.from_m + last.to_m);
                 }
                 _ => stretches.push(next),
@@ -512,8 +512,8 @@ impl Posterior<'_> {
         }
     }
 
-    /// Inverse of the Fisher information of (a, W), whose square root is the Jacobian (W·h̃′, h̃); a position that the reading
-    /// does not determine is given the variance of one anywhere on the beam, l²/12.
+    /// Inverse of the Fisher information of (a, W), JᵀJ with the Jacobian J = (W·h̃′, h̃). A position that the reading
+    /// does not determine has the variance of a uniform distribution over the beam, l²/12.
     fn covariance(&self, influence: &[(f64, f64)], force_n: f64) -> [f64; 3] {
         let (mut xx, mut xf, mut ff) = (0.0, 0.0, 0.0);
         for (h, slope) in influence {
@@ -529,15 +529,15 @@ impl Posterior<'_> {
             Some(factors) => {
                 let [_, [_, of_position]] = factors.inverse();
                 let (variance, slope) = (most.min(of_position), -xf / ff);
-                // cov(a, W) = slope·var a and var W = 1/ff + slope²·var a, whatever var a is.
+                // cov(a, W) = slope·var a and var W = 1/ff + slope²·var a, for any var a.
                 [variance, slope * variance, 1.0 / ff + slope * slope * variance]
             }
             None => [most, 0.0, if ff > 0.0 { 1.0 / ff } else { 0.0 }],
         }
     }
 
-    /// Logarithm of the probability around an explanation, up to a constant, by Laplace's method. Where the noise is unknown
-    /// only explanations as good as exact share in it.
+    /// Logarithm of the probability around an explanation, up to a constant, by Laplace's method. Where the noise is unknown only practically exact
+    /// explanations count.
     fn log_weight(&self, explanation: &Explanation) -> f64 {
         match self.noise {
             Noise::Known => {
@@ -580,12 +580,12 @@ struct Segment {
     to_m: f64,
     /// h̃ of each channel, a polynomial of t = (a − from)/(to − from).
     influence: Vec<Polynomial>,
-    /// The same for the unknown force, divided by t or 1 − t where every influence is 0 at that end: there N²/D would
-    /// be 0/0, and the division leaves it as it is.
+    /// h̃ for the unknown force, divided by t or 1 − t where every influence is 0 at that end. There N²/D would
+    /// be 0/0, and the division does not change it.
     reduced: Vec<Polynomial>,
     /// Whether `reduced` is in 1 − t.
     mirrored: bool,
-    /// Start of `reduced`: 0, or just beside an end where no sensor reads anything and only an infinite force would.
+    /// Start of `reduced`: 0, or just beside an end where every sensor reads 0 and only an infinite force would fit.
     start: f64,
 }
 
@@ -613,7 +613,7 @@ impl Segment {
         Self { from_m, to_m, influence: polynomials, reduced, mirrored, start }
     }
 
-    /// Positions at which the squared residual is stationary, its ends always among them.
+    /// Positions at which the squared residual is stationary, and both ends of the segment.
     fn candidates(&self, reading: &[f64], force_n: Option<f64>) -> Vec<f64> {
         let functions = if force_n.is_some() { &self.influence } else { &self.reduced };
         let (mut n, mut d) = (Polynomial::zero(), Polynomial::zero());

@@ -51,7 +51,7 @@ impl Polynomial {
         self.0.iter().rev().fold(Self::zero(), |sum, c| sum.times(&mirror).plus(1.0, &Self(vec![*c])))
     }
 
-    /// The polynomial divided by t; its constant, which ought to be 0, is dropped.
+    /// The polynomial divided by t; its constant, in theory 0, is dropped.
     pub(super) fn over_t(&self) -> Self {
         Self(self.0.iter().skip(1).copied().chain((self.0.len() <= 1).then_some(0.0)).collect())
     }

@@ -20,13 +20,13 @@ pub fn learnt(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     lines
 }
 
-/// A value and its noise, of which three digits are shown.
+/// A value ± its noise, to three significant digits of the noise.
 fn with_noise(value: f64, noise: f64) -> String {
     let decimals = decimals(noise, 3);
     format!("{value:.decimals$} ± {noise:.decimals$}")
 }
 
-/// Decimals by which a value has so many digits; none of 0.
+/// Decimals for `digits` significant digits of a value; 0 for the value 0.
 pub(super) fn decimals(value: f64, digits: i32) -> usize {
     if value == 0.0 {
         return 0;
@@ -34,14 +34,14 @@ pub(super) fn decimals(value: f64, digits: i32) -> usize {
     (f64::from(digits - 1) - value.abs().log10().floor()).clamp(0.0, 15.0) as usize
 }
 
-/// Structure, drift, scatter and what was set aside, for the summary of a fit.
+/// Structure, drift, scatter and excluded rows, for the summary of a fit.
 pub fn learnt_summary(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     let mut lines = vec![structure(linear)];
     lines.extend(disturbances(linear, names));
     lines
 }
 
-/// The structure, and why it was taken.
+/// The structure, and the reason for it.
 fn structure(linear: &ForceLinearLocator) -> String {
     let exponent = linear.response();
     match (linear.asked_structure(), exponent == 1.0) {
@@ -61,7 +61,7 @@ fn structure(linear: &ForceLinearLocator) -> String {
     }
 }
 
-/// Drift, scatter, and what was set aside.
+/// Drift, scatter and excluded rows.
 fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     let by_channel = |sizes: &[(usize, f64)]| {
         let size = |(c, sd): &(usize, f64)| format!("{} by {:.*}", names[*c], decimals(*sd, 2), sd);
@@ -98,7 +98,7 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     }
     if !linear.tells_untouched() {
         lines.push(
-            "the offsets are open by what touches read: no reading is `no_contact`, before some rows are recorded untouched (force 0)"
+            "the offsets are undetermined: no reading is `no_contact` without untouched rows (force 0) in the recording"
                 .to_owned(),
         );
     }
@@ -111,11 +111,11 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     lines
 }
 
-/// The warning of a recording of so many presses that are hardly repeated.
+/// The warning for a recording of so many presses with hardly any repeats.
 pub fn noise_is_hardly_told(presses: usize) -> String {
     let presses = format_count(presses as u64);
     format!(
-        "{presses} presses, hardly any repeated: the noise is hardly told, and taken to be about a hundredth of what presses change; press one place three times, or leave rows untouched (force 0)"
+        "{presses} presses, hardly any repeated: the noise is badly determined, and assumed to be about a hundredth of what presses change; press one place three times, or leave rows untouched (force 0)"
     )
 }
 
@@ -142,7 +142,7 @@ fn influences(linear: &ForceLinearLocator) -> String {
         Source::Deflection => "deflection",
     };
     let rest = smooth.map(|smooth| format!(", and {smooth}")).unwrap_or_default();
-    format!("those of sensors of {kind} at places that the presses tell, polynomials{rest}")
+    format!("those of sensors of {kind} at places that the presses determine, polynomials{rest}")
 }
 
 #[cfg(test)]

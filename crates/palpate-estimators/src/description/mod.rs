@@ -1,4 +1,4 @@
-//! Setups, recordings and locators in words, a line for each thing that is to be said.
+//! Descriptions of setups, recordings and locators in words, a line for each fact.
 
 mod learnt;
 mod locator;

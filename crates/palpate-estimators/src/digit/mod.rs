@@ -1,12 +1,12 @@
 //! The flexible digit's own estimator, after Ma and his colleagues: where a bending finger is touched, how hard, and what
 //! shape it has.
 //!
-//! Strain gauges read the bending moment. Those between the clamp and the contact see it, and those beyond see nothing, so the
+//! Strain gauges read the bending moment. Gauges between the clamp and the contact respond to it; gauges beyond it read 0. So the
 //! likelihood of a reading has one smooth piece for every stretch between neighbouring gauges. Each piece is searched by
-//! itself: a few starts, then Gauss–Newton steps on the exact elastica that never leave the stretch. What the pieces say
-//! together is a posterior of position and force, flat before the reading over the digit's length and the logarithm of
-//! the force: one Gaussian a stretch, cut off at its gauges; and where one gauge alone sees a contact of unknown
-//! force, which tells force times lever and no more, a curve of contacts that explain it alike.
+//! itself: a few starts, then Gauss–Newton steps on the exact elastica that never leave the stretch. Together the pieces
+//! form a posterior of position and force, with a prior that is flat over the digit's length and the logarithm of
+//! the force. A stretch has one Gaussian, cut off at its gauges. Where only one gauge responds to a contact of unknown
+//! force, it determines only the product of force and lever arm: the piece is a curve of contacts that explain the reading equally well.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -27,7 +27,7 @@ use palpate_numerics::watch::Cancelled;
 use palpate_numerics::{bisect, clamped_interval, holding, normal_cdf, normal_interval_95};
 
 /// The flexible digit's estimator: maximum likelihood over position and force. It needs the digit, its gauges and their
-/// noise, and learns nothing from a recording.
+/// noise, and does not learn from a recording.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, digit::DigitEstimator, fit::Fit, setup::Setup};
@@ -48,12 +48,12 @@ use palpate_numerics::{bisect, clamped_interval, holding, normal_cdf, normal_int
 pub struct DigitEstimator {
     /// Theory of bending by which the gauges read.
     pub theory: DigitTheory,
-    /// Share of untouched readings that may be taken for a contact.
+    /// False-alarm rate: share of untouched readings that may be detected as a contact.
     pub false_alarm_rate: FalseAlarmRate,
 }
 
 impl DigitEstimator {
-    /// An estimator by this theory of bending, otherwise as by default.
+    /// An estimator with this theory of bending, and default settings otherwise.
     pub const fn of_theory(theory: DigitTheory) -> Self {
         Self { theory, false_alarm_rate: FalseAlarmRate::DEFAULT }
     }
@@ -63,7 +63,7 @@ impl DigitEstimator {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DigitTheory {
-    /// The elastica: the finger bends as far as the force bends it.
+    /// The elastica, for bending of any size.
     #[default]
     Exact,
     /// Small deflections: strain is force times lever. For comparison, and for small forces.
@@ -76,13 +76,13 @@ pub enum DigitFitError {
     /// Another kind of surface.
     #[error("the digit estimator needs `kind = \"digit\"` in [surface]; the surface is another one")]
     NotADigit,
-    /// A sensor that is no strain gauge.
+    /// A sensor other than a strain gauge.
     #[error("the digit estimator needs strain gauges; the layout has a {kind} sensor")]
     NotAGauge {
         /// Quantity that the sensor measures.
         kind: SensorKind,
     },
-    /// A gauge whose noise is not given.
+    /// A gauge without noise.
     #[error(
         "gauge {gauge} has neither noise nor resolution; the digit estimator weighs gauges by their noise: give `noise` in [sensors]"
     )]
@@ -90,7 +90,7 @@ pub enum DigitFitError {
         /// Number of the gauge, from 1.
         gauge: usize,
     },
-    /// Too few gauges for what is to be found.
+    /// Too few gauges for the unknowns.
     #[error(
         "the digit estimator needs at least {needed} living gauges ({}); the layout has {found}",
         if *needed == 1 { "the force is known" } else { "the force is unknown" }
@@ -101,7 +101,7 @@ pub enum DigitFitError {
         /// Gauges that are not dead.
         found: usize,
     },
-    /// A known force that bends the digit further than its model goes.
+    /// A known force that bends the digit beyond the range of its model.
     #[error(
         "the force is {force_n} N; a contact at the tip bears at most {most_n} N, a load F·l²/(E·I) of {}",
         Digit::MOST_LOAD
@@ -158,7 +158,7 @@ impl Fit for DigitEstimator {
     }
 }
 
-/// Widest interval, as a share of the length, that is a place where one gauge alone sees the contact.
+/// Widest interval, as a share of the length, that counts as a place where only one gauge responds to the contact.
 const WIDE: f64 = 0.01;
 
 /// A digit's estimator that locates; see [`DigitEstimator`].
@@ -173,10 +173,10 @@ pub struct DigitLocator {
     pub force_n: Option<f64>,
     /// Theory of bending by which the gauges read.
     pub theory: DigitTheory,
-    /// Share of untouched readings that may be taken for a contact.
+    /// False-alarm rate: share of untouched readings that may be detected as a contact.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
-    /// Offset of each channel, in its SI unit; none where no untouched row told them.
+    /// Offset of each channel, in its SI unit; empty where the recording has no untouched row.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub offsets: Vec<f64>,
 }
@@ -185,7 +185,7 @@ impl DigitLocator {
     /// The shape of the finger at an estimated contact, at `steps` + 1 points from clamp to tip; an estimate without a force leaves it
     /// straight.
     ///
-    /// Its uncertainty is the contact's, carried over by the shapes one standard deviation to either side along the
+    /// The uncertainty of the shape is that of the contact, propagated by the shapes one standard deviation to either side along the
     /// columns of the covariance's Cholesky factor.
     pub fn shape(&self, contact: &ContactEstimate, steps: usize) -> DigitShape {
         let digit = &self.digit;
@@ -211,7 +211,7 @@ impl DigitLocator {
         DigitShape { points: (0..=steps).map(point).collect() }
     }
 
-    /// Leaves a dead gauge out from now on; false, with nothing changed, when too few would be left.
+    /// Disables a dead gauge from now on; false, without a change, when too few would remain.
     pub fn leave_out(&mut self, gauge: usize) -> bool {
         let needed = unknowns(1, self.force_n);
         let Some(sensor) = self.layout.sensors().get(gauge) else { return false };
@@ -291,7 +291,7 @@ impl Locate for DigitLocator {
         let rule =
             StatusRule::new(gauges.len(), unknowns(1, self.force_n), LINE_PLACES, self.false_alarm_rate);
         let is_no_contact = |misfit: f64| none_saturated && rule.is_no_contact(size, misfit);
-        // No contact leaves less than 0, so that most of what is noise needs no search.
+        // |r|² of a contact is at least 0, so that most readings of noise need no search.
         if is_no_contact(0.0) {
             return NO_CONTACT;
         }
@@ -309,7 +309,7 @@ impl Locate for DigitLocator {
         LocatorFault::check_count("gauges", setup.layout().len(), self.layout.len())?;
         check_offsets(&self.offsets, self.layout.len())?;
         let others = self.layout.kinds().into_iter().filter(|kind| *kind != SensorKind::Strain).count();
-        LocatorFault::check_count("sensors that are no gauges", 0, others)?;
+        LocatorFault::check_count("sensors that are not gauges", 0, others)?;
         let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);
         let on_digit = |x: f64| self.digit.contains(Position::along(x));
         LocatorFault::check_numbers("gauge position", places, on_digit, "on the digit")?;
@@ -324,13 +324,13 @@ impl Locate for DigitLocator {
     }
 }
 
-/// Pieces whose |r|² is larger than the least by this have no weight: e⁻³⁰.
+/// Pieces with |r|² above the least by more than this have no weight: e⁻³⁰.
 const MOST_EXCESS: f64 = 60.0;
-/// Points of a curve of contacts that explain a reading alike.
+/// Points of a curve of contacts that explain a reading equally well.
 const CURVE_POINTS: usize = 96;
 
-/// The posterior of position and force. Before the reading it is flat over the position and over the logarithm of the force:
-/// a contact anywhere, and of any order of magnitude.
+/// The posterior of position and force. The prior is flat over the position and over the logarithm of the force: a contact anywhere, and of any order
+/// of magnitude.
 struct Posterior {
     /// Most probable first.
     pieces: Vec<Piece>,
@@ -339,7 +339,7 @@ struct Posterior {
 /// The posterior on one stretch.
 #[derive(Clone, Debug)]
 struct Piece {
-    /// The most likely contact; of a curve, its median.
+    /// The most likely contact; for a curve, its median.
     best: Guess,
     /// |r|² of the best contact.
     chi_squared: f64,
@@ -356,18 +356,18 @@ struct Piece {
 enum Marginal {
     /// A normal distribution, cut off at the ends of the stretch.
     Normal { centre_m: f64, sd_m: f64, from_m: f64, to_m: f64 },
-    /// All of it at the best position, as the piece is cut off far out in its tail.
+    /// The whole probability at the best position, as the piece is cut off far out in its tail.
     Point,
     /// Along a curve: equal steps from one position to another, and the share of the probability up to the end of each.
     Curve { from_m: f64, to_m: f64, shares: Vec<f64> },
 }
 
 impl Posterior {
-    /// The posterior of a reading; without pieces where no contact explains any of it.
+    /// The posterior of a reading; without pieces where no contact explains any part of it.
     fn new(likelihood: &Likelihood) -> Self {
         let mut pieces: Vec<Piece> = Vec::new();
         let mut least = f64::INFINITY;
-        // From the tip on, as gauges that must read nothing rule out stretches nearer to the clamp.
+        // From the tip on, as gauges that must read 0 rule out stretches nearer to the clamp.
         for stretch in stretches(likelihood.gauges, likelihood.digit.length_m()).into_iter().rev() {
             if likelihood.least_chi_squared(stretch) > least + MOST_EXCESS {
                 continue;
@@ -385,7 +385,7 @@ impl Posterior {
         posterior
     }
 
-    /// Drops pieces whose best contact does not explain the reading, unless none does; says whether any does.
+    /// Drops pieces with a best contact that does not explain the reading, unless that is so of all; true when at least one explains it.
     fn keep_explanations(&mut self, rule: &StatusRule) -> bool {
         let explains = |piece: &Piece| rule.is_explained(piece.chi_squared);
         let any = self.pieces.iter().any(explains);
@@ -404,10 +404,10 @@ impl Posterior {
         }
     }
 
-    /// The 95 % interval of the position, which holds the estimate.
+    /// The 95 % interval of the position, which contains the estimate.
     ///
-    /// Beside the clamp and the tip equal tails would cut contacts there off: of the intervals that leave equal tails, the lower or the upper tail, it is
-    /// the shortest.
+    /// Beside the clamp and the tip equal tails would exclude contacts there. Of the interval with equal tails and those without a lower or an upper
+    /// tail, it is the shortest.
     fn interval_95_m(&self, estimate_m: f64, length_m: f64) -> (f64, f64) {
         let quantile_m = |share: f64| self.quantile_m(share, length_m);
         let (low_m, high_m) = (quantile_m(0.025), quantile_m(0.975));
@@ -431,7 +431,7 @@ impl Posterior {
 }
 
 impl Piece {
-    /// Whether one gauge alone saw the contact, so that a curve of contacts explains the reading alike.
+    /// Whether only one gauge responded to the contact, so that a curve of contacts explains the reading equally well.
     fn is_curve(&self) -> bool {
         matches!(self.marginal, Marginal::Curve { .. })
     }
@@ -462,8 +462,8 @@ fn normal_mass(low: f64, high: f64) -> f64 {
     if low > 0.0 { normal_cdf(-low) - normal_cdf(-high) } else { normal_cdf(high) - normal_cdf(low) }
 }
 
-/// The piece around the most likely contact on a stretch: |r|² is a parabola about the end of the next Gauss–Newton step, which
-/// may lie beyond the stretch. By Laplace's method its weight is the volume beneath, as far as it is on the stretch.
+/// The piece around the most likely contact on a stretch. |r|² is a parabola about the end of the next Gauss–Newton step, which may lie beyond the
+/// stretch. By Laplace's method the weight of the piece is the volume under its Gaussian within the stretch.
 fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     let (best, fit) = search(likelihood, stretch);
     let factors = likelihood.factors(&fit)?;
@@ -492,8 +492,8 @@ fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     })
 }
 
-/// The piece of a stretch that one gauge alone sees, for an unknown force: at every position some force explains the moment.
-/// A position weighs as much as the logarithm of its force is uncertain.
+/// The piece of a stretch where only one gauge responds, for an unknown force: at every position some force explains the moment. The weight of a
+/// position is the uncertainty of the logarithm of its force.
 fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     let points = curve_points(likelihood, stretch);
     let most = points.iter().map(|point| point.log_weight).fold(f64::NEG_INFINITY, f64::max);
@@ -530,7 +530,7 @@ fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     })
 }
 
-/// A contact of a curve, which stands for its step of the way along the stretch.
+/// A contact of a curve, which represents its step along the stretch.
 struct CurvePoint {
     guess: Guess,
     chi_squared: f64,
@@ -570,7 +570,7 @@ struct Gauge {
     strain: f64,
 }
 
-/// Contacts that the same gauges see: the first `seeing` of them.
+/// Contacts to which the same gauges respond: the first `seeing` of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stretch {
     seeing: usize,
@@ -580,7 +580,7 @@ struct Stretch {
 
 /// The gauges of a reading from clamp to tip, without dead and saturated ones.
 fn gauges(layout: &Layout, reading: &[f64], strains: &[f64]) -> Vec<Gauge> {
-    // Converters saturate by what they read, offset and strain.
+    // Converters saturate at their reading, the sum of offset and strain.
     let inside = |((sensor, read), _): &((&Sensor, &f64), f64)| {
         !sensor.channel.dead && sensor.channel.range.is_none_or(|(low, high)| low < **read && **read < high)
     };
@@ -595,7 +595,7 @@ fn gauges(layout: &Layout, reading: &[f64], strains: &[f64]) -> Vec<Gauge> {
     gauges
 }
 
-/// The stretches on which at least one gauge sees a contact, from clamp to tip.
+/// The stretches on which at least one gauge responds to a contact, from clamp to tip.
 fn stretches(gauges: &[Gauge], length_m: f64) -> Vec<Stretch> {
     let end = |i: usize| gauges.get(i).map_or(length_m, |gauge| gauge.at_m);
     let stretch = |i: usize| Stretch { seeing: i + 1, from_m: gauges[i].at_m, to_m: end(i + 1) };
@@ -603,7 +603,7 @@ fn stretches(gauges: &[Gauge], length_m: f64) -> Vec<Stretch> {
     (0..gauges.len()).map(stretch).filter(|it| it.to_m - it.from_m > 1e-9 * length_m).collect()
 }
 
-/// A reading of a digit, to be explained.
+/// Likelihood of a reading of a digit.
 #[derive(Clone, Copy)]
 struct Likelihood<'a> {
     digit: &'a Digit,
@@ -613,7 +613,7 @@ struct Likelihood<'a> {
     force_n: Option<f64>,
 }
 
-/// A contact that is tried: position along the digit in metres, and force in newtons.
+/// A contact in the search: position along the digit in metres, and force in newtons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Guess {
     position_m: f64,
@@ -621,12 +621,12 @@ struct Guess {
 }
 
 impl Likelihood<'_> {
-    /// The largest force that is looked for at a position.
+    /// The largest force that is searched at a position.
     fn most_force_n(&self, position_m: f64) -> f64 {
         Digit::MOST_LOAD * self.digit.bending_stiffness() / (position_m * position_m)
     }
 
-    /// |r|² of the gauges that see nothing of a contact on a stretch: no contact there does better.
+    /// |r|² of the gauges beyond a stretch, which a contact on it does not strain: a lower bound of |r|² there.
     fn least_chi_squared(&self, stretch: Stretch) -> f64 {
         self.gauges[stretch.seeing..].iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum()
     }
@@ -662,13 +662,13 @@ impl Likelihood<'_> {
         fit.mirrored()
     }
 
-    /// The factors of JᵀJ, whose inverse is the covariance of position and force; without the force where it is known.
-    /// `None` where the reading does not tell them.
+    /// The factors of JᵀJ, the inverse covariance of position and force, or of the position alone where the force is known.
+    /// `None` where the reading does not determine them.
     fn factors(&self, fit: &ContactFit<2>) -> Option<Ldl<2>> {
         Ldl::of_free(&fit.information, [true, self.force_n.is_none()])
     }
 
-    /// The force by which the linear theory explains the reading best at a position: where a search begins.
+    /// The force by which the linear theory explains the reading best at a position: the start of a search.
     fn linear_force_n(&self, position_m: f64, stretch: Stretch) -> f64 {
         let scale = self.digit.strain_per_curvature_m() / self.digit.bending_stiffness();
         let (mut n, mut d) = (0.0, 0.0);
@@ -692,16 +692,16 @@ type Tried = (Guess, ContactFit<2>);
 
 /// Starting positions of the search, as shares of the stretch.
 const START_SHARES: [f64; 3] = [0.1, 0.4, 0.8];
-/// Factors of the linear theory's force at a start: a finger that bends far has shorter levers.
+/// Factors of the linear theory's force at a start: a finger that bends far has shorter lever arms.
 const START_FORCES: [f64; 6] = [1.0, 1.4, 2.0, 3.0, 5.0, 8.0];
-/// Steps that are tried; from a start five to ten reach the last digits.
+/// Most steps; five to ten from a start reach the last digits.
 const MOST_STEPS: usize = 60;
 /// A step of this share of its parameter is the last one.
 const LAST_STEP: f64 = 1e-10;
-/// A step that is halved more often than this gains nothing.
+/// Most halvings of a step; a smaller one no longer reduces |r|².
 const MOST_HALVINGS: usize = 30;
 
-/// The best contact on a stretch: the lowest of the minima that are reached from the best force at each start.
+/// The best contact on a stretch: the lowest of the minima reached from the best force at each start.
 fn search(likelihood: &Likelihood, stretch: Stretch) -> Tried {
     let reached = START_SHARES.map(|share| {
         let position_m = stretch.from_m + share * (stretch.to_m - stretch.from_m);
@@ -774,7 +774,7 @@ fn descend(
     None
 }
 
-/// The guess, held on the stretch and to forces that push and that the model covers.
+/// The guess, clamped to the stretch and to forces that push and that the model covers.
 fn clamped(likelihood: &Likelihood, guess: Guess, stretch: Stretch) -> Guess {
     let position_m = guess.position_m.max(stretch.from_m).min(stretch.to_m);
     let force_n = likelihood.force_n.unwrap_or_else(|| {
@@ -831,7 +831,7 @@ fn deviations(contact: &ContactEstimate) -> [[f64; 2]; 2] {
     [[xx.sqrt(), xf / xx.sqrt()], [0.0, (ff - xf * xf / xx).max(0.0).sqrt()]]
 }
 
-/// A locator by the linear theory, and the exact readings that it is asked for.
+/// A locator by the linear theory, and the exact readings for it.
 pub struct LinearTheory<'a> {
     locator: DigitLocator,
     sensors: CleanSensors<'a>,
@@ -841,14 +841,14 @@ impl<'a> LinearTheory<'a> {
     /// A locator for the bench of a digit; `None` where the linear theory does not suit its sensors.
     pub fn new(setup: &Setup, digit: &'a Digit) -> Option<Self> {
         let unknown = setup.clone().unknown_force();
-        // The estimator learns nothing, but every fit wants a recording.
+        // The estimator does not learn from a recording, but every fit takes one.
         let recording = Recording::new(setup.layout(), "", Vec::new());
         let task = FitTask::new(&unknown, &recording);
         let locator = DigitEstimator::of_theory(DigitTheory::Linear).fit_method(task).ok()?;
         Some(Self { locator, sensors: CleanSensors::new(digit, setup.layout()) })
     }
 
-    /// Errors of position, in metres, and of force, in newtons, of a contact that is read without noise; NaN for a force that is not found.
+    /// Errors of position, in metres, and of force, in newtons, for a contact that is read without noise; NaN for a force without an estimate.
     pub fn errors(&self, contact: Contact) -> [f64; 2] {
         let found = self.locator.locate(&self.sensors.reading(contact)).contact;
         let off_n = found.force_n.map_or(f64::NAN, |force_n| (force_n - contact.force_n).abs());

@@ -40,15 +40,15 @@ fn clean(setup: &Setup, x_m: f64, force_n: f64) -> Vec<f64> {
 /// Results of a locator on contacts between the second gauge and the tip.
 #[derive(Debug, Default)]
 struct Tally {
-    /// Contacts, and those of them that the second gauge reads by five standard deviations of its noise.
+    /// Number of contacts, and of those with a reading of the second gauge above five standard deviations of its noise.
     counts: [f64; 2],
-    /// Mean errors of position and force, of those, over an estimator's at the limit.
+    /// Mean errors of position and force of the latter contacts, over those of an estimator at the limit.
     ratios: [f64; 2],
-    /// Shares of the 95 % intervals of position and force that hold the truth, of all contacts, in %.
+    /// Shares of the 95 % intervals of position and force that contain the truth, for all contacts, in %.
     covered: [f64; 2],
-    /// Largest distance of a point of the centre line from where it is, of all contacts, in % of the length.
+    /// Largest distance of a point of the centre line from its true place, over all contacts, in % of the length.
     shape_percent: f64,
-    /// Share of those contacts that are `located`, in %.
+    /// Share of the latter contacts that are `located`, in %.
     located: f64,
 }
 
@@ -166,7 +166,7 @@ fn what_one_gauge_sees_alone_is_ambiguous_unless_the_force_is_known() {
     let ContactEstimate { position, force_n, uncertainty } = estimate.contact;
     let (low_m, high_m) = uncertainty.unwrap().x_95_m;
     assert!(low_m < 0.006 && high_m > 0.018 && high_m < 0.021, "{low_m} {high_m}");
-    // The moment at the gauge is told, and so force times lever.
+    // The moment at the gauge is determined, and so force times lever arm.
     assert!((force_n.unwrap() * (position.x_m - 0.004) / (2.0 * 0.010) - 1.0).abs() < 0.02);
     let known = setup.clone().known_force(2.0).unwrap();
     let estimate = locator(&known, DigitTheory::Exact).locate(&reading).unwrap();
@@ -180,7 +180,7 @@ fn readings_that_no_push_explains_say_so() {
     let locator = locator(&setup, DigitTheory::Exact);
     let status = |reading: &[f64]| locator.locate(reading).unwrap().status;
     assert_eq!(status(&[1e-6, -1e-6, 0.5e-6, 0.0, -0.5e-6]), Status::NoContact);
-    // Before the first gauge no gauge sees a contact.
+    // Contacts between the clamp and the first gauge strain no gauge.
     assert_eq!(status(&clean(&setup, 0.003, 3.0)), Status::NoContact);
     let pulled: Vec<f64> = clean(&setup, 0.09, 3.0).into_iter().map(|strain| -strain).collect();
     assert_eq!(status(&pulled), Status::OutsideModel);

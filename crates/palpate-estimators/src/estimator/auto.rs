@@ -39,17 +39,18 @@ pub struct Auto {
 }
 
 impl Auto {
-    /// The candidates on a surface without a model by default: those that take seconds.
+    /// The default candidates on a surface without a model: those that take seconds.
     pub fn quick() -> Self {
         Self { only: ["influence", "gaussian-process"].map(str::to_owned).to_vec() }
     }
 }
 
 impl Estimator {
-    /// Estimators among which it chooses at held-out positions; `None` of one that does not choose.
+    /// Estimators among which it chooses at held-out positions; `None` for an estimator that does not choose.
     ///
-    /// `influence` with `structure = "auto"` chooses a structure from 19 positions on, the number from which intervals are checked. With fewer, and in
-    /// fits within folds, the evidence of the presses decides. Where one weight pressed, readings in proportion to the force are the only structure.
+    /// `influence` with `structure = "auto"` chooses a structure from 19 positions on, the number from which intervals are checked. With fewer, and
+    /// in fits within folds, the evidence of the presses decides. For presses of one weight, readings in proportion to the force are the only
+    /// structure.
     pub fn candidates(&self, FitTask { setup, recording, .. }: FitTask) -> Option<Vec<Self>> {
         let all = || {
             let mut all = contenders(setup, self, recording.rows.len());
@@ -75,7 +76,7 @@ impl Estimator {
 }
 
 impl Estimator {
-    /// True of structures of influence functions that learn from presses how readings depend on the force.
+    /// True for structures of influence functions that learn from presses how readings depend on the force.
     fn needs_forces(&self) -> bool {
         matches!(
             self,
@@ -83,8 +84,8 @@ impl Estimator {
         )
     }
 
-    /// The choice among its candidates; `None` of an estimator without candidates. If no structure of influence functions is compared within the
-    /// limit, there is no choice either, and the evidence of the presses decides.
+    /// The choice among its candidates; `None` for an estimator without candidates. If no structure of influence functions is compared within the
+    /// limit, the result is `None` too, and the evidence of the presses decides.
     ///
     /// # Errors
     /// [`FitError::NoCandidate`] without a candidate; [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then
@@ -107,16 +108,16 @@ impl Estimator {
         Ok(locator)
     }
 
-    /// The estimator that it chooses; itself without a choice.
+    /// The chosen estimator; this one without a choice.
     pub(super) fn decided(&self, task: FitTask) -> Result<Self, FitError> {
         Ok(self.decide(task, None)?.map_or_else(|| self.clone(), |choice| choice.best))
     }
 
-    /// The estimator for an evaluation in folds. The structure of influence functions is chosen once, by all presses: the folds would choose
-    /// among the same three at sixteen times the cost. The choice of `auto` is repeated in each fold.
+    /// The estimator for an evaluation in folds. The structure of influence functions is chosen once, by all presses: the folds would choose among
+    /// the same three at sixteen times the cost. The choice of `auto` is repeated in each fold.
     ///
     /// # Errors
-    /// Those of [`Estimator::decide`].
+    /// As for [`Estimator::decide`].
     pub fn for_folds(&self, task: FitTask) -> Result<Self, FitError> {
         if let Self::Auto(_) = self { Ok(self.clone()) } else { self.decided(task) }
     }
@@ -129,7 +130,7 @@ pub struct Choice {
     pub best: Estimator,
     /// Estimators that were tried: the chosen one, then the others by rising score.
     pub tried: Vec<Tried>,
-    /// Names of those that were not, with the reason.
+    /// Names of those that were left out, with the reason.
     pub left_out: Vec<(&'static str, String)>,
     /// Greatest change of each channel by the drift that was subtracted from the held-out readings; `None` without a drift.
     pub drift: Option<Vec<f64>>,
@@ -143,7 +144,7 @@ struct Trial {
 }
 
 impl Trial {
-    /// Rank of the structure of influence functions, the simplest first; `None` of another estimator.
+    /// Rank of the structure of influence functions, the simplest first; `None` for another estimator.
     fn structure_rank(&self) -> Option<usize> {
         let Estimator::Influence(Influence { structure, .. }) = self.estimator else { return None };
         [Structure::ForceLinear, Structure::ForceMonotone, Structure::Free]
@@ -152,7 +153,7 @@ impl Trial {
     }
 
     /// True where the mean score of another is smaller by more than two standard errors over the places. The cost of an estimate is half the sum of
-    /// its error and its interval score over the means of the other, which is the score to the first order.
+    /// its error and its interval score, each over the mean of the other trial; this is the score to first order.
     fn is_significantly_worse_than(&self, best: &Self) -> bool {
         let [error_m, score_m] = [best.tried.mean_error_m, best.tried.interval_score_m];
         let cost = |one: &Located| {
@@ -170,8 +171,8 @@ impl Trial {
     }
 }
 
-/// Number of the chosen trial, of trials by rising score: the first; of structures the simplest that is not significantly worse. The simpler structure
-/// extrapolates to forces that were not pressed.
+/// Number of the chosen trial, among trials by rising score: the first; among structures the simplest that is not significantly worse. The simpler
+/// structure extrapolates to forces beyond those of the presses.
 fn chosen(trials: &[Trial]) -> usize {
     let Some(best) = trials.first() else { return 0 };
     let is_simpler = |trial: &Trial| {
@@ -195,20 +196,20 @@ fn figures(name: &str, evaluation: &Evaluation) -> Option<Tried> {
 /// The time that the choice of an estimator may take.
 #[derive(Clone, Copy)]
 pub struct TimeLimit<'a> {
-    /// Tells seconds since any fixed moment.
+    /// Returns seconds since any fixed moment.
     pub clock: &'a (dyn Fn() -> f64 + Sync),
-    /// Limit in seconds; an estimator that is not done by then is stopped and left out.
+    /// Limit in seconds; an estimator that is not finished by then is stopped and left out.
     pub seconds: f64,
 }
 
 /// Reason of an estimator that [`TimeLimit`] leaves out.
 const NOT_IN_TIME: &str = "it was not done in time";
 
-/// Tares the held-out readings of splits by the drift that the other presses show. Returns the greatest change of each channel, or `None` where
+/// Subtracts from the held-out readings of splits the drift that the other presses show. Returns the greatest change of each channel, or `None` where
 /// no split has a drift.
 ///
 /// # Errors
-/// [`InfluenceFitError`] where a split's presses cannot be learnt from, and when the watch stopped it.
+/// [`InfluenceFitError`] where influence functions cannot be fitted to a split's presses, and when the watch stopped it.
 pub fn take_off_drift(
     setup: &Setup,
     splits: &mut [Split],
@@ -228,7 +229,8 @@ pub fn take_off_drift(
 /// Folds of the cross-validation that chooses.
 pub const CHOICE_FOLDS: usize = 5;
 
-/// The rows by which candidates are compared. Structures of one method keep their order with more than [`ReadingCheck::MOST_ROWS`] rows, and so many are enough.
+/// The rows by which candidates are compared. Structures of one method keep their order with more than [`ReadingCheck::MOST_ROWS`] rows, so that this
+/// number is enough.
 pub(super) fn compared_rows<'a>(candidates: &[Estimator], recording: &'a Recording) -> Cow<'a, Recording> {
     if candidates.iter().all(|candidate| matches!(candidate, Estimator::Influence(_))) {
         ReadingCheck::thinned(recording)
@@ -248,7 +250,7 @@ fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -
     let is_over = || limit.is_some_and(|limit| (limit.clock)() - start_s >= limit.seconds);
     let in_time = |progress| watch.report(progress).is_ok() && !is_over();
     let limited = Watch::new(&in_time);
-    // Stopped by whoever watches, unless it was the time.
+    // Stopped by the caller's watch, unless the time limit was reached.
     let stopped = |stopped: Option<&'static str>| match (watch.round(), limit) {
         (Ok(()), Some(TimeLimit { seconds, .. })) => FitError::NotInTime { seconds, stopped },
         _ => Cancelled.into(),
@@ -265,7 +267,7 @@ fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -
     {
         Ok(drift) => drift.flatten(),
         Err(error) if Cancelled::caused(&error) => return Err(stopped(None)),
-        // Without influence functions there is no drift; when that estimator is tried, its error has the reason.
+        // Without influence functions the drift is unknown; when that estimator is tried, its error gives the reason.
         Err(_) => {
             splits.iter_mut().for_each(|split| split.offsets = None);
             None

@@ -15,29 +15,29 @@ pub struct Comparison {
     pub tried: TimedEvaluation,
 }
 
-/// How estimators are compared.
+/// Options of a comparison of estimators.
 #[derive(Clone, Copy)]
 pub struct CompareOptions<'a> {
     /// Seed of the fits.
     pub seed: u64,
-    /// Tells seconds since any fixed moment, for the times of fits and estimates.
+    /// Returns seconds since any fixed moment, for the times of fits and estimates.
     pub clock: &'a dyn Fn() -> f64,
-    /// Reason why an estimator of this cost is not fitted; `None` where it is.
+    /// Reason why an estimator of this cost is not fitted; `None` to fit it.
     pub refuse: &'a dyn Fn(&Estimator, FitCost) -> Option<String>,
-    /// Watch over the comparison, which receives the name of the estimator that is tried and the number of those done.
+    /// Watch over the comparison; it receives the name of the current estimator and the number of those done.
     pub watch: Watch<'a>,
 }
 
-/// What a comparison came to.
+/// Result of a comparison.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Compared {
     /// Estimators that were tried, by rising mean error.
     pub comparisons: Vec<Comparison>,
-    /// Names of those that were not, with the reason.
+    /// Names of those that were left out, with the reason.
     pub left_out: Vec<(&'static str, String)>,
 }
 
-/// Fits each estimator to the training part of every trial, and locates what that judges by; one that does not suit is left out.
+/// Fits each estimator to the training part of every trial, and locates the contacts of its judged part; unsuitable estimators are left out.
 ///
 /// ```
 /// use palpate_estimators::estimator::{CompareOptions, Estimator, compare, contenders, select};

@@ -4,9 +4,8 @@ use super::Estimator;
 use crate::influence::{Influence, Structure};
 use crate::setup::Setup;
 
-/// The estimators that `auto` chooses from, and that a comparison shows: every contender, with the settings of `own`
-/// where that is of its kind. Networks trained by back-propagation stop after as many presentations as
-/// take some seconds.
+/// The estimators that `auto` chooses from, and that a comparison shows: every contender, with the settings of `own` where the kinds are equal.
+/// Networks trained by back-propagation stop after a number of presentations that takes some seconds.
 pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator> {
     const MOST_PRESENTATIONS: usize = 20_000_000;
     let mut contenders = Estimator::contenders(setup);
@@ -41,7 +40,7 @@ pub struct UnknownEstimator {
 /// The contenders that `only` names by kind or by [`Estimator::name`]; all of them where it is empty.
 ///
 /// # Errors
-/// [`UnknownEstimator`] for a name that is none of theirs.
+/// [`UnknownEstimator`] for a name that no contender has.
 pub fn select(mut contenders: Vec<Estimator>, only: &[String]) -> Result<Vec<Estimator>, UnknownEstimator> {
     let is_named = |contender: &Estimator, name: &str| [contender.kind(), contender.name()].contains(&name);
     if let Some(name) = only.iter().find(|name| !contenders.iter().any(|contender| is_named(contender, name)))

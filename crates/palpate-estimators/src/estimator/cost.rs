@@ -1,7 +1,7 @@
-//! The cost of a fit, before it is begun: memory and time by the sizes of what each method factors and tabulates.
+//! The cost of a fit, estimated before it starts: memory and time by the sizes of the matrices and tables of each method.
 //!
-//! Times are for one core that has other work too, and on an idle one up to four times too long. `cargo bench -p palpate --bench cost` measures
-//! them, and docs/measured.md has what it found.
+//! Times are for one core with other work; on an idle core they are up to four times too long. `cargo bench -p palpate --bench cost` measures them,
+//! and docs/measured.md has the results.
 
 use super::auto::compared_rows;
 use super::{CHOICE_FOLDS, Estimator, is_learnt};
@@ -25,12 +25,12 @@ use std::collections::HashSet;
 pub struct FitCost {
     /// Memory at its peak, in bytes, besides the program itself.
     pub memory_bytes: f64,
-    /// Time of one core, in seconds; the most where a method may end earlier.
+    /// Time of one core, in seconds; an upper bound where a method may end earlier.
     pub seconds: f64,
 }
 
 impl FitCost {
-    /// The cost with that of the check of intervals at held-out places, where the recording has enough of these.
+    /// The cost with that of the check of intervals at held-out places, where the recording has enough places.
     #[must_use]
     pub fn with_interval_check(self, recording: &Recording) -> Self {
         let places = recording.distinct_positions().len();
@@ -49,11 +49,11 @@ impl FitCost {
 const NUMBER: f64 = 8.0;
 /// Multiply-adds of a product of large matrices in a second.
 const PRODUCTS: f64 = 12e9;
-/// Those of narrow ones.
+/// Multiply-adds of a product of narrow matrices in a second.
 const NARROW: f64 = 5e9;
-/// Those of a triangular solution for one vector.
+/// Multiply-adds of a triangular solution for one vector in a second.
 const SOLVED: f64 = 2e9;
-/// Those of loops over what does not fit into the cache.
+/// Multiply-adds of loops over more than fits into the cache, in a second.
 const LOOPS: f64 = 1e9;
 
 /// Sizes of a task.
@@ -85,7 +85,7 @@ impl Estimator {
                 let cost = sizes.process(sizes.rows, coordinates, 2.0, process.search_points);
                 let kinds =
                     process.features.map_or_else(|| FeatureKind::contenders(setup, recording).len(), |_| 1);
-                // Widths take a search of their own, and the posteriors of what folds leave.
+                // Widths need a search of their own, and the posteriors of the folds' remainders.
                 let searched = sizes.rows.min(process.search_points as f64);
                 let widths = sizes.process(searched, coordinates, 2.0, process.search_points).seconds
                     + folds_taken(recording.rows.len()) as f64 * conditioning_seconds(sizes.rows);
@@ -101,7 +101,7 @@ impl Estimator {
                     / LOOPS,
             },
             Self::Network(network) => {
-                /// Seconds of a node's activation, and of a weight's use and change, in a presentation.
+                /// Seconds of a node's activation, and of a weight's use and update, in a presentation.
                 const NODE_SECONDS: f64 = 24e-9;
                 const WEIGHT_SECONDS: f64 = 0.7e-9;
                 let nodes = network.hidden.iter().sum::<usize>() as f64;
@@ -124,7 +124,7 @@ impl Estimator {
     }
 }
 
-/// Memory and time of the check beside a learnt method.
+/// Memory and time of the reading check of a learnt method.
 fn check_cost(setup: &Setup, recording: &Recording) -> FitCost {
     let recording = ReadingCheck::thinned(recording);
     match setup.surface() {
@@ -133,7 +133,7 @@ fn check_cost(setup: &Setup, recording: &Recording) -> FitCost {
     }
 }
 
-/// Seconds that the posterior of so many points takes, of known hyperparameters.
+/// Seconds for the posterior of so many points, with known hyperparameters.
 fn conditioning_seconds(points: f64) -> f64 {
     if points <= MOST_EXACT as f64 {
         return points.powi(3) / 3.0 / PRODUCTS + points * points * 4e-9;
@@ -169,7 +169,7 @@ impl Sizes {
         let weights = widths.windows(2).map(|pair| (pair[0] + 1) * pair[1]).sum::<usize>() as f64;
         let steps = 2.0 * levenberg.ensemble as f64 * f64::from(levenberg.max_iterations);
         let rows = self.rows.min(network::MOST_PRESSES as f64);
-        // The first output's Jacobian, others that join it in the cache, and the curvature.
+        // The first output's Jacobian, the others, which share the cache with it, and the curvature.
         let products = 0.5 * (1.0 + outputs as f64) * rows * weights * weights + 1.5 * weights.powi(3);
         FitCost {
             memory_bytes: 3.0 * NUMBER * (self.rows * self.channels + outputs as f64 * rows * weights),
@@ -179,9 +179,9 @@ impl Sizes {
 
     /// A Gaussian process of so many points, their coordinates and outputs, and points of the search for its hyperparameters.
     fn process(&self, points: f64, coordinates: f64, outputs: f64, search_points: usize) -> FitCost {
-        /// Evaluations of the evidence that a search takes as a rule, each a factor and an inverse.
+        /// Typical number of evaluations of the evidence in a search, each with a factorisation and an inverse.
         const EVALUATIONS: f64 = 20.0;
-        /// Seconds that one coordinate of two points takes in all of them.
+        /// Seconds of one coordinate of two points over all evaluations.
         const PAIR_SECONDS: f64 = 1e-7;
         let searched = points.min(search_points as f64);
         let search =
@@ -226,10 +226,10 @@ impl Sizes {
         let kept = if self.presses <= MOST_EXACT as f64 { self.presses } else { INDUCING as f64 };
         let table = FitCost {
             memory_bytes: NUMBER * nodes * depth * (5.0 * self.channels + 16.0),
-            // Each node twice: some tables are made again, finer.
+            // Each node twice: some tables are computed again on a finer grid.
             seconds: 2.0 * nodes * depth * (kept * (self.channels + 30.0) / LOOPS / 4.0 + 6e-5),
         };
-        // A fifth of the presses is held out of a second process.
+        // A fifth of the presses is held out from a second process.
         process.and(FitCost { memory_bytes: 0.0, ..process }).and(table)
     }
 
@@ -249,11 +249,11 @@ impl Sizes {
         })
     }
 
-    /// Influence functions of presses with forces: hyperparameters are searched, two priors are judged, each by as many factors as there are
-    /// folds, and each channel has one of its own; residuals of every press are another. Presses are learnt from again without those that
-    /// nothing explains, and with noise by place.
+    /// Cost of influence functions of presses with forces. Hyperparameters are searched, and two priors are judged, each by as many factors as there
+    /// are folds; each channel has one factor of its own, and residuals of every press are another. The fit is repeated without the presses that the
+    /// model does not explain, and with noise by place.
     fn force_linear(&self, extent: Extent) -> FitCost {
-        /// Evaluations of the evidence in a search, and how often presses are learnt from, as a rule.
+        /// Typical number of evaluations of the evidence in a search, and of fits to the presses.
         const EVALUATIONS: f64 = 700.0;
         const LEARNT: f64 = 2.2;
         let presses = self.presses.min(force_linear::MOST_PRESSES as f64);
@@ -262,7 +262,7 @@ impl Sizes {
         let kept = presses * (1.0 - 1.0 / force_linear::FOLDS as f64);
         let factors = 2.0 * force_linear::FOLDS as f64 * kept.powi(3) / 3.0 + presses.powi(3);
         let learning = EVALUATIONS * searched.powi(3) / 3.0 / NARROW + factors / PRODUCTS;
-        // Each position of few presses is left out of a fit once more.
+        // With few presses, each position is left out of a fit once more.
         let fits = if presses < force_linear::FEW { 1.0 + presses } else { 1.0 };
         FitCost {
             memory_bytes: NUMBER * (7.0 * presses * presses + 4.0 * nodes * self.channels)

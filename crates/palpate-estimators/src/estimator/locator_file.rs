@@ -6,16 +6,16 @@ use crate::fit::{LARGEST, LocatorFault};
 /// The `format` of every locator file.
 const FORMAT: &str = "palpate-locator";
 
-/// The version of the format that this palpate writes and reads.
+/// The version of the format that this palpate reads and writes.
 pub const FORMAT_VERSION: u32 = 1;
 
 /// A locator file that cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LocatorFileError {
-    /// Not the JSON of a locator; the error names line and column.
+    /// Text that is not the JSON of a locator; the error names line and column.
     #[error("this is not a locator file: {0}")]
     Json(#[from] serde_json::Error),
-    /// A number that no locator has; the reader of the JSON sees it only when the object around it is whole.
+    /// A number that is invalid in a locator; the JSON reader checks it only after the whole object around it.
     #[error("{}", without_place(.error))]
     Number {
         /// The number with its name and bound.
@@ -37,7 +37,7 @@ pub enum LocatorFileError {
         /// Value in the file.
         found: u32,
     },
-    /// Numbers that do not fit together.
+    /// Numbers that are inconsistent.
     #[error("{fault}")]
     Fault {
         /// What is wrong.
@@ -45,7 +45,7 @@ pub enum LocatorFileError {
         /// Line and column, from 1, where they are known.
         place: Option<(usize, usize)>,
     },
-    /// A number beyond all that a surface, a sensor or a sum of their squares can be.
+    /// A number larger than any of a surface, a sensor or a sum of their squares.
     #[error("{value:e} is beyond ±{LARGEST:e}, within which every number of a locator lies")]
     TooLarge {
         /// The number.
@@ -56,7 +56,7 @@ pub enum LocatorFileError {
 }
 
 impl LocatorFileError {
-    /// Line and column, from 1, where the JSON is at fault.
+    /// Line and column, from 1, of the fault in the JSON.
     pub fn place(&self) -> Option<(usize, usize)> {
         match self {
             Self::Json(error) if error.line() > 0 => Some((error.line(), error.column().max(1))),
@@ -67,7 +67,7 @@ impl LocatorFileError {
     }
 }
 
-/// Fields that every version of the file begins with.
+/// First fields of every version of the file.
 #[derive(serde::Deserialize)]
 struct Heading {
     format: String,
@@ -98,7 +98,7 @@ impl Locator {
     /// ```
     ///
     /// # Errors
-    /// [`LocatorFileError::Json`] when a number has no JSON, which no fitted locator has.
+    /// [`LocatorFileError::Json`] for a number that JSON cannot express; a fitted locator has no such number.
     pub fn to_json(&self) -> Result<String, LocatorFileError> {
         let file = File { format: FORMAT.to_owned(), format_version: FORMAT_VERSION, locator: self };
         Ok(serde_json::to_string_pretty(&file)? + "\n")
@@ -107,7 +107,7 @@ impl Locator {
     /// Reads the text of a locator file.
     ///
     /// # Errors
-    /// [`LocatorFileError`], with the place where there is one.
+    /// [`LocatorFileError`], with the place where it is known.
     pub fn from_json(text: &str) -> Result<Self, LocatorFileError> {
         let heading: Heading = serde_json::from_str(text)?;
         if heading.format != FORMAT {
@@ -148,12 +148,12 @@ fn numbers(text: &str) -> impl Iterator<Item = (usize, f64)> {
     })
 }
 
-/// The byte behind a string, of which `at` is the first character.
+/// Index of the byte after a string with its first character at `at`.
 fn end_of_string(bytes: &[u8], mut at: usize) -> usize {
     while let Some(byte) = bytes.get(at) {
         match byte {
             b'"' => return at + 1,
-            // Whatever is escaped ends no string.
+            // An escaped character does not end a string.
             b'\\' => at += 2,
             _ => at += 1,
         }
@@ -161,7 +161,7 @@ fn end_of_string(bytes: &[u8], mut at: usize) -> usize {
     at
 }
 
-/// An error of the JSON; of a number that is out of its range, with the number's own place.
+/// An error of the JSON; for a number out of its range, with the number's own place.
 fn at_number(error: serde_json::Error, text: &str) -> LocatorFileError {
     match place_within_object(&error, text) {
         Some(place) => LocatorFileError::Number { error, place },
@@ -169,8 +169,8 @@ fn at_number(error: serde_json::Error, text: &str) -> LocatorFileError {
     }
 }
 
-/// Line and column, from 1, of the number that an error names ("…is -0.4; it must be greater than 0"): the only one of this value in the object whose end
-/// is the error's place.
+/// Line and column, from 1, of the number that an error names ("…is -0.4; it must be greater than 0"). It is the only number of this value in
+/// the object that ends at the error's place.
 fn place_within_object(error: &serde_json::Error, text: &str) -> Option<(usize, usize)> {
     let told = error.to_string();
     let (named, _) = told.split_once("; it must be ")?;
@@ -191,13 +191,13 @@ fn without_place(error: &serde_json::Error) -> String {
     told.strip_suffix(&place).unwrap_or(&told).to_owned()
 }
 
-/// The byte behind line and column, both from 1.
+/// The byte at line and column, both from 1.
 fn byte_at(text: &str, line: usize, column: usize) -> Option<usize> {
     let before: usize = text.split_inclusive('\n').take(line.checked_sub(1)?).map(str::len).sum();
     Some((before + column).min(text.len()))
 }
 
-/// The byte at which the object or list that ends before `end` begins; that of the text where none does.
+/// The byte at which the object or list that ends before `end` begins; the start of the text where there is none.
 fn start_of_object(bytes: &[u8], end: usize) -> usize {
     let mut open = Vec::new();
     let (mut at, mut start) = (0, 0);
@@ -216,8 +216,7 @@ fn start_of_object(bytes: &[u8], end: usize) -> usize {
     start
 }
 
-/// Line and column, from 1, of the number that is at fault: the only one of this value, or the first that is too small, which is none that a
-/// fit would write.
+/// Line and column, from 1, of the number at fault: the only one of this value, or the first that is too small, as a fit never writes such a number.
 fn place_of(fault: &LocatorFault, text: &str) -> Option<(usize, usize)> {
     let mut places = numbers(text).filter(|(_, number)| number.to_bits() == fault.value().to_bits());
     let (at, _) = places.next()?;

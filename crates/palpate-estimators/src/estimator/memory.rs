@@ -1,4 +1,4 @@
-//! The most memory that work may need, by the estimate that is made before it is begun.
+//! The memory limit of work, checked against an estimate before the work starts.
 
 use super::{Estimator, FitCost, contenders};
 use crate::recording::Recording;
@@ -6,7 +6,7 @@ use crate::setup::Setup;
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
-/// The most memory that work may need, in bytes: greater than 0.
+/// The most memory that work may use, in bytes: greater than 0.
 ///
 /// ```
 /// use palpate_estimators::estimator::MemoryLimit;
@@ -22,18 +22,18 @@ pub struct MemoryLimit {
     bytes: f64,
 }
 
-/// A limit of memory that is none.
+/// An invalid limit of memory.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MemoryLimitError {
-    /// The text is no number with a unit.
-    #[error("`{0}` is no size of memory; it is written as in \"2 GB\" or \"500 MB\"")]
+    /// The text is not a number with a unit.
+    #[error("`{0}` is not a size of memory; it is written as in \"2 GB\" or \"500 MB\"")]
     Text(String),
-    /// There is no such size.
+    /// A size that is not greater than 0 and finite.
     #[error("{0} bytes of memory; it must be greater than 0, and finite")]
     Size(f64),
 }
 
-/// Work that is estimated to need more memory than it may.
+/// Work with an estimated memory above the limit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{work} needs about {} of memory; the limit is {limit}", Size(*needed_bytes))]
 pub struct MemoryExceeded {
@@ -46,7 +46,7 @@ pub struct MemoryExceeded {
 }
 
 impl MemoryLimit {
-    /// A limit of so many bytes.
+    /// A limit in bytes.
     ///
     /// # Errors
     /// [`MemoryLimitError`] for a size that is not greater than 0, or not finite.
@@ -54,10 +54,10 @@ impl MemoryLimit {
         if bytes.is_finite() && bytes > 0.0 { Ok(Self { bytes }) } else { Err(MemoryLimitError::Size(bytes)) }
     }
 
-    /// Refuses work that is estimated to need more.
+    /// Refuses work with an estimated memory above the limit.
     ///
     /// # Errors
-    /// [`MemoryExceeded`] for that.
+    /// [`MemoryExceeded`] for such work.
     pub fn check(self, work: &str, needed_bytes: f64) -> Result<(), MemoryExceeded> {
         if needed_bytes <= self.bytes {
             return Ok(());
@@ -65,15 +65,15 @@ impl MemoryLimit {
         Err(MemoryExceeded { work: work.to_owned(), needed_bytes, limit: self })
     }
 
-    /// Refuses a fit whose estimated cost is more.
+    /// Refuses a fit with an estimated cost above the limit.
     ///
     /// # Errors
-    /// [`MemoryExceeded`] for that.
+    /// [`MemoryExceeded`] for such a fit.
     pub fn check_fit(self, estimator: &Estimator, cost: FitCost) -> Result<(), MemoryExceeded> {
         self.check(&format!("the fit of {}", estimator.kind()), cost.memory_bytes)
     }
 
-    /// Advice where a fit is refused, with the kinds of estimators that need no more.
+    /// Advice for a refused fit, with the kinds of estimators that need no more memory than the limit.
     pub fn remedy(self, refused: &Estimator, setup: &Setup, recording: &Recording) -> String {
         let others = contenders(setup, refused, recording.rows.len());
         let suits = |other: &&Estimator| {

@@ -1,4 +1,4 @@
-//! Every estimator as one type: whoever evaluates, studies, reports or listens treats all alike.
+//! All estimators as one type, so that evaluations, studies, reports and listeners treat them alike.
 
 mod auto;
 mod compare;
@@ -57,7 +57,7 @@ use crate::status::FalseAlarmRate;
 use palpate_mechanics::surface::SurfaceSpec;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Makes of the one list of estimators the types that are any of them.
+/// Defines the types that represent any estimator, from one list of all estimators.
 macro_rules! estimators {
     ($($(#[doc = $doc:literal])* $kind:literal $variant:ident($config:ty) $method:ty, $error:ty;)*) => {
         /// A configured method; fitting it to a recording gives a locator.
@@ -85,7 +85,7 @@ macro_rules! estimators {
             /// The fit was stopped.
             #[error("{0}")]
             Cancelled(#[from] Cancelled),
-            /// The choice of an estimator had no time to try any.
+            /// The time limit passed before the choice finished an estimator.
             #[error("no estimator was done within the {seconds} s that the choice may take ({} was stopped): give it more time, or name an estimator", stopped.map_or_else(|| "the search for a drift".to_owned(), |kind| format!("`{kind}`")))]
             NotInTime {
                 /// The time limit.
@@ -96,7 +96,7 @@ macro_rules! estimators {
             /// The estimators that `only` names do not suit the surface.
             #[error("no estimator that `only` names suits the surface")]
             NoCandidate,
-            /// No estimator suits the recording; the last one's complaint.
+            /// No estimator suits the recording; contains the last one's error.
             #[error("no estimator suits the recording: {0}")]
             Choice(Box<EvaluationError<FitError>>),
             $(#[doc = concat!("Why `", $kind, "` does not suit it.")]
@@ -142,7 +142,7 @@ macro_rules! estimators {
                 influence.drift_course(task, asked)
             }
 
-            /// Fits with a seed, watched. A method that is learnt has a [`ReadingCheck`] beside it.
+            /// Fits with a seed, watched. A learnt method gets a [`ReadingCheck`] as well.
             fn fit_without_interval_check(&self, task: FitTask) -> Result<Locator, FitError> {
                 if let Self::Auto(_) = self {
                     return self.decided(task)?.fit_without_interval_check(task);
@@ -206,13 +206,13 @@ estimators! {
     "centroid" Centroid(Centroid) CentroidLocator, CentroidFitError;
 }
 
-/// True of kinds that map a reading to a position without a model of readings: these have a [`ReadingCheck`].
+/// True for kinds that map a reading to a position without a model of readings: these have a [`ReadingCheck`].
 pub(crate) fn is_learnt(kind: &str) -> bool {
     matches!(kind, "network" | "network-lm" | "gaussian-process" | "neighbours" | "centroid")
 }
 
 impl Estimator {
-    /// Fits the method, and beside it, where it is learnt, the reading check that `check` gives of the same recording.
+    /// Fits the method and, where it is learnt, adds the reading check that `check` fits to the same recording.
     fn fit_beside(
         &self,
         task: FitTask,
@@ -232,14 +232,15 @@ impl Estimator {
 }
 
 impl Method {
-    /// True of a method with intervals from errors at held-out positions, reading by reading.
+    /// True for a method with intervals from errors at held-out positions, reading by reading.
     fn knows_its_errors(&self) -> bool {
         matches!(self, Self::GaussianProcess(locator) if locator.widths.is_some())
     }
 }
 
 impl Estimator {
-    /// The rows that a method learns from: those without contact teach offset and noise, which methods that go from a reading to a position do not have.
+    /// The rows that a method learns from. Rows without contact determine offset and noise, which methods that map a reading to a position do not
+    /// have.
     fn learnt_from<'a>(&self, recording: &'a Recording) -> Cow<'a, Recording> {
         match self {
             Self::Influence(_) | Self::ClosedForm(_) | Self::Digit(_) | Self::Auto(_) => {
@@ -249,7 +250,7 @@ impl Estimator {
         }
     }
 
-    /// Name in comparisons: the kind, and with it the structure that an influence estimator states.
+    /// Name in comparisons: the kind, with the structure where an influence estimator states one.
     pub fn name(&self) -> &'static str {
         let Self::Influence(Influence { structure, .. }) = self else { return self.kind() };
         match structure {
@@ -287,7 +288,8 @@ impl Estimator {
         contenders
     }
 
-    /// The estimator of a bench whose rig names none: on a surface without a model the [quick](Auto::quick) choice, elsewhere the default network.
+    /// The default estimator of a bench, where the rig names none: on a surface without a model the [quick](Auto::quick) choice, elsewhere the
+    /// default network.
     pub fn usual(setup: &Setup) -> Self {
         match setup.surface().model() {
             Some(_) => Self::default(),
@@ -295,7 +297,7 @@ impl Estimator {
         }
     }
 
-    /// A digit's estimator by the linear theory of bending, to be compared with.
+    /// A digit's estimator by the linear theory of bending, for comparison.
     pub const LINEAR_DIGIT: Self = Self::Digit(DigitEstimator::of_theory(DigitTheory::Linear));
 
     /// Distinct contact positions that a recording must have for fitting.
@@ -306,7 +308,7 @@ impl Estimator {
         }
     }
 
-    /// False-alarm rate of its locators; `None` where they have no `no_contact`, and of `auto`.
+    /// False-alarm rate of its locators; `None` for locators without `no_contact`, and for `auto`.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         match self {
             Self::Influence(config) => Some(config.false_alarm_rate),
@@ -316,7 +318,7 @@ impl Estimator {
         }
     }
 
-    /// The most rounds that one fit has; 0 where that is not known before.
+    /// Upper bound of the rounds of one fit; 0 where it is unknown.
     pub fn most_rounds(&self) -> u64 {
         match self {
             Self::Network(config) => u64::from(config.training.max_epochs),
@@ -375,31 +377,31 @@ where
 /// A locator without an untouched reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "a locator of kind `{kind}`, fitted to a recording without rows of force 0, does not know what its surface reads untouched"
+    "a locator of kind `{kind}`, fitted to a recording without rows of force 0, has no untouched reading of its surface"
 )]
 pub struct NoBaseline {
     /// The locator's kind.
     pub kind: &'static str,
 }
 
-/// A channel that cannot be left out.
+/// A channel that cannot be disabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LeaveOutError {
-    /// There is no such channel.
-    #[error("there is no channel {channel}; the locator has channels 1 to {channels}")]
+    /// The channel does not exist.
+    #[error("no channel has the number {channel}; the locator has channels 1 to {channels}")]
     NoChannel {
-        /// Which was named, from 1.
+        /// Number of the named channel, from 1.
         channel: usize,
         /// Channels of the locator.
         channels: usize,
     },
-    /// The method cannot do without it.
+    /// The method needs the channel.
     #[error("a locator of kind `{kind}` needs every channel: fit it again without the dead one")]
     Needed {
         /// The locator's kind.
         kind: &'static str,
     },
-    /// It is the last one.
+    /// The channel is the last one.
     #[error("it is the last living channel; at least 1 must be left")]
     NoneLeft,
 }
@@ -421,10 +423,10 @@ impl Locator {
         }
     }
 
-    /// Leaves a dead channel out of all sums from now on, without fitting again.
+    /// Disables a dead channel from now on, without fitting again.
     ///
     /// # Errors
-    /// [`LeaveOutError`] when there is no such channel, or the method needs it.
+    /// [`LeaveOutError`] when the channel does not exist, or the method needs it.
     pub fn leave_out(&mut self, channel: usize) -> Result<(), LeaveOutError> {
         let channels = self.setup.layout().len();
         if channel >= channels {
@@ -459,8 +461,8 @@ impl Locator {
         self.method.kind()
     }
 
-    /// Untouched reading of each channel, as calibration left it: the offsets that influence functions were learnt with, the mean of the
-    /// recording's rows without contact, or nothing at all where a model says what a contact adds.
+    /// Untouched reading of each channel, as calibration left it: the offsets of the influence functions, the mean of the
+    /// recording's rows without contact, or 0 where a model gives what a contact adds.
     ///
     /// # Errors
     /// [`NoBaseline`] without all of them.
@@ -478,7 +480,7 @@ impl Locator {
         known.ok_or(NoBaseline { kind: self.kind() })
     }
 
-    /// A tare of its readings, whose baseline is as calibration left it. Followed, it takes the latest untouched reading where the calibration
+    /// A tare of its readings, with the baseline that calibration left. When it follows, it takes the latest untouched reading where the calibration
     /// did ([`Zero::Last`]); the first reading is untouched then.
     ///
     /// ```
@@ -506,7 +508,7 @@ impl Locator {
         let tare = Tare::new(self.untouched_reading()?);
         let channels = self.layout().len();
         let tare = match (self.setup.recording_columns().zero, &self.untouched_drift) {
-            // The calibration has no offsets: the first reading in use is the first zero, whatever it reads.
+            // The calibration has no offsets: the first reading in use is the first zero, at any value.
             (Zero::Last, _) => tare.and_then(|tare| {
                 tare.with_last_zero().with_drift(vec![0.0; channels], vec![f64::INFINITY; channels])
             }),
@@ -515,11 +517,11 @@ impl Locator {
             }
             (Zero::None, None) => tare,
         };
-        // Channels and values of a locator are checked.
+        // Channels and values of a locator are valid.
         tare.map_err(|_| NoBaseline { kind: self.kind() })
     }
 
-    /// Locates a reading by a tare of its own, which follows the baseline as [`Tare::follow`] does. `tared` is the tared reading afterwards.
+    /// Locates a reading by its own tare, which follows the baseline as [`Tare::follow`] does. Afterwards `tared` contains the tared reading.
     ///
     /// # Errors
     /// [`TareError`] for another number of channels or a value that is not finite.
@@ -529,11 +531,11 @@ impl Locator {
         reading: &[f64],
         tared: &mut [f64],
     ) -> Result<Estimate, TareError> {
-        // A locator refuses no tared reading: its channels and values were checked by the tare.
+        // A locator accepts every tared reading: the tare has checked its channels and values.
         tare.follow(reading, tared, |tared| self.locate(tared).unwrap_or_else(|_| self.anywhere()))
     }
 
-    /// The lightest touch that this locator finds, of one that is found by noise alone: contacts have to exceed the scatter of its untouched rows too.
+    /// The smallest detectable force of this locator, from that by noise alone: contacts must exceed the scatter of the untouched rows too.
     #[must_use]
     pub fn beyond_scatter<'a>(&self, touch: LightestTouch<'a>) -> LightestTouch<'a> {
         match &self.untouched_scatter {
@@ -542,14 +544,14 @@ impl Locator {
         }
     }
 
-    /// False-alarm rate; `None` of a method without `no_contact`.
+    /// False-alarm rate; `None` for a method without `no_contact`.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         let of_check = || self.check.as_ref()?.false_alarm_rate();
         let of_scatter = || self.untouched_scatter.as_ref().map(|_| FalseAlarmRate::default());
         self.method.false_alarm_rate().or_else(of_check).or_else(of_scatter)
     }
 
-    /// True of a locator with forces in its estimates, known or estimated.
+    /// True for a locator with forces in its estimates, known or estimated.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, fit::Fit, network::Network, influence::Influence, setup::Setup};
@@ -574,7 +576,7 @@ impl Locator {
         }
     }
 
-    /// The influence functions of a surface without a model that are proportional to force, or to a power of it; `None` of any other locator.
+    /// The influence functions of a surface without a model that are proportional to force, or to a power of it; `None` for any other locator.
     pub fn force_linear(&self) -> Option<&ForceLinearLocator> {
         match &self.method {
             Method::Influence(InfluenceLocator::ForceLinear(linear)) => Some(linear),
@@ -582,7 +584,7 @@ impl Locator {
         }
     }
 
-    /// The influence functions that it has learnt, with their uncertainty; `None` of a method without any.
+    /// The learnt influence functions, with their uncertainty; `None` for a method without any.
     pub fn influences_at_nodes(&self) -> Option<InfluencesAtNodes> {
         match &self.method {
             Method::Influence(influence) => influence.influences_at_nodes(),
@@ -590,10 +592,10 @@ impl Locator {
         }
     }
 
-    /// Setup with the learnt noise, if there is one, and with unused channels dead.
+    /// Setup with the learnt noise, if any, and with unused channels dead.
     ///
     /// # Errors
-    /// [`SetupError`] for noise that no sensor has.
+    /// [`SetupError`] for an invalid noise.
     pub fn learnt_setup(&self) -> Result<Setup, SetupError> {
         let mut setup = self.setup.clone();
         if let Some(linear) = self.force_linear() {
@@ -616,7 +618,7 @@ impl Locator {
         }
     }
 
-    /// Outcome of its training, where it was trained by epochs.
+    /// Outcome of the training, for a method trained by epochs.
     pub fn training_outcome(&self) -> Option<TrainingOutcome> {
         match &self.method {
             Method::Network(network) => Some(network.parts().outcome),
@@ -630,15 +632,15 @@ impl Locator {
     /// by the mechanics of the bench for any other.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] for a measured surface, a live sensor without noise, or when none is alive.
+    /// [`LoadSensorsError`] for a measured surface, a live sensor without noise, or a layout of dead sensors.
     pub fn load_sensors(&self) -> Result<LoadSensors<'_>, LoadSensorsError> {
         self.load_sensors_watched(Watch::NONE)
     }
 
-    /// The same, watched while the surface is solved.
+    /// Channels that read a spread load, as of [`Locator::load_sensors`], watched while the surface is solved.
     ///
     /// # Errors
-    /// Those of [`Locator::load_sensors`] and of [`LoadSensors::new_watched`].
+    /// As for [`Locator::load_sensors`] and [`LoadSensors::new_watched`].
     pub fn load_sensors_watched(&self, watch: Watch) -> Result<LoadSensors<'_>, LoadSensorsError> {
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
@@ -658,10 +660,10 @@ pub struct Tracking {
     likelihood: Arc<dyn Likelihood>,
 }
 
-/// A locator by which moving contacts cannot be followed, or not in that way.
+/// A locator that cannot track moving contacts, or not with this configuration.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotTrackable {
-    /// It has no likelihood of readings.
+    /// The method has no likelihood of readings.
     #[error("a moving contact is followed by an influence locator of a surface with a model; this one is of kind `{kind}`{}", if *measured { ", on a measured surface" } else { "" })]
     Kind {
         /// The locator's kind.
@@ -669,15 +671,15 @@ pub enum NotTrackable {
         /// Whether its surface has no model.
         measured: bool,
     },
-    /// The shape in which its surface swings is not known.
+    /// The first mode of its surface is not known.
     #[error(
-        "inertia is reckoned with on a beam on two simple supports, whose first mode is half a sine; this surface is held otherwise: follow it in balance, without a natural frequency"
+        "inertia is included on a beam on two simple supports, where the first mode is half a sine; this surface has other supports: follow it in balance, without a natural frequency"
     )]
     Mode,
 }
 
 impl Tracking {
-    /// The likelihood to follow contacts by.
+    /// The likelihood for tracking contacts.
     pub fn likelihood(&self) -> Arc<dyn Likelihood> {
         Arc::clone(&self.likelihood)
     }

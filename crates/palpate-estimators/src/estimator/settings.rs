@@ -1,4 +1,4 @@
-//! An estimator's settings in words, so that a report can list those of any method.
+//! An estimator's settings in words, for reports on any method.
 
 use super::{Auto, Estimator};
 use crate::digit::{DigitEstimator, DigitTheory};
@@ -13,7 +13,7 @@ use palpate_mechanics::units::format_count;
 /// One setting of an estimator.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// Key in a rig's `[estimator]`, or a name of its own where a rig cannot change it.
+    /// Key in a rig's `[estimator]`, or another name where a rig cannot change it.
     pub key: &'static str,
     /// Name, in words.
     pub name: &'static str,
@@ -50,7 +50,7 @@ impl Estimator {
                 vec![Setting::new("most_neighbours", "neighbours tried, at most", config.most.to_string())]
             }
             Self::ClosedForm(config) => vec![false_alarms(config.false_alarm_rate)],
-            // They have nothing to set.
+            // They have no settings.
             Self::GaussianProcess(_) | Self::Centroid(_) => Vec::new(),
             Self::Auto(Auto { only }) if only.is_empty() => Vec::new(),
             Self::Auto(Auto { only }) => vec![Setting::new("only", "candidates", only.join(", "))],
@@ -59,7 +59,7 @@ impl Estimator {
 }
 
 fn false_alarms(rate: FalseAlarmRate) -> Setting {
-    Setting::new("false_alarm_rate", "untouched readings taken for a contact", rate.to_string())
+    Setting::new("false_alarm_rate", "untouched readings mistaken for a contact", rate.to_string())
 }
 
 fn nodes(hidden: &[usize]) -> String {
@@ -74,7 +74,7 @@ fn influence(config: Influence) -> Vec<Setting> {
     };
     let force = match config.force_sd_n {
         Some(sd_n) => format!("about the bench's, ± {sd_n} N (1 σ)"),
-        None => "as the bench says: known, or unknown".to_owned(),
+        None => "known or unknown, as for the bench".to_owned(),
     };
     vec![
         Setting::new("source", "influence functions from", source),

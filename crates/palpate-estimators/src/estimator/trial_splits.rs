@@ -28,7 +28,8 @@ impl<'a> TrialSplits<'a> {
         Self { setup, splits, seed, clock, checks: splits.iter().map(|_| OnceCell::new()).collect() }
     }
 
-    /// Evaluates an estimator as [`evaluate_splits`](crate::evaluation::evaluate_splits) does. The time of a shared check counts for each estimator that has one.
+    /// Evaluates an estimator as [`evaluate_splits`](crate::evaluation::evaluate_splits) does. The time of a shared check counts for each estimator
+    /// with a check.
     pub fn evaluate(
         &self,
         estimator: &Estimator,

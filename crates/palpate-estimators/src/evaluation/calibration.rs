@@ -14,7 +14,7 @@ use palpate_mechanics::sensing::ChannelModel;
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 
-/// A calibration to simulate: where a setup is pressed and how hard, what the locator is told of the force, and the contacts
+/// A calibration to simulate: where a setup is pressed and how hard, whether the locator is given the force, and the contacts
 /// that it is judged by.
 ///
 /// ```
@@ -39,11 +39,11 @@ use palpate_numerics::watch::Watch;
 pub struct Calibration {
     /// The setup with the force of the presses.
     pressed: Setup,
-    /// The setup with the force of the contacts that are located afterwards, or its middle.
+    /// The setup with the force of the contacts that are located afterwards, or with its middle.
     touched: Setup,
-    /// Forces of these contacts in turn, as multiples of that one.
+    /// Forces of these contacts in turn, as multiples of that force.
     force_shares: &'static [f64],
-    /// The setup as the locator knows it.
+    /// The setup as the locator has it, with the force or without.
     known: Setup,
     /// Positions of the presses, each as often as it is pressed.
     presses: Vec<Position>,
@@ -53,14 +53,14 @@ pub struct Calibration {
     contacts: Vec<Position>,
 }
 
-/// A locator from a simulated calibration, and how it located.
+/// A locator from a simulated calibration, and its evaluation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibrated<M: Locate> {
     /// The seed of the simulation and of the fit.
     pub seed: u64,
     /// The locator.
     pub locator: Fitted<M>,
-    /// Answers to the contacts.
+    /// Evaluation over the contacts.
     pub evaluation: Evaluation,
 }
 
@@ -89,11 +89,11 @@ pub fn simulate_use_all_over_watched(
 }
 
 impl Calibration {
-    /// Forces of contacts in turn, as multiples of that of the presses, by which locators are compared that are not told the force.
+    /// Forces of contacts in turn, as multiples of the force of the presses, by which locators without a known force are compared.
     pub const UNKNOWN_FORCES: [f64; 3] = [1.0, 0.5, 2.0];
 
-    /// A calibration by presses of `press_force_n`, or else of the setup's force, nowhere yet. Contacts have the setup's force, or
-    /// that of the presses where the setup does not know it; there is one at each position of [`all_over`].
+    /// A calibration by presses of `press_force_n`, or else of the setup's force, without positions yet. Contacts have the setup's force, or
+    /// that of the presses where the setup's force is unknown; there is one at each position of [`all_over`].
     ///
     /// # Errors
     /// [`OutOfRange`] for a force of the presses that is not greater than 0 and finite.
@@ -121,19 +121,19 @@ impl Calibration {
         Ok(Self { placement_sd_m: training.placement_sd_m, ..calibration })
     }
 
-    /// The same by presses at other positions, `repeats` at each.
+    /// This calibration with presses at other positions, `repeats` at each.
     #[must_use]
     pub fn pressed_at(self, positions: &[Position], repeats: usize) -> Self {
         Self { presses: repeated(positions, repeats), ..self }
     }
 
-    /// The same judged by other contacts, with `readings` of each.
+    /// This calibration judged by other contacts, with `readings` of each.
     #[must_use]
     pub fn judged_at(self, contacts: &[Position], readings: usize) -> Self {
         Self { contacts: repeated(contacts, readings), ..self }
     }
 
-    /// The same judged by contacts with [`Calibration::UNKNOWN_FORCES`] in turn, where the setup does not know the force.
+    /// This calibration judged by contacts with [`Calibration::UNKNOWN_FORCES`] in turn, where the setup's force is unknown.
     #[must_use]
     pub fn at_forces_of_use(self) -> Self {
         let force_shares =
@@ -141,7 +141,7 @@ impl Calibration {
         Self { force_shares, ..self }
     }
 
-    /// The same for a locator that is not told the force of its contacts.
+    /// This calibration for a locator without the force of its contacts.
     #[must_use]
     pub fn unknown_force(self) -> Self {
         Self { known: self.known.unknown_force(), ..self }
@@ -152,7 +152,7 @@ impl Calibration {
         &self.presses
     }
 
-    /// The contacts to judge by, each as often as it is read, with their forces: the same whatever the seed.
+    /// The contacts to judge by, each as often as it is read, with their forces; they do not depend on the seed.
     ///
     /// # Errors
     /// [`SimulateError::NoForce`] where neither presses nor contacts have a force.
@@ -163,8 +163,8 @@ impl Calibration {
         Ok(self.contacts.iter().zip(self.force_shares.iter().cycle()).map(with_force).collect())
     }
 
-    /// Recordings of the presses to fit and of the contacts to judge. Both are read by the same faulty channels: their gains and offsets are the first
-    /// draws of a seed. A reading's noise depends on the seed and on how many come before it alone.
+    /// Recordings of the presses to fit and of the contacts to judge. Both are read by the same faulty channels: their gains and offsets are the
+    /// first draws of a seed. A reading's noise depends only on the seed and on the number of readings before it.
     ///
     /// With imperfections one bench makes both recordings, one after the other: equal presses in a row are one press that is read so often, and
     /// untouched rows stand between presses.
@@ -175,10 +175,10 @@ impl Calibration {
         self.simulate_watched(seed, Watch::NONE)
     }
 
-    /// The same, watched.
+    /// Simulates the calibration and the contacts to judge by, watched.
     ///
     /// # Errors
-    /// Those of [`Calibration::simulate`], and [`SimulateError::Cancelled`].
+    /// As for [`Calibration::simulate`], and [`SimulateError::Cancelled`].
     pub fn simulate_watched(&self, seed: u64, watch: Watch) -> Result<Split, SimulateError> {
         let force_n = self.touched.force_n().ok_or(SimulateError::NoForce)?;
         let presses = self.presses.iter().map(|position| Contact { position: *position, force_n });
@@ -221,10 +221,10 @@ impl Calibration {
         self.trials_watched(count, seed, Watch::NONE)
     }
 
-    /// The same, watched.
+    /// Simulates the trials of [`Calibration::trials`], watched.
     ///
     /// # Errors
-    /// Those of [`Calibration::trials`], and [`SimulateError::Cancelled`].
+    /// As for [`Calibration::trials`], and [`SimulateError::Cancelled`].
     pub fn trials_watched(&self, count: u64, seed: u64, watch: Watch) -> Result<Vec<Split>, SimulateError> {
         (0..count).map(|k| self.simulate_watched(seed + k, watch)).collect()
     }
@@ -245,7 +245,7 @@ impl Calibration {
     /// Simulates, gets a locator by `fit`, and judges it.
     ///
     /// # Errors
-    /// [`EvaluationError`] when the setup cannot be simulated or there is no locator.
+    /// [`EvaluationError`] when the setup cannot be simulated or `fit` returns an error.
     pub fn run_with<M: Locate, E: std::error::Error>(
         &self,
         seed: u64,
@@ -258,8 +258,8 @@ impl Calibration {
         Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
     }
 
-    /// The same for some rising seeds. Without faults all seeds press alike, and the estimator fits them all at once, side by side where it
-    /// can.
+    /// Runs the calibration for some rising seeds. Without faults the presses of all seeds are alike, and the estimator fits them all at once, side by
+    /// side where it can.
     ///
     /// # Errors
     /// [`EvaluationError`] as for [`Calibration::run`].

@@ -49,7 +49,7 @@ impl SurfaceMap {
     }
 }
 
-/// Map of the recorded positions with which a locator's errors are less.
+/// Map of the recorded positions that makes a locator's errors smaller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MappedPositions {
     /// The map.
@@ -61,8 +61,8 @@ pub struct MappedPositions {
 }
 
 impl Evaluation {
-    /// The map of recorded positions that explains the errors: with it the mean error is less than half, and errors are less at more places than chance
-    /// explains (sign test, 5 % level over all maps). `None` where no map does.
+    /// The map of recorded positions that explains the errors: with it the mean error is less than half, and errors are smaller at more places than
+    /// chance explains (sign test, 5 % level over all maps). `None` without such a map.
     pub fn mapped_positions(&self) -> Option<MappedPositions> {
         let places = self.by_position();
         let maps = SurfaceMap::all_of(self.extent);

@@ -29,11 +29,11 @@ use std::sync::{Mutex, PoisonError};
 pub struct Located {
     /// True position of the contact.
     pub truth: Position,
-    /// Its force in newtons, where that is known.
+    /// Force of the contact in newtons, where it is known.
     pub force_n: Option<f64>,
     /// Position that the locator gave.
     pub estimate: Position,
-    /// Whether the locator's 95 % region held it, where the locator has one.
+    /// Whether the locator's 95 % region contained the contact, where the locator has one.
     pub covered: Option<bool>,
     /// Score of the locator's 95 % intervals in metres, where it has them: see [`Evaluation::interval_score_m`].
     pub interval_score_m: Option<f64>,
@@ -48,7 +48,7 @@ pub struct Located {
 pub struct LocatedForce {
     /// Force that the locator gave, in newtons.
     pub estimate_n: f64,
-    /// Whether its 95 % interval contains the contact's force.
+    /// Whether the 95 % interval of the estimate contains the contact's force.
     pub covered: bool,
 }
 
@@ -59,18 +59,18 @@ pub struct ForceSummary {
     pub count: usize,
     /// Mean of the absolute errors, in newtons.
     pub average_n: f64,
-    /// Their median, in newtons.
+    /// Median of the absolute errors, in newtons.
     pub median_n: f64,
-    /// Their 95th percentile, in newtons.
+    /// 95th percentile of the absolute errors, in newtons.
     pub p95_n: f64,
-    /// The largest, in newtons.
+    /// Largest absolute error, in newtons.
     pub largest_n: f64,
     /// Share of the 95 % intervals that contain the force, in %.
     pub coverage_percent: f64,
 }
 
 impl Located {
-    /// The contact of a row beside the estimate of its reading.
+    /// The contact of a row, with the estimate of its reading.
     fn new(row: &Row, estimate: &Estimate, extent: Extent) -> Self {
         Self::of_contact(row.position, row.force_n, estimate, extent)
     }
@@ -92,18 +92,18 @@ impl Located {
         }
     }
 
-    /// The distance between the two, in metres.
+    /// The distance between true and estimated position, in metres.
     pub fn error_m(&self) -> f64 {
         self.truth.distance_m(self.estimate)
     }
 }
 
-/// A locator's answers to a recording.
+/// A locator's estimates for a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evaluation {
-    /// The surface, to whose length percentage errors refer.
+    /// The surface; percentage errors refer to its length.
     pub extent: Extent,
-    /// The answers, in the recording's order.
+    /// The estimates, in the recording's order.
     pub located: Vec<Located>,
 }
 
@@ -122,7 +122,7 @@ impl Portion {
         format!("{}_{}", self.from_m * 1e3, self.to_m * 1e3)
     }
 
-    /// Whether a position lies in it; a rounding error of 10⁻⁹ m is forgiven.
+    /// Whether a position lies in it, within a rounding error of 10⁻⁹ m.
     pub fn contains(&self, position: Position) -> bool {
         (self.from_m - 1e-9..=self.to_m + 1e-9).contains(&position.x_m)
     }
@@ -131,7 +131,7 @@ impl Portion {
 /// Summary of location errors.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ErrorSummary {
-    /// Number of answers.
+    /// Number of estimates.
     pub count: usize,
     /// Mean, in metres.
     pub average_m: f64,
@@ -150,7 +150,7 @@ pub fn percentage_error(error_m: f64, length_m: f64) -> f64 {
     error_m / length_m * 100.0
 }
 
-/// Whether the 95 % region of an estimated contact holds `truth`: on a line the interval, on a plane the ellipse
+/// Whether the 95 % region of an estimated contact contains `truth`: on a line the interval, on a plane the ellipse
 /// (e − t)ᵀ·C⁻¹·(e − t) ≤ [`ELLIPSE_95`].
 pub(crate) fn covered(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<bool> {
     let uncertainty = contact.uncertainty?;
@@ -174,14 +174,14 @@ fn interval_score_m(contact: &ContactEstimate, truth: Position, extent: Extent) 
     })
 }
 
-/// u − l + 2/α·(l − x)⁺ + 2/α·(x − u)⁺ of the interval (l, u) that should hold x with the probability 1 − α = 0.95.
+/// Interval score u − l + 2/α·(l − x)⁺ + 2/α·(x − u)⁺ of the interval (l, u) that should contain x with the probability 1 − α = 0.95.
 fn score_of_interval((low, high): (f64, f64), truth: f64) -> f64 {
     const ALPHA: f64 = 0.05;
     high - low + 2.0 / ALPHA * ((low - truth).max(0.0) + (truth - high).max(0.0))
 }
 
 impl Evaluation {
-    /// Locates every reading of a recording in which something touched.
+    /// Locates every reading of a recording with a contact.
     ///
     /// # Errors
     /// [`ReadingError`] when the recording's channels are not the locator's.
@@ -192,7 +192,7 @@ impl Evaluation {
         Ok(Self { extent, located: located.collect::<Result<_, _>>()? })
     }
 
-    /// The same in batches, watched.
+    /// Locates a recording in batches, watched.
     ///
     /// # Errors
     /// [`BatchError`] when the recording's channels are not the locator's, or the watch stopped it.
@@ -214,7 +214,7 @@ impl Evaluation {
         }
         let readings: Vec<f64> = rows.iter().flat_map(|row| row.reading.iter().copied()).collect();
         let located = Mutex::new(Vec::with_capacity(rows.len()));
-        // One thread takes the blocks one after the other.
+        // One thread takes block after block.
         let take = |first: usize, estimates: &[Estimate]| {
             let judged = rows[first..].iter().zip(estimates);
             let judged = judged.map(|(row, estimate)| Located::new(row, estimate, extent));
@@ -224,7 +224,7 @@ impl Evaluation {
         Ok(Self { extent, located: located.into_inner().unwrap_or_else(PoisonError::into_inner) })
     }
 
-    /// The errors within a portion, or everywhere; `None` where nothing was located.
+    /// The errors within a portion, or everywhere; `None` without a located contact.
     pub fn summary(&self, portion: Option<Portion>) -> Option<ErrorSummary> {
         let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
         let errors = sorted_errors_m(self.located.iter().filter(inside));
@@ -238,21 +238,21 @@ impl Evaluation {
         })
     }
 
-    /// Share of the contacts whose error is at most `tolerance_m`, in %. With contacts evenly along the surface it is
+    /// Share of the contacts with an error of at most `tolerance_m`, in %. With contacts evenly along the surface it is
     /// the paper's effective length.
     pub fn effective_percent(&self, tolerance_m: f64) -> f64 {
         let good = self.located.iter().filter(|located| located.error_m() <= tolerance_m).count();
         100.0 * good as f64 / self.located.len() as f64
     }
 
-    /// Share of the 95 % regions that hold their contact, in %; `None` where the locator has none.
+    /// Share of the 95 % regions that contain their contact, in %; `None` for a locator without regions.
     pub fn coverage_percent(&self) -> Option<f64> {
         let told: Vec<bool> = self.located.iter().filter_map(|located| located.covered).collect();
         let held = told.iter().filter(|covered| **covered).count();
         (!told.is_empty()).then(|| 100.0 * held as f64 / told.len() as f64)
     }
 
-    /// Share of the answers with each status, in %, in the order of [`Status::ALL`]; `None` where statuses were not kept.
+    /// Share of the estimates with each status, in %, in the order of [`Status::ALL`]; `None` where statuses were not kept.
     pub fn status_percents(&self) -> Option<Vec<(Status, f64)>> {
         let statuses: Option<Vec<Status>> = self.located.iter().map(|located| located.status).collect();
         let statuses = statuses.filter(|statuses| !statuses.is_empty())?;
@@ -263,7 +263,7 @@ impl Evaluation {
         Some(Status::ALL.into_iter().map(percent).collect())
     }
 
-    /// Errors of the estimated forces; `None` where the locator estimates none, or the contacts' are not known.
+    /// Errors of the estimated forces; `None` where the locator estimates no force, or the contacts' forces are unknown.
     pub fn force_summary(&self) -> Option<ForceSummary> {
         let forces: Vec<(f64, bool)> = self
             .located
@@ -289,8 +289,8 @@ impl Evaluation {
     /// Mean interval score of the 95 % intervals, in metres: narrow intervals that contain the contact are good ones, and the score is least on
     /// average for the true quantiles (Gneiting and Raftery, J. Am. Stat. Assoc. 102, 2007, eq. 43).
     ///
-    /// A locator that gives no intervals is judged by the best that can be done of its estimates with one width everywhere: the 95th percentile
-    /// of its errors to either side. `None` where nothing was located.
+    /// A locator without intervals is judged by the best intervals of one width everywhere about its estimates: the 95th percentile
+    /// of its errors to either side. `None` without a located contact.
     pub fn interval_score_m(&self) -> Option<f64> {
         let told: Vec<f64> = self.located.iter().filter_map(|located| located.interval_score_m).collect();
         if !told.is_empty() && told.len() == self.located.len() {
@@ -302,13 +302,13 @@ impl Evaluation {
         Some(mean(scores))
     }
 
-    /// The median error of the contacts in each cell, in metres; NaN where there is none.
+    /// The median error of the contacts in each cell, in metres; NaN for a cell without contacts.
     pub fn median_by_cell_m(&self, cells: &Cells) -> Vec<f64> {
         let median = |cell: Vec<&Located>| percentile(&sorted_errors_m(cell), 50.0).unwrap_or(f64::NAN);
         self.by_cell(cells).into_iter().map(median).collect()
     }
 
-    /// The mean position and the median error of the contacts in each of `count` equal stretches along the surface, in metres; nothing
+    /// The mean position and the median error of the contacts in each of `count` equal stretches along the surface, in metres; no entry
     /// for a stretch without contacts.
     pub fn median_by_stretch_m(&self, count: usize) -> Vec<(f64, f64)> {
         let extent = self.extent.along_x();
@@ -328,13 +328,13 @@ impl Evaluation {
         parts
     }
 
-    /// The 1st to the 100th percentile of the errors, in metres; nothing where nothing was located.
+    /// The 1st to the 100th percentile of the errors, in metres; empty without a located contact.
     pub fn percentiles_m(&self) -> Vec<(u32, f64)> {
         let errors = sorted_errors_m(&self.located);
         (1..=100).filter_map(|percent| Some((percent, percentile(&errors, f64::from(percent))?))).collect()
     }
 
-    /// The answers at each distinct position, by x and then y.
+    /// The estimates at each distinct position, by x and then y.
     pub fn by_position(&self) -> Vec<(Position, Self)> {
         let mut sorted = self.located.clone();
         sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
@@ -354,10 +354,10 @@ fn sorted_errors_m<'a>(located: impl IntoIterator<Item = &'a Located>) -> Vec<f6
 const ENDS: f64 = 1.0 / 80.0;
 /// Largest limit that counts, as a share of the length: the limit is a bound for small errors, and no estimator reaches a larger one.
 const LARGE_LIMIT: f64 = 1.0 / 200.0;
-/// The same on a plane, whose two directions share the readings.
+/// The largest limit that counts on a plane, where both directions share the readings.
 const LARGE_LIMIT_ON_A_PLANE: f64 = 1.0 / 20.0;
 
-/// Mean error over the limit's mean error, for the bench's noise; `None` where there is no limit. Counted are contacts
+/// Mean error over the limit's mean error, for the bench's noise; `None` where the limit does not exist. It counts contacts
 /// at least 1/80 of the length from both ends, on a plane also of the width from both sides, where the limit is at most
 /// 1/200 of the length, on a plane 1/20.
 pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
@@ -399,12 +399,12 @@ pub struct Quantiles {
 }
 
 impl Quantiles {
-    /// The same in another unit, of which one of this makes `factor`.
+    /// These quantiles in another unit: each is multiplied by `factor`.
     pub fn scaled(self, factor: f64) -> Self {
         Self { median: self.median * factor, p05: self.p05 * factor, p95: self.p95 * factor }
     }
 
-    /// The quantiles of some values, in any order; `None` of nothing.
+    /// The quantiles of some values, in any order; `None` without values.
     pub fn from_values(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
         Some(Self {
@@ -418,7 +418,7 @@ impl Quantiles {
 /// An evaluation over some splits together, and the time it took.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedEvaluation {
-    /// The answers.
+    /// The estimates.
     pub evaluation: Evaluation,
     /// Mean time of a fit, by the caller's clock.
     pub fit_seconds: f64,
@@ -426,7 +426,7 @@ pub struct TimedEvaluation {
     pub locate_ns: f64,
 }
 
-/// Fits an estimator to the training part of each split and locates what it judges by. `clock` tells seconds since any fixed moment.
+/// Fits an estimator to the training part of each split and locates the contacts of its judged part. `clock` returns seconds since any fixed moment.
 ///
 /// # Errors
 /// [`EvaluationError`] when the estimator does not suit the setup or a recording, or the watch stopped it.
@@ -492,9 +492,8 @@ impl<E: From<Cancelled> + std::error::Error + 'static> From<Cancelled> for Evalu
     }
 }
 
-/// Fits an estimator to each fold's training rows and locates the held-out ones; the answers of all folds together. Folds
-/// are by position, see [`Recording::folds`](crate::recording::Recording::folds). An estimator that chooses among others
-/// chooses without the held-out rows.
+/// Fits an estimator to each fold's training rows and locates the held-out ones; returns the estimates of all folds together. Folds are by position,
+/// see [`Recording::folds`](crate::recording::Recording::folds). An estimator that chooses among others chooses without the held-out rows.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, evaluation::cross_validate, fit::FitTask, influence::Influence, setup::Setup};

@@ -1,4 +1,4 @@
-//! Errors of answers that are known by hand.
+//! Known errors of made-up estimates.
 
 use super::*;
 
@@ -140,7 +140,7 @@ fn positions_that_count_from_the_other_end_or_along_other_axes_are_recognised() 
     let other_side = |at: Position| Position { y_m: 0.06 - at.y_m, ..at };
     assert_eq!(mapped(line, &|at| at), None);
     assert_eq!(mapped(plane, &|at| at), None);
-    // Errors at random are no map.
+    // Random errors do not show a map.
     assert_eq!(mapped(line, &|at| Position::along((at.x_m * 7.0) % 0.1)), None);
     assert_eq!(mapped(line, &other_end), Some((SurfaceMap::MirroredX, true)));
     assert_eq!(mapped(plane, &other_end), Some((SurfaceMap::MirroredX, true)));

@@ -1,4 +1,4 @@
-//! Features of a reading for inverse methods: its channels, or what of them does not depend on the load.
+//! Features of a reading for inverse methods: its channels, or quantities that do not depend on the load.
 
 use crate::fit::LocatorFault;
 use crate::recording::{Recording, is_one_force};
@@ -11,22 +11,22 @@ use palpate_numerics::mean_and_variance;
 pub enum FeatureKind {
     /// The readings themselves.
     Readings,
-    /// r/‖r‖ and ln ‖r‖. Where readings are proportional to the force, r/‖r‖ does not change with it, and ln ‖r‖ says
-    /// how much there is of it.
+    /// r/‖r‖ and ln ‖r‖. Where readings are proportional to the force, r/‖r‖ does not change with it, and ln ‖r‖ measures
+    /// the size of the reading.
     LoadInvariant,
-    /// r/‖r‖ alone, for presses of one force: ln ‖r‖ would tell where contacts of that force are, and lead those of others astray.
+    /// r/‖r‖ alone, for presses of one force: ln ‖r‖ would determine the place of contacts of that force, and mislead for other forces.
     Direction,
-    /// ln r of every channel, where all readings are greater than 0: channels that grow as different powers of the force or the depth, such
-    /// as times beside pressures, then differ by sums.
+    /// ln r of every channel, where all readings are greater than 0: channels that grow as different powers of the force or the depth, such as times
+    /// beside pressures, then differ by sums.
     Logarithms,
 }
 
 impl FeatureKind {
-    /// Kinds that suit the presses of a recording; which of them tells the position best is for the method to find out.
+    /// Kinds that suit the presses of a recording. The method compares them and chooses one.
     ///
-    /// Of a known force the readings themselves and r/‖r‖ with ln ‖r‖: near a support all readings are next to nothing, those of one end lie beside
-    /// those of another, and only their proportions tell the ends apart. Of an unknown one features that the load does not change, and logarithms where all
-    /// readings have one.
+    /// For a known force these are the readings themselves, and r/‖r‖ with ln ‖r‖. Near a support all readings are almost 0, so that those of one end
+    /// are close to those of another, and only their proportions distinguish the ends. For an unknown force they are features that do not depend on
+    /// the load, and logarithms where all readings have one.
     pub fn contenders(setup: &Setup, recording: &Recording) -> Vec<Self> {
         if setup.force_n().is_some() {
             return vec![Self::Readings, Self::LoadInvariant];
@@ -36,7 +36,7 @@ impl FeatureKind {
         std::iter::once(Self::load_invariant(setup, recording)).chain(logarithms).collect()
     }
 
-    /// Features that the load does not change: with the size of a reading, unless all presses have one force and contacts may have others.
+    /// Features that do not depend on the load. They include the size of a reading, unless all presses have one force and contacts may have others.
     pub fn load_invariant(setup: &Setup, recording: &Recording) -> Self {
         let forces_n: Option<Vec<f64>> =
             recording.rows.iter().filter(|row| row.touches()).map(|row| row.force_n).collect();
@@ -45,7 +45,7 @@ impl FeatureKind {
     }
 }
 
-/// A recording whose readings never change.
+/// A recording with constant readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("none of the recording's {channels} channels varies over its {rows} rows; at least 1 must")]
 pub struct NoFeatures {
@@ -55,16 +55,16 @@ pub struct NoFeatures {
     pub rows: usize,
 }
 
-/// From a reading to standardized features: (source − centre)/spread, so that each has mean 0 and variance 1 over the
-/// recording. Channels and features that never change over it are left out.
+/// Standardized features of a reading: (source − centre)/spread, so that each has mean 0 and variance 1 over the recording. Constant channels and
+/// features are left out.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Features {
     /// Kind of features that a reading is turned into.
     pub kind: FeatureKind,
-    /// The channels that are looked at.
+    /// The channels in use.
     pub channels: Vec<ChannelScale>,
-    /// ‖r‖ of a reading that is all zeros; greater than 0.
+    /// ‖r‖ that stands for a reading of zeros; greater than 0.
     pub least_norm: f64,
     /// The features, in order.
     pub features: Vec<Feature>,
@@ -102,7 +102,7 @@ pub enum FeatureSource {
     LogNorm,
 }
 
-/// A norm, or a reading whose logarithm is taken, below this share of the least in the recording counts as this.
+/// Least norm, or least reading before its logarithm, as a share of the least in the recording; a smaller one counts as this.
 const LEAST_NORM: f64 = 1e-3;
 /// A spread below this share of the largest magnitude is rounding.
 const ROUNDING: f64 = 1e-12;
@@ -135,7 +135,7 @@ impl Features {
         self.features.len()
     }
 
-    /// Whether there are none, which fitting never gives.
+    /// Whether the list of features is empty, which fitting never returns.
     pub fn is_empty(&self) -> bool {
         self.features.is_empty()
     }
@@ -148,10 +148,10 @@ impl Features {
         self.features.iter().map(standardized).collect()
     }
 
-    /// Checks what a file may have got wrong, for readings of `channels` channels.
+    /// Checks numbers that come from a file, for readings of `channels` channels.
     ///
     /// # Errors
-    /// [`LocatorFault`], naming what does not fit together.
+    /// [`LocatorFault`], which names the inconsistent numbers.
     pub fn check(&self, channels: usize) -> Result<(), LocatorFault> {
         let positive = |what, numbers: &mut dyn Iterator<Item = f64>| {
             LocatorFault::check_numbers(what, numbers, |value| value > 0.0, "finite and greater than 0")
@@ -188,7 +188,7 @@ impl Features {
         }
     }
 
-    /// The feature made of `source`, unless it never changes.
+    /// The feature of `source`; `None` for a constant one.
     fn standardized(&self, source: FeatureSource, recording: &Recording) -> Option<Feature> {
         let raw = |reading: &[f64]| self.raw(source, reading, self.norm(reading).max(self.least_norm));
         let values: Vec<f64> = recording.rows.iter().map(|row| raw(&row.reading)).collect();
@@ -219,7 +219,7 @@ fn channel_scales(recording: &Recording) -> Vec<ChannelScale> {
     live.iter().map(of_one).filter(|scale| scale.divisor.is_finite() && scale.divisor > 0.0).collect()
 }
 
-/// A channel's value; 0 for one that is not there.
+/// A channel's value; 0 for a missing one.
 fn value(reading: &[f64], channel: usize) -> f64 {
     reading.get(channel).copied().unwrap_or(0.0)
 }

@@ -102,7 +102,7 @@ fn a_damaged_file_is_refused() {
     }
 }
 
-/// Readings beside the supports of a beam are next to nothing, at one end as at the other; only their proportions tell the ends apart.
+/// Readings beside the supports of a beam are almost 0 at both ends; only their proportions distinguish the ends.
 #[test]
 fn the_ends_of_a_beam_are_told_apart_where_the_force_is_known() {
     let Example { setup, training } = paper(5e-6, 5);

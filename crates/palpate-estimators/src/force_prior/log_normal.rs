@@ -30,9 +30,9 @@ const LOWEST: f64 = 4.0;
 impl LogNormalPrior {
     /// The log-normal distribution with these quantiles at 0.5 % and 99.5 %, cut off at the upper one.
     pub fn new(least_n: f64, greatest_n: f64) -> Self {
-        /// Most nodes, which a range of 60 decades has: a rule with longer steps is coarse, and still a prior.
+        /// The most nodes, which a range of 60 decades needs. A rule with longer steps is coarse, and still a prior.
         const MOST_NODES: f64 = 2000.0;
-        // A power of a force may be beyond all numbers.
+        // A power of a force may overflow or underflow.
         let in_numbers = |force_n: f64| force_n.clamp(f64::MIN_POSITIVE, f64::MAX).ln();
         let (low, high) = (in_numbers(least_n), in_numbers(greatest_n));
         let (log_median, log_sd) = (0.5 * (low + high), ((high - low) / (2.0 * NORMAL_99)).max(1e-6));
@@ -102,7 +102,7 @@ impl LogNormalPrior {
         let k = q / self.log_sd;
         let slope = -(1.0 + k) / found_n;
         let curvature = (1.0 + k - self.log_sd.powi(-2)) / (found_n * found_n);
-        // Far below the range the curvature of the prior alone is that of no maximum; the likelihood's stays.
+        // Far below the range, the prior alone has no maximum by its curvature; the curvature of the likelihood remains.
         let precision = (a - curvature).max(0.5 * a);
         let cut = CutNormal { mean_n: found_n + slope / precision, precision, greatest_n: self.greatest_n };
         (cut, q * q + 2.0 * (self.log_sd * found_n).ln() - slope * slope / precision)

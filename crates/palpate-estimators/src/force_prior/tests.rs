@@ -42,13 +42,13 @@ fn integrals_are_those_of_small_steps() {
     for range in [(0.05, 50.0), (0.5, 10.0), (2.0, 3.0), (1e-3, 1e3)] {
         let prior = log_normal(range.0, range.1);
         let (low, high): (f64, f64) = range;
-        // Costs count from that of a likelihood that says nothing.
+        // Costs are relative to that of a flat likelihood.
         let constant = cost(prior.integrate(likelihood(0.0, 0.0))) - by_small_steps(range, 0.0, 0.0)[0];
         for share in [-1.0, 0.2, 0.5, 0.8, 0.99] {
             let force_n = if share < 0.0 { -low } else { low * (high / low).powf(share) };
             for z in [0.1, 1.0, 3.0, 5.5, 7.0, 20.0, 100.0] {
                 if share < 0.0 && z > 1.0 {
-                    // Excluded at the lower end: the posterior is in a tail that no node is in.
+                    // Excluded at the lower end: the posterior is in a tail without nodes.
                     continue;
                 }
                 let a = (z / force_n).powi(2);

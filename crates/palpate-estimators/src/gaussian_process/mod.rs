@@ -1,8 +1,8 @@
-//! Gaussian-process regression of the contact's position on what a reading says of it.
+//! Gaussian-process regression of the contact's position on the features of a reading.
 //!
-//! The inverse way: position = f(features) + error, with f a Gaussian process and the error, whose variance is fitted,
-//! standing for what the sensors' noise does to the position. It asks nothing of the surface but smoothness. One error for the whole
-//! surface is too little where the sensors see little, and too much elsewhere: [`Widths`] mend the intervals by errors at positions held out.
+//! The inverse method: position = f(features) + error. f is a Gaussian process; the error has a fitted variance, and
+//! stands for the effect of the sensors' noise on the position. The method requires only a smooth surface. One error for the whole
+//! surface is too small where the sensors are insensitive, and too large elsewhere: [`Widths`] correct the intervals by errors at held-out positions.
 
 mod selection;
 mod widths;
@@ -42,9 +42,9 @@ pub struct GaussianProcessEstimator {
     pub features: Option<FeatureKind>,
     /// Kernel: the smoothness of the position as a function of the features.
     pub kernel: Kernel,
-    /// Trend: what the position returns to for readings unlike any recorded.
+    /// Trend: the position for readings unlike any recorded.
     pub trend: Trend,
-    /// The hyperparameters are found from at most this many rows, drawn at random; at least 2.
+    /// The hyperparameters are optimised on at most this many rows, drawn at random; at least 2.
     pub search_points: usize,
 }
 
@@ -57,7 +57,7 @@ impl Default for GaussianProcessEstimator {
 /// A recording that a Gaussian process cannot be fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum GaussianProcessError {
-    /// There is nothing between which to interpolate.
+    /// Too few positions to interpolate between.
     #[error(transparent)]
     Positions(#[from] TooFewPositions),
     /// No channel varies.
@@ -74,7 +74,7 @@ pub enum GaussianProcessError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Distinct positions without which a position cannot be a function of anything.
+/// Least number of distinct positions, below which the position cannot be a function of the reading.
 const LEAST_POSITIONS: usize = 2;
 
 impl Fit for GaussianProcessEstimator {
@@ -103,7 +103,7 @@ impl Fit for GaussianProcessEstimator {
 }
 
 impl GaussianProcessEstimator {
-    /// For each kind of features, hyperparameters that are found from all rows, and from one row of each position where there are repeats.
+    /// For each kind of features, hyperparameters from all rows, and from one row of each position where there are repeats.
     fn candidates(
         &self,
         task: FitTask,
@@ -113,7 +113,7 @@ impl GaussianProcessEstimator {
         let extent = setup.surface().extent();
         let kinds =
             self.features.map_or_else(|| FeatureKind::contenders(setup, recording), |kind| vec![kind]);
-        // Of more positions than are searched, few of the rows that are searched are repeats.
+        // With more positions than searched rows, few of the searched rows are repeats.
         let without_repeats =
             recording.one_row_a_position(seed).filter(|few| few.rows.len() < self.search_points);
         let mut candidates = Vec::with_capacity(2 * kinds.len());
@@ -152,8 +152,8 @@ pub struct GaussianProcessLocator {
 impl Locate for GaussianProcessLocator {
     type Check = NoCheck;
 
-    /// The posterior mean, with the variance of the contact's position: that of the function and the fitted error of a single row, times the square of
-    /// what held-out positions have shown.
+    /// The posterior mean, with the variance of the contact's position: that of the function and the fitted error of a single row, times the square
+    /// of the factor from held-out positions.
     fn locate(&self, reading: &[f64]) -> Estimate {
         let features = self.features.apply(reading);
         let (means_m, variances_m2) = self.process.predict(&features);

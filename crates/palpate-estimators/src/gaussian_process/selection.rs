@@ -1,7 +1,7 @@
 //! The choice of features and hyperparameters: by evidence, and by errors at held-out positions.
 //!
-//! The evidence takes the repeats of a position for independent observations of it. Of few positions and many repeats it prefers functions that are
-//! flat around each position and steep between them, far off where nothing was pressed. Errors at held-out positions show that; but they are
+//! The evidence treats the repeats of a position as independent observations of it. With few positions and many repeats it prefers functions that are
+//! flat around each position and steep between them, far off where the surface was not pressed. Errors at held-out positions show that; but they are
 //! few, and differ by chance. So the evidence decides, unless those errors disagree by a margin.
 
 use ndarray::Array2;
@@ -16,11 +16,11 @@ use palpate_numerics::mean;
 use palpate_numerics::regression::{GaussianProcess, Hyperparameters, Regression, Samples};
 use palpate_numerics::watch::Watch;
 
-/// Features and hyperparameters that may be taken.
+/// Features and hyperparameters to choose from.
 pub(super) struct Candidate {
     pub features: Features,
     pub hyperparameters: Hyperparameters,
-    /// The posterior of all rows, where those were searched.
+    /// The posterior of all rows, where all were searched.
     pub process: Option<GaussianProcess>,
 }
 
@@ -58,9 +58,9 @@ pub(super) struct Selection<'a> {
 }
 
 impl Selection<'_> {
-    /// The candidate of the greatest evidence, unless the error of another at positions held out is less by [`MARGIN`].
+    /// The candidate of the greatest evidence, unless another has an error at held-out positions that is less by [`MARGIN`].
     pub fn best(&self, mut candidates: Vec<Candidate>) -> Result<Candidate, GaussianProcessError> {
-        /// Rows that errors are distinguished from; more would cost time and change little.
+        /// Most rows for held-out errors; more would cost time and change little.
         const MOST: usize = 500;
         const MARGIN: f64 = 1.25;
         const FOLDS: usize = 5;
@@ -85,7 +85,7 @@ impl Selection<'_> {
         Ok(candidates.swap_remove(best.1))
     }
 
-    /// Mean error at the positions that folds hold out; infinite where they hold out none.
+    /// Mean error at the positions that folds hold out; infinite where folds hold out no position.
     fn held_out_error_m(
         &self,
         Candidate { features, hyperparameters, .. }: &Candidate,
@@ -108,7 +108,8 @@ impl Selection<'_> {
     }
 }
 
-/// Folds by position, so many where there are as many positions; positions beyond all that are left in a fold are not held out of it, as few contacts lie beyond all presses.
+/// Folds by position: `most`, or one a position where there are fewer positions. A position beyond all remaining ones of a fold is not held out, as few contacts lie
+/// beyond all presses.
 pub(super) fn folds_between(recording: &Recording, most: usize) -> Vec<Fold> {
     let mut folds = recording.folds(recording.distinct_positions().len().min(most)).unwrap_or_default();
     for Fold { training, held_out } in &mut folds {

@@ -1,4 +1,4 @@
-//! The method on simulated benches, and on other people's recordings by the protocol that comes with them.
+//! The method on simulated benches, and on public recordings by the protocols that come with them.
 
 use std::sync::LazyLock;
 
@@ -38,8 +38,8 @@ fn bells(x_m: f64, force_n: f64, noise: f64, rng: &mut Xoshiro256PlusPlus) -> Ro
     Row { position: Position::along(x_m), force_n: None, nuisances: Vec::new(), time_s: None, reading }
 }
 
-/// Repeats are no further witnesses of how the position follows the readings: taken for such they led to functions that are flat around every
-/// position, 40 mm off between them.
+/// Repeats are not independent observations of the position. Treated as such they led to functions that are flat around every position, and 40 mm off
+/// between them.
 #[test]
 fn repeats_make_it_better() {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
@@ -99,7 +99,7 @@ fn a_pad_is_two_dimensional() {
     let setup = raw_setup(extent, 5, None);
     let locator = fit(&setup, &raw_recording(rows.collect())).unwrap();
     assert_eq!(locator.check(&setup), Ok(()));
-    // Between the grid's points, with half a newton, and the dead channel reading otherwise.
+    // Between the grid's points, with half of the size, and another reading of the dead channel.
     let estimate = locator.locate(&[0.375, 0.125, 0.375, 0.125, 0.0].map(|r: f64| 0.5 * r));
     assert!((estimate.contact.position.x_m - 0.05).abs() < 1e-3, "{estimate:?}");
     assert!((estimate.contact.position.y_m - 0.05).abs() < 1e-3, "{estimate:?}");
@@ -110,7 +110,7 @@ fn a_pad_is_two_dimensional() {
 
 #[test]
 fn a_position_beyond_the_edge_is_said_to_be_one() {
-    // Presses as far as the edge, and a reading that a press beyond it would give.
+    // Presses as far as the edge, and the reading of a press beyond it.
     let rows = (0..41).map(|i| {
         let x_m = 0.01 * f64::from(i);
         Row {
@@ -176,7 +176,7 @@ fn five_folds(name: &str, setup: &Setup, recording: &Recording) -> (ErrorSummary
 /// Its hyperparameters come from other starts and a prior, so scikit-learn's figures are met within a hundredth.
 const SLACK: f64 = 1.01;
 
-/// Fails when median and mean are beyond scikit-learn's, or its own intervals do not hold what they promise.
+/// Fails when median and mean are beyond scikit-learn's, or the intervals do not have their coverage.
 fn check(name: &str, (setup, recording): (Setup, Recording), median_mm: f64, mean_mm: f64) {
     let (errors, coverage) = five_folds(name, &setup, &recording);
     let as_good = errors.median_m <= SLACK * mm(median_mm) && errors.average_m <= SLACK * mm(mean_mm);
@@ -266,7 +266,7 @@ fn channels_that_follow_different_powers_of_the_force_are_taken_by_their_logarit
     let recording = raw_recording(rows.collect());
     let setup = raw_setup(*EXTENT, 3, None);
     assert_eq!(fit(&setup, &recording).unwrap().features.kind, FeatureKind::Logarithms);
-    // A channel that may be negative has none.
+    // A channel with negative readings has no logarithms.
     let mut signed = recording;
     signed.rows[3].reading[1] = -0.1;
     assert_eq!(fit(&setup, &signed).unwrap().features.kind, FeatureKind::LoadInvariant);

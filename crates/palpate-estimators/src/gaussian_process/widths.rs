@@ -1,9 +1,9 @@
 //! Widths of the 95 % intervals, by errors at held-out positions.
 //!
-//! A process has one error for the whole surface. Where sensors see little the truth is further off, elsewhere its intervals are wider than need be, and
-//! all are too wide where errors have long tails. So positions are held out. There z_j = (estimate − truth)/σ_j along coordinate j,
-//! where σ_j is the standard deviation that the process tells. A second process takes ln z_j² for a smooth function of the features,
-//! as smooth as the evidence has it, and w_j = exp(½·E ln z_j²) is how far σ_j is off about a reading (Goldberg, Williams and Bishop, Adv. Neural Inf. Process. Syst. 10, 1998).
+//! A process has one error for the whole surface. Where sensors are insensitive the true error is larger; elsewhere the intervals are too wide, and
+//! all are too wide where errors have long tails. So positions are held out. There z_j = (estimate − truth)/σ_j along coordinate j, where σ_j is the
+//! standard deviation from the process. A second process models ln z_j² as a smooth function of the features, with the smoothness from its evidence;
+//! w_j = exp(½·E ln z_j²) is the factor by which σ_j is off near a reading (Goldberg, Williams and Bishop, Adv. Neural Inf. Process. Syst. 10, 1998).
 //! Number ⌈0.95·(n + 1)⌉ of the n values |z_j|/w_j in rising order, times w_j·σ_j, is the half-width (Papadopoulos, Gammerman and Vovk 2008).
 
 use ndarray::Array2;
@@ -23,7 +23,7 @@ use palpate_numerics::regression::{
 use palpate_numerics::watch::Watch;
 use palpate_numerics::{ELLIPSE_95, FEWEST_FOR_95, NORMAL_95, conformal_95};
 
-/// Factors on the standard deviations of a process, by which its intervals hold what they should.
+/// Factors on the standard deviations of a process, which give its intervals their coverage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Widths {
@@ -31,7 +31,7 @@ pub struct Widths {
     pub logarithms: GaussianProcess,
     /// Quantile of |z_j|/w_j over that of a normal variable, for each coordinate.
     pub factors: Vec<f64>,
-    /// On a plane, of the quadratic form of all coordinates, so scaled, over that of normal variables.
+    /// On a plane, quantile of the quadratic form of all coordinates, so scaled, over that of normal variables.
     pub ellipse: f64,
 }
 
@@ -43,11 +43,11 @@ struct HeldOut {
     positions: Vec<Position>,
 }
 
-/// Least |z| whose logarithm is taken: that of a smaller one varies by chance alone.
+/// Lower bound of |z| in its logarithm: that of a smaller one varies by chance alone.
 const LEAST_Z: f64 = 0.1;
 
 impl Widths {
-    /// Widths by positions that a process with these features and hyperparameters is not conditioned on; `None` of less than [`FEWEST_FOR_95`].
+    /// Widths by positions that a process with these features and hyperparameters is not conditioned on; `None` with fewer than [`FEWEST_FOR_95`].
     pub(super) fn held_out(
         task: FitTask,
         regression: Regression,
@@ -75,7 +75,7 @@ impl Widths {
         widths.into_iter().zip(&self.factors).map(|(width, factor)| factor * width).collect()
     }
 
-    /// Checks what a file may have got wrong.
+    /// Checks numbers that come from a file.
     pub(super) fn check(&self, features: usize, outputs: usize) -> Result<(), LocatorFault> {
         let logarithms = &self.logarithms;
         LocatorFault::check_count(
@@ -101,7 +101,7 @@ fn local_widths(logarithms: &GaussianProcess, features: &[f64]) -> Vec<f64> {
 /// Folds that positions are dealt to.
 const FOLDS: usize = 10;
 
-/// Folds that are held out in turn: all where a process takes no time, few where one tells of hundreds of presses.
+/// Folds that are held out in turn: all where a process is fast, few where one has hundreds of presses.
 pub(crate) fn folds_taken(rows: usize) -> usize {
     match rows {
         0..=1200 => FOLDS,
@@ -132,7 +132,7 @@ impl HeldOut {
         }
     }
 
-    /// Distinct positions. Errors of presses at one are alike, so as many are needed as of independent errors.
+    /// Distinct positions. Errors of presses at one position are alike, so they count as one independent error.
     fn places(&self) -> Vec<Position> {
         let mut places = self.positions.clone();
         places.sort_by(Position::cmp_by_x_then_y);
@@ -144,7 +144,7 @@ impl HeldOut {
         self.z.first().map_or(0, Vec::len)
     }
 
-    /// The process of ln z², by some of the errors; its hyperparameters are searched where they are not known.
+    /// The process of ln z², by some of the errors; its hyperparameters are searched where they are unknown.
     fn logarithms(
         &self,
         chosen: &[usize],
@@ -172,7 +172,7 @@ impl HeldOut {
         let kept: Vec<usize> = thinned(self.z.len(), regression.search_points).collect();
         let logarithms = self.logarithms(&kept, regression, None, watch)?;
         let scaled = self.scaled(logarithms.hyperparameters(), &places, &kept, regression, watch)?;
-        // Without any error, as of readings made up without noise, there is nothing to be told.
+        // Without any error, as of simulated readings without noise, the factors are undetermined.
         let bound = |sizes: Vec<f64>| conformal_95(sizes).filter(|size| size.is_finite() && *size > 0.0);
         let factor = |j: usize| Some(bound(scaled.iter().map(|z| z[j].abs()).collect())? / NORMAL_95);
         let factors: Option<Vec<f64>> = (0..self.outputs()).map(factor).collect();
@@ -185,7 +185,7 @@ impl HeldOut {
         Ok(Some(Widths { logarithms, factors, ellipse }))
     }
 
-    /// z over widths that follow from errors at other positions, as those of contacts in use are.
+    /// z over widths from errors at other positions, as those of contacts in use are.
     fn scaled(
         &self,
         known: &Hyperparameters,

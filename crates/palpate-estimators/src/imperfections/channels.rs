@@ -14,17 +14,17 @@ pub struct ImperfectChannels {
     levels: Vec<(f64, f64)>,
     states: Vec<ChannelState>,
     time_s: f64,
-    /// Stream of the random walks, beside those of noise and places.
+    /// Random stream of the walks, separate from those of noise and places.
     rng: Xoshiro256PlusPlus,
 }
 
-/// State of a simulated bench after a recording, from which a later one goes on.
+/// State of a simulated bench after a recording, from which a later one continues.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BenchState {
     /// Seed of gains, offsets and places of the bench.
     pub seed: u64,
-    /// Force under which the ranges of its channels were taken, in newtons.
+    /// Force for the ranges of its channels, in newtons.
     pub range_force_n: f64,
     /// Time since its start, in seconds.
     pub time_s: f64,
@@ -46,7 +46,7 @@ pub struct ChannelState {
     pub walk: f64,
 }
 
-/// Tells the stream of the walks from those of noise, finger and lost frames, which have the same seed.
+/// Distinguishes the stream of the walks from those of noise, finger and lost frames, which have the same seed.
 const WALKS: u64 = 0xA6_E109;
 
 impl ImperfectChannels {
@@ -61,7 +61,7 @@ impl ImperfectChannels {
         }
     }
 
-    /// The same channels as an earlier recording left them, with fresh random walks from there on.
+    /// The channels in the final state of an earlier recording, with fresh random walks from there on.
     #[must_use]
     pub fn resumed(mut self, state: &BenchState) -> Self {
         self.states.iter_mut().zip(&state.channels).for_each(|(own, left)| *own = *left);
@@ -85,7 +85,7 @@ impl ImperfectChannels {
         &self.states
     }
 
-    /// Lets a step of time pass under constant contacts, whose faultless reading this is, and gives the reading at its end, without noise.
+    /// Advances time by a step under constant contacts with the faultless reading `clean`; returns the reading at its end, without noise.
     pub fn advance(&mut self, clean: &[f64], step_s: f64) -> Vec<f64> {
         self.time_s += step_s;
         let Imperfections { drift, common_drift, .. } = self.imperfections;
@@ -111,7 +111,7 @@ impl ImperfectChannels {
         reading
     }
 
-    /// A step of a walk of standard deviation 1, or 0 without drawing.
+    /// A step of a walk of standard deviation 1; 0, without a draw, where it is not needed.
     fn draw(&mut self, is_needed: bool) -> f64 {
         if is_needed { self.rng.sample(StandardNormal) } else { 0.0 }
     }

@@ -5,7 +5,7 @@
 //! channel from its untouched reading [saturates](Imperfections::saturation), passes a [play operator](Imperfections::hysteresis),
 //! [creeps](Imperfections::creep), leaves a [residue](Imperfections::residue), is multiplied by the drifting gain, and is shifted by the
 //! drifting offset; then come noise, steps and limits of the channel
-//! ([`ChannelModel`](palpate_mechanics::sensing::ChannelModel)). Sensors and presses beside their places are numbers of the channel model
+//! ([`ChannelModel`](palpate_mechanics::sensing::ChannelModel)). Displacements of sensors and presses are numbers of the channel model
 //! (`position_error_m`) and of the training (`placement_sd_m`).
 
 mod channels;
@@ -20,8 +20,7 @@ use palpate_mechanics::contact::Extent;
 use palpate_numerics::OutOfRange;
 use serde::{Deserialize, Serialize};
 
-/// Imperfections of a bench; none by default. Plain data: what takes it into a setup, a
-/// [`Setup`](crate::setup::Setup::with_imperfections), refuses a number out of its range.
+/// Imperfections of a bench; none by default. Plain data: a [`Setup`](crate::setup::Setup::with_imperfections) refuses a number out of its range.
 ///
 /// ```
 /// use palpate_estimators::arrangement::Training;
@@ -74,7 +73,7 @@ pub struct Imperfections {
     /// Share s by which a deviation as large as the channel's range R falls short of a linear one, at least 0 and below 1:
     /// x/(1 + s/(1 − s)·|x|/R), the hyperbolic law of a Langmuir isotherm and of resistive foams.
     pub saturation: f64,
-    /// Force, in newtons, whose largest deviation over the surface is a channel's range; the force of the presses where it is not given.
+    /// Force, in newtons, that sets a channel's range: its largest deviation over the surface under this force. `None` for the force of the presses.
     pub range_force_n: Option<f64>,
     /// Times of presses and rests.
     pub schedule: Schedule,
@@ -116,7 +115,7 @@ pub struct OffsetDrift {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schedule {
-    /// Time for which nothing touches before each press, and after the last, in seconds; greater than 0.
+    /// Time for which the surface is untouched before each press, and after the last, in seconds; greater than 0.
     pub rest_s: f64,
     /// Rows that are recorded at the end of each of these rests.
     pub untouched_rows: u32,

@@ -3,7 +3,7 @@
 use palpate_mechanics::contact::{Contact, Extent, Position};
 use palpate_mechanics::surface::midpoints;
 
-/// Points along the width of a touch. By the midpoint rule the second moment of the pressure, on which readings depend first, is 1/64 short.
+/// Points along the width of a touch. By the midpoint rule the second moment of the pressure, the first on which readings depend, is 1/64 too small.
 const POINTS: usize = 8;
 
 /// A contact under a layer as point contacts of equal force in the middles of equal parts: of a stretch of this width on a line, of a square of

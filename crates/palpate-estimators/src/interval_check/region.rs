@@ -29,7 +29,7 @@ pub(super) struct Interval {
 }
 
 impl Region {
-    /// That of the position; `None` of an estimate without intervals.
+    /// Region of the position; `None` for an estimate without intervals.
     pub fn of_position(held_out: &HeldOutEstimate, extent: Extent) -> Option<Self> {
         let ContactEstimate { position, uncertainty, .. } = held_out.estimate.contact;
         let Uncertainty { covariance: [xx, xy, _, yy, ..], x_95_m, y_95_m, .. } = uncertainty?;
@@ -45,7 +45,7 @@ impl Region {
         })
     }
 
-    /// That of the force; `None` where it is not estimated or was not recorded.
+    /// Region of the force; `None` where the force is not estimated or was not recorded.
     pub fn of_force(held_out: &HeldOutEstimate, extent: Extent) -> Option<Self> {
         let contact = &held_out.estimate.contact;
         let interval_n = ContactRecord::new(contact, extent).force_interval_95_n()?;
@@ -74,7 +74,7 @@ impl Region {
             Self::Ellipse { error, intervals, .. } => {
                 let of_ellipse =
                     self.factors(added_sd).map(|factors| (factors.quadratic(*error) / ELLIPSE_95).sqrt());
-                // An ellipse without an area says nothing of the errors across it; its intervals do.
+                // An ellipse without an area does not bound the errors across it; its intervals do.
                 let of_intervals = || intervals[0].ratio(added_sd).max(intervals[1].ratio(added_sd));
                 of_ellipse.filter(|ratio| ratio.is_finite()).unwrap_or_else(of_intervals).min(UNBOUNDED)
             }
@@ -101,7 +101,7 @@ impl Region {
         }
     }
 
-    /// Factors of the covariance with the added standard deviation; `None` of an interval, and of an ellipse without an area.
+    /// Factors of the covariance with the added standard deviation; `None` for an interval, and for an ellipse without an area.
     fn factors(&self, added_sd: f64) -> Option<Ldl<2>> {
         let Self::Ellipse { covariance: [xx, xy, yy], .. } = self else { return None };
         let added = added_sd * added_sd;
@@ -126,8 +126,9 @@ impl Interval {
         (self.half_width() / NORMAL_95).powi(2) + added_sd * added_sd
     }
 
-    /// The least factor by which it contains the truth: within the interval the share of its half-width toward the truth; beyond it the distance from the nearer
-    /// end counts in halves of its whole length, so that an interval that ends at its own estimate is widened too.
+    /// The least factor by which the interval contains the truth. Within the interval it is the error over the distance from the estimate
+    /// to the end on the side of the truth. Beyond it, the distance from the nearer end counts in half-widths, so an interval that ends at
+    /// its own estimate is widened too.
     fn ratio(&self, added_sd: f64) -> f64 {
         let half = self.half_width().hypot(NORMAL_95 * added_sd);
         let more = half - self.half_width();

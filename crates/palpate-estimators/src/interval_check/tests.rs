@@ -21,11 +21,11 @@ fn plane() -> Extent {
     Extent::plane(1.0, 1.0).unwrap()
 }
 
-/// Standard deviations that estimates have by themselves, in metres and newtons.
+/// Standard deviations of the estimates, in metres and newtons.
 const SD_M: f64 = 1e-3;
 const SD_N: f64 = 0.1;
 
-/// Presses of some places, whose errors are a multiple of the standard deviation that the estimates have.
+/// Presses of some places. Their errors are a multiple of the standard deviation of the estimates.
 fn estimates(places: usize, presses: usize, multiple: f64, seed: u64) -> Vec<HeldOutEstimate> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut error = || -> f64 {
@@ -166,7 +166,7 @@ fn a_fit_of_few_places_has_no_check() {
     assert_eq!(fit(19).unwrap().places, 19);
 }
 
-/// Presses that lie beside their places, located with intervals of different widths that do not know of it.
+/// Presses that lie beside their places, located with intervals of different widths that do not include this error.
 fn beside_their_places(places: usize, widest_m: f64, placement_sd_m: f64, seed: u64) -> Vec<HeldOutEstimate> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -201,7 +201,7 @@ fn errors_that_intervals_do_not_know_add_a_standard_deviation() {
     }
 }
 
-/// Wide intervals at held-out places are no measure of narrow ones in use.
+/// Wide intervals at held-out places do not represent narrow ones in use.
 #[test]
 fn intervals_that_are_narrower_in_use_than_at_held_out_places_contain_the_position() {
     let mut covered = 0;

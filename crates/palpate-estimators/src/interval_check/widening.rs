@@ -14,7 +14,7 @@ pub(crate) struct Widening {
 impl Widening {
     pub const NONE: Self = Self { added_sd: 0.0, factor: 1.0 };
 
-    /// A wider interval, lengthened to both sides alike. It ends at 0 and `size` where it ended within them.
+    /// A wider interval, lengthened to both sides alike. It stays within 0 and `size` where the original interval does.
     pub fn interval(self, (low, high): (f64, f64), size: f64) -> (f64, f64) {
         let half = 0.5 * (high - low).max(0.0);
         let more = self.factor * half.hypot(NORMAL_95 * self.added_sd) - half;
@@ -25,13 +25,13 @@ impl Widening {
         self.factor * self.factor * (variance + self.added_sd * self.added_sd)
     }
 
-    /// What is added to a variance.
+    /// Increase of a variance.
     pub fn added_variance(self, variance: f64) -> f64 {
         self.variance(variance) - variance
     }
 }
 
-/// What widens the intervals of estimates.
+/// Widening of the intervals of estimates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EstimateWidening {
     pub position: Widening,
@@ -39,7 +39,8 @@ pub(crate) struct EstimateWidening {
 }
 
 impl EstimateWidening {
-    /// The estimate with wider intervals of all its contacts. They end where the surface does, and a force interval at 0, where they did before.
+    /// The estimate with wider intervals of all its contacts. Intervals within the surface stay within it, and a force interval above 0
+    /// stays above 0.
     pub fn widened(&self, estimate: Estimate, extent: Extent) -> Estimate {
         if [self.position, self.force] == [Widening::NONE; 2] {
             return estimate;
@@ -61,9 +62,9 @@ impl EstimateWidening {
         let Self { position, force } = *self;
         let [xx, xy, xf, yy, yf, ff] = uncertainty.covariance;
         let (p, f) = (position.factor, force.factor);
-        // Across a line there is no error.
+        // A line has no error across it.
         let yy = if extent.width_m().is_some() { position.variance(yy) } else { p * p * yy };
-        // A force that is known has none either.
+        // A known force has no error.
         let ff = if ff > 0.0 { force.variance(ff) } else { ff };
         let uncertainty = Uncertainty {
             covariance: [position.variance(xx), p * p * xy, p * f * xf, yy, p * f * yf, ff],

@@ -1,4 +1,4 @@
-//! The lightest touch measured by locators' own rule of `no_contact`.
+//! The smallest detectable force, measured by the locators' own rule of `no_contact`.
 
 use super::*;
 use crate::closed_form::ClosedForm;
@@ -19,7 +19,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 const READINGS: usize = 1000;
 
-/// Share of the readings of a contact that a locator finds.
+/// Share of the readings of a contact in which a locator detects it.
 fn found(bench: &Example, locator: &Locator, contact: Contact) -> f64 {
     let (surface, layout) = (bench.setup.surface().model().unwrap(), bench.setup.layout());
     let clean = CleanSensors::new(surface, layout).reading(contact);
@@ -32,7 +32,8 @@ fn found(bench: &Example, locator: &Locator, contact: Contact) -> f64 {
     (0..READINGS).filter(is_found).count() as f64 / READINGS as f64
 }
 
-/// Checks that forces a tenth less than the lightest touch are found less often than it says, and a tenth more more often.
+/// Checks that forces a tenth below the smallest detectable force are detected with less than its probability, and forces a tenth above it
+/// with more.
 fn check(name: &str, bench: &Example, locator: &Locator, touch: &LightestTouch, positions: &[Position]) {
     for position in positions {
         for (share, force_n) in LightestTouch::FOUND.into_iter().zip(touch.forces_at(*position)) {
@@ -112,7 +113,7 @@ fn on_a_surface_without_a_model_it_is_true_within_a_tenth() {
     let Method::Influence(InfluenceLocator::ForceLinear(linear)) = &locator.method else { panic!() };
     let positions = [0.1, 0.2].map(Position::along);
     check("force-linear", &bench, &locator, &linear.lightest_touch(), &positions);
-    // And its limit is that of the mechanics, as far as the recording tells the influences.
+    // The Cramér–Rao bound of the locator is that of the mechanics, up to the error of the learnt influences.
     let extent = setup.surface().extent();
     let (learnt, known) = (linear.cramer_rao_bound(extent), bench.setup.cramer_rao_bound().unwrap());
     for position in positions {
@@ -141,7 +142,7 @@ fn the_scatter_of_untouched_rows_hides_touches_that_noise_would_not() {
         .map(|touch| touch.forces_at(positions[1])[1].unwrap());
     assert!(scatter_n > 1.5 * noise_n, "{scatter_n} {noise_n}");
     check("scatter", &bench, &locator, &touch, &positions);
-    // The force by the scatter does not depend on the noise that is supposed.
+    // The force by the scatter does not depend on the assumed noise.
     let mut quiet = bench.setup.clone();
     quiet
         .edit_sensors(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 1e-6))
@@ -160,7 +161,7 @@ fn a_surface_that_does_not_notice_has_no_lightest_touch() {
     let touch = new(Box::new(|_| vec![0.0; 3]));
     assert_eq!(touch.forces_at(Position::along(0.1)), [None, None]);
     assert_eq!(touch.summaries(&[Position::along(0.1)]), [None, None]);
-    // One that saturates is found where its readings do not.
+    // On a saturating surface, contacts are detected at forces below saturation.
     let saturating = |contact: Contact| vec![(4.0 * contact.force_n).min(8.0), 0.0, 0.0];
     let touch = new(Box::new(saturating));
     let [half_n, surely_n] = touch.forces_at(Position::along(0.1)).map(Option::unwrap);
@@ -169,7 +170,7 @@ fn a_surface_that_does_not_notice_has_no_lightest_touch() {
 
 #[test]
 fn one_channel_and_one_unknown_are_a_normal_variable() {
-    // Found above C = 9 or below −3; the length bound of 25 is never the one that counts.
+    // Detected above 3 or below −3, the square roots of C = 9; the length bound of 25 never decides.
     let detection = Detection { channels: 1, unknowns: 1, square: 25.0, taken: 9.0 };
     for signal in [0.0, 1.5, 3.0, 5.0] {
         let expected =

@@ -1,25 +1,25 @@
-//! Bounds of sums over a load, whatever its shape: what a reading does not exclude.
+//! Bounds of sums over a load of any shape: the values that a reading does not exclude.
 //!
-//! A load next to a support is hardly read, so that a profile's own covariance, which knows the cells that its prior fills, does not tell how
-//! much may lie in the others. Here no prior decides: with A, x ≥ 0 and y as in [the module above](super), v is within the bounds of a sum
+//! A load next to a support is hardly read. A profile's own covariance covers only the cells that its prior fills, and does not show how
+//! much may lie in the others. Here no prior decides. With A, x ≥ 0 and y as in [the module above](super), v is within the bounds of a sum
 //! c·x when some load with c·x = v leaves ‖A·x − y‖² within [`RATIO_95`] of the least that any leaves (the likelihood ratio, profiled over all
 //! loads: Rust and Burrus, *Mathematical Programming and the Numerical Solution of Linear Equations*, 1972; Kuusela and Stark, *Annals of Applied
 //! Statistics* 11, 2017).
 //!
-//! The least misfit for a given sum is had without a constraint: x that minimises ‖A·x − y‖² + ρ²·(c·x − t)² over x ≥ 0 is, by the conditions
-//! of Karush, Kuhn and Tucker, also the least for its own sum, and that rises with t.
+//! The least misfit for a given sum is computed without a constraint. By the conditions of Karush, Kuhn and Tucker, x that minimises
+//! ‖A·x − y‖² + ρ²·(c·x − t)² over x ≥ 0 has also the least misfit for its own sum, and that sum rises with t.
 
 use ndarray::{Array1, Array2};
 use palpate_numerics::{Cholesky, holding};
 
-/// Misfit above the least, up to which a load is not excluded. For an unknown without bounds it would be 3.84, the 95 % quantile of χ² of one;
-/// that no load pulls makes the least misfit larger, and with 3.84 a total of two pads in mid-span was held in 92 % of readings.
+/// Misfit above the least, up to which a load is not excluded. For an unknown without bounds it would be 3.84, the 95 % quantile of χ² of one.
+/// Loads cannot pull, which makes the least misfit larger; with 3.84 the interval contained the total of two pads in mid-span in 92 % of readings.
 const RATIO_95: f64 = 5.0;
-/// Times that a search doubles its step; beyond, there is no bound.
+/// Most doublings of a search's step; beyond them the sum has no bound.
 const MOST_DOUBLINGS: usize = 40;
-/// Halvings of the interval that holds a bound, or fewer where a secant is quicker.
+/// Halvings of the interval that contains a bound, or fewer where a secant is quicker.
 const MOST_STEPS: usize = 40;
-/// Misfit that does not matter.
+/// Negligible misfit.
 const NEGLIGIBLE: f64 = 1e-3;
 
 /// Loads that a reading does not exclude.
@@ -67,15 +67,15 @@ impl Bounds {
         let [low, high] = [-1.0, 1.0].map(|side| self.bound(c, side));
         let low = low.map_or(f64::NEG_INFINITY, |(sum, _)| sum);
         let high = high.map_or(f64::INFINITY, |(sum, _)| sum);
-        // A sum of forces is no less than 0.
+        // A sum of forces is at least 0.
         let low = if c.iter().all(|c| *c >= 0.0) { low.max(0.0) } else { low };
         (low, high)
     }
 
     /// Bounds of the mean Σ a·x/Σ x over some cells, where a is the coordinate of each.
     ///
-    /// A mean v has a load that is not excluded if the bounds of Σ (a − v)·x contain 0. The load at the upper bound of that sum has a mean above v, which
-    /// is the next v (Dinkelbach, *On Nonlinear Fractional Programming*, Management Science 13, 1967).
+    /// A mean v has a load that is not excluded if the bounds of Σ (a − v)·x contain 0. The load at the upper bound of that sum has a mean above v,
+    /// and this mean is the next v (Dinkelbach, *On Nonlinear Fractional Programming*, Management Science 13, 1967).
     pub fn of_mean(&self, cells: &[usize], coordinates: &[f64]) -> (f64, f64) {
         let ends = coordinates.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |ends, a| holding(ends, *a));
         let mean = |load: &Array1<f64>| {
@@ -107,7 +107,7 @@ impl Bounds {
     }
 
     /// The sum at which the least misfit reaches the largest one, on one side of the best sum, and a load beside it that is not excluded; `None`
-    /// where there is no such sum.
+    /// where no sum reaches it.
     fn bound(&self, c: &Array1<f64>, side: f64) -> Option<(f64, Array1<f64>)> {
         let best = c.dot(&self.best);
         let step = side * 0.01 * best.abs().max(1.0 / self.stiffness.sqrt());
@@ -119,7 +119,7 @@ impl Bounds {
             if least.misfit > self.most {
                 return Some(self.between(c, inside, (t, least)));
             }
-            // No load has a smaller sum than none.
+            // No load has a smaller sum than 0.
             if side < 0.0 && least.sum <= 0.0 && c.iter().all(|c| *c >= 0.0) {
                 return Some((0.0, least.load));
             }
@@ -188,9 +188,9 @@ impl LeastSquares<'_> {
         self.right[i] + self.drawn.map_or(0.0, |(c, stiffness, t)| stiffness * t * c[i])
     }
 
-    /// The minimum over x ≥ 0 by active sets (Lawson and Hanson, *Solving Least Squares Problems*, 1974, chapter 23): of many columns that are nearly
-    /// alike only as many are ever used as there are rows, so that a wide A costs little. (`smoothness::minimise` uses nearly all of them, as smooth loads
-    /// do, and needs a positive definite matrix, which AᵀA is not.)
+    /// The minimum over x ≥ 0 by active sets (Lawson and Hanson, *Solving Least Squares Problems*, 1974, chapter 23). Among many nearly equal columns
+    /// it uses at most as many as there are rows, so that a wide A costs little. (`smoothness::minimise` uses nearly all of them, as smooth loads do,
+    /// and needs a positive definite matrix, which AᵀA is not.)
     fn non_negative(&self) -> Array1<f64> {
         let columns = self.right.len();
         let lengths: Vec<f64> = (0..columns).map(|j| self.gram(j, j).sqrt()).collect();
@@ -212,8 +212,8 @@ impl LeastSquares<'_> {
         x
     }
 
-    /// Brings x to the minimum over the columns in use, leaving out those that would be negative; false, and x as it was, where the `next` of
-    /// them gains nothing.
+    /// Brings x to the minimum over the columns in use, without those that would be negative. Returns false, with x unchanged, where the column
+    /// `next` does not reduce the misfit.
     fn fit(&self, x: &mut Array1<f64>, used: &mut Vec<usize>, next: usize) -> bool {
         let mut is_first = true;
         while !used.is_empty() {
@@ -285,7 +285,7 @@ mod tests {
         let (low, high) = bounds.of_sum(&Array1::ones(1));
         let half = 0.5 * RATIO_95.sqrt();
         assert!((low - (10.0 - half)).abs() < 1e-3 && (high - (10.0 + half)).abs() < 1e-3, "{low} {high}");
-        // A cell that no sensor sees has no bound, and one that reads too little may have none.
+        // A cell without a sensitive sensor has no bound, and one with too small a reading may have none.
         let blind =
             Bounds::new(&Array2::from_shape_vec((1, 2), vec![2.0, 0.0]).unwrap(), &Array1::from(vec![20.0]));
         assert_eq!(blind.of_sum(&Array1::ones(2)).1, f64::INFINITY);
@@ -305,7 +305,7 @@ mod tests {
         for end in [low, high] {
             assert!((misfit(end) - RATIO_95).abs() < 0.1, "{end}: {}", misfit(end));
         }
-        // One cell has one mean, and an invisible cell may have all of the load.
+        // One cell has one mean, and an insensitive cell may have all of the load.
         assert_eq!(bounds.of_mean(&[1], &[0.3]), (0.3, 0.3));
         let blind =
             Bounds::new(&Array2::from_shape_vec((1, 2), vec![2.0, 0.0]).unwrap(), &Array1::from(vec![20.0]));

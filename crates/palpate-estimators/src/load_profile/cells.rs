@@ -1,4 +1,4 @@
-//! The cells of a surface, each of which carries a part of the load.
+//! The cells of a surface; each carries a part of the load.
 
 use std::ops::RangeInclusive;
 
@@ -15,7 +15,7 @@ const ON_A_PLANE: usize = 20;
 const POINTS_ON_A_LINE: [usize; 2] = [8, 1];
 const POINTS_ON_A_PLANE: [usize; 2] = [3, 3];
 
-/// A surface parted into equal cells, numbered along x and then along y.
+/// A surface divided into equal cells, numbered along x and then along y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cells {
     /// The surface.
@@ -27,18 +27,18 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// 80 cells on a line; on a plane 20 along the longer side, as square as they come.
+    /// 80 cells on a line; on a plane 20 along the longer side, as square as possible.
     pub fn new(extent: Extent) -> Self {
         let Some(width_m) = extent.width_m() else { return Self { extent, columns: ON_A_LINE, rows: 1 } };
         let most = ON_A_PLANE as f64;
         let count = |side_m: f64| {
-            // A strip gets one row of cells at least, whatever its sides.
+            // A strip gets at least one row of cells, for any ratio of its sides.
             (most * side_m / extent.length_m().max(width_m)).round().clamp(1.0, most) as usize
         };
         Self { extent, columns: count(extent.length_m()), rows: count(width_m) }
     }
 
-    /// About `count` cells of a plane, as square as they come, with a number along each side within `sides`.
+    /// About `count` cells of a plane, as square as possible, with a number along each side within `sides`.
     pub fn nearly_square(extent: Extent, count: f64, sides: RangeInclusive<usize>) -> Self {
         let aspect = extent.width_m().unwrap_or(extent.length_m()) / extent.length_m();
         let side = |ratio: f64| ((count * ratio).sqrt().round() as usize).clamp(*sides.start(), *sides.end());
@@ -71,7 +71,7 @@ impl Cells {
         (0..self.len()).map(|cell| self.centre(cell))
     }
 
-    /// The cell that holds a position; the nearest one of a position off the surface.
+    /// The cell that contains a position; the nearest one for a position off the surface.
     pub fn cell_of(&self, position: Position) -> usize {
         let number = |at_m: f64, size_m: f64, count: usize| {
             ((at_m / size_m * count as f64).max(0.0) as usize).min(count - 1)
@@ -132,7 +132,7 @@ impl Cells {
         beside.into_iter().flatten()
     }
 
-    /// Points of a cell whose mean is the mean over the cell.
+    /// Points of a cell; the mean over them stands for the mean over the cell.
     pub(super) fn points(&self, cell: usize) -> Vec<Position> {
         let (from, to) = self.corners(cell);
         midpoints(from, to, self.points_a_side())

@@ -1,4 +1,4 @@
-//! Shares of 95 % intervals that hold what they are of, by where loads lie.
+//! Coverage of the 95 % intervals, by where loads lie.
 
 use super::tests::{beam, clean, layout, noisy};
 use super::*;
@@ -10,7 +10,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 const DISTANCES_M: [(f64, f64); 6] =
     [(0.001, 0.01), (0.01, 0.02), (0.02, 0.04), (0.04, 0.06), (0.06, 0.1), (0.1, 0.2)];
 
-/// Readings of which the profile has as many patches as there are loads, and how many of their intervals hold.
+/// Readings with as many patches in the profile as there are loads, and how many of their intervals contain the truth.
 #[derive(Debug, Default)]
 struct Held {
     readings: usize,
@@ -118,8 +118,8 @@ fn patches_are_held_wherever_they_lie() {
     }
 }
 
-/// No other load has the force of one over the whole beam, so that its interval ends where centre and width are told as well. docs/load-profiles.md has the
-/// shares of 400 readings: PALPATE_READINGS=400.
+/// No other load has the force of one over the whole beam, so that its interval ends where centre and width are determined as well.
+/// docs/load-profiles.md has the shares of 400 readings: PALPATE_READINGS=400.
 #[test]
 fn the_force_of_a_load_over_the_whole_beam_is_held() {
     let readings = fixtures::readings(40);

@@ -4,11 +4,11 @@ use super::cells::Cells;
 use super::{LoadChannel, LoadSensors};
 use ndarray::Array2;
 
-/// Nodes that an interpolation goes by along an axis.
+/// Nodes of an interpolation along an axis.
 const STENCIL: usize = 4;
 
-/// Influence functions, over the noise of their sensors, summed up from the lower left corner of the surface: the sum at the nodes of a grid, between
-/// which it is cubic. A mean over a rectangle is a difference of four of its values over the area.
+/// Influence functions, over the noise of their sensors, summed from the lower left corner of the surface: the sums at the nodes of a grid, with
+/// cubic interpolation between. A mean over a rectangle is a difference of four of these sums over the area.
 pub(super) struct CumulativeInfluence {
     channels: usize,
     /// Sides of the surface in metres; of a line, 1 across.
@@ -22,12 +22,12 @@ pub(super) struct CumulativeInfluence {
 /// The mean over a rectangle of each channel's influence function, over its noise, in 1/N; with derivatives per metre by its ends.
 pub(super) struct EvenMean {
     pub value: Vec<f64>,
-    /// By the ends along x and along y: the lower and the upper one.
+    /// Derivatives by the ends along x and along y: the lower and the upper one.
     pub slopes: [[Vec<f64>; 2]; 2],
 }
 
 impl CumulativeInfluence {
-    /// The table of the living channels, from the points of each cell.
+    /// The table of the channels that are not dead, from the points of each cell.
     pub fn new(sensors: &LoadSensors, cells: &Cells) -> Self {
         let alive: Vec<&LoadChannel> = sensors.alive().collect();
         let channels = alive.len();
@@ -58,7 +58,7 @@ impl CumulativeInfluence {
         Self { channels, sides_m, nodes, sums }
     }
 
-    /// The means over the cells whose points the table was made from, in 1/N: a channel a row, a cell a column.
+    /// The means over the cells that gave the table its points, in 1/N: a channel a row, a cell a column.
     pub fn over_cells(&self, cells: &Cells) -> Array2<f64> {
         let [along, across] = cells.points_a_side();
         let sum =
@@ -106,7 +106,7 @@ impl CumulativeInfluence {
         let area = lengths_m[0] * lengths_m[1];
         value.iter_mut().for_each(|value| *value /= area);
         for (slopes, length_m) in slopes.iter_mut().zip(lengths_m) {
-            // A longer stretch takes in what is beyond its end, and thins out the rest.
+            // A longer stretch includes the influence beyond its end, and dilutes the rest.
             for (slopes, sign) in slopes.iter_mut().zip([1.0, -1.0]) {
                 slopes
                     .iter_mut()
@@ -144,7 +144,7 @@ struct Stencil {
 }
 
 impl Stencil {
-    /// Those of nodes at which the sums are not 0, as they are at the first one.
+    /// The terms of nodes other than the first, where the sums are 0.
     fn terms(&self) -> impl Iterator<Item = (usize, (f64, f64))> {
         (self.first..).zip(self.terms.into_iter().take(self.count)).filter(|(node, _)| *node > 0)
     }

@@ -1,15 +1,15 @@
 //! Patches as evenly loaded stretches or rectangles: those that a reading does not exclude.
 //!
-//! A profile is drawn by its prior, smooth and no heavier than the reading asks for, and next to a support, where a heavy load reads as a lighter
-//! one farther in does, the prior decides. Here none does: a patch is a force F, spread evenly around a centre c over a width w, and
-//! a value v of its force, of its centre or of the centre of pressure is in the 95 % interval when some loads with that value leave
+//! A profile is shaped by its prior: smooth, and no heavier than the reading requires. Next to a support a heavy load reads like a lighter
+//! one farther in, and there the prior decides. Here no prior decides: a patch is a force F, spread evenly around a centre c over a width w. A
+//! value v of its force, of its centre or of the centre of pressure is in the 95 % interval when some loads with that value leave
 //! ‖y − Σ F·m(c, w)‖² within [`RATIO_95`] of the least that any leave, m being the means of the influence functions over the noise
 //! (the likelihood ratio, profiled over everything else: Pawitan, *In All Likelihood*, 2001, section 3.4).
 //!
-//! The least for a given v is had without a constraint, as in [`super::bounds`]: the minimum with (v − t)²·ρ² added is the least for its own v.
-//! Minima are those of Levenberg and Marquardt, with unknowns held at the ends of their ranges. A width follows from its square, to which
-//! readings are proportional where it is small, as a share s of the way from the least, a part of the grid, to the widest
-//! at its centre: w² = w_min² + s·(w_max(c)² − w_min²).
+//! The least for a given v is computed without a constraint, as in [`super::bounds`]: the minimum with (v − t)²·ρ² added is the least for its own v.
+//! Minima are by Levenberg–Marquardt, with unknowns clamped to their ranges. Readings are proportional to the square of a width where it is small. So
+//! the unknown is a share s of the square, from the least width, a part of the grid, to the widest at its centre:
+//! w² = w_min² + s·(w_max(c)² − w_min²).
 
 use super::cells::Cells;
 use super::cumulative::CumulativeInfluence;
@@ -22,9 +22,9 @@ use palpate_numerics::{Cholesky, chi_squared_critical_value};
 const RATIO_95: f64 = 3.84;
 /// Share of a side from which on a load is over the whole of it.
 const WHOLE: f64 = 0.95;
-/// Values of an interval that a median is of.
+/// Values of an interval from which a median is computed.
 const LOOKED_AT: usize = 16;
-/// Misfit that does not matter.
+/// Negligible misfit.
 const NEGLIGIBLE: f64 = 1e-3;
 /// Share by which the diagonal is raised in the projection of the score test.
 const SCORE_DAMPING: f64 = 1e-9;
@@ -34,9 +34,9 @@ const MOST_STEPS: usize = 200;
 const FIRST_DAMPING: f64 = 1e-4;
 const LEAST_DAMPING: f64 = 1e-12;
 const MOST_DAMPING: f64 = 1e6;
-/// Times that a search for an end doubles its step; beyond, there is none.
+/// Most doublings of the step in a search for an end; beyond them the value has no end.
 const MOST_DOUBLINGS: usize = 40;
-/// Halvings of the interval that holds an end.
+/// Halvings of the interval that contains an end.
 const MOST_HALVINGS: usize = 20;
 
 /// Loads that explain a reading: as many as there are patches.
@@ -54,7 +54,7 @@ struct Minimum {
     misfit: f64,
 }
 
-/// Value that an interval is of.
+/// Value with an interval.
 #[derive(Clone, Copy)]
 pub(super) enum Aim {
     /// Force of a load, in newtons.
@@ -67,7 +67,7 @@ pub(super) enum Aim {
     CentreOfPressure(usize),
 }
 
-/// A value that is drawn to `t` with the weight ρ².
+/// A value that is drawn to the target `t` with the weight ρ².
 type Drawn = (Aim, f64, f64);
 
 impl<'a> EvenLoads<'a> {
@@ -178,14 +178,14 @@ impl<'a> EvenLoads<'a> {
         self.load(&self.best.unknowns[number * self.each()..][..self.each()])
     }
 
-    /// The misfit that they leave.
+    /// The misfit of these loads.
     pub fn misfit(&self) -> f64 {
         self.best.misfit
     }
 
-    /// One of the loads, in the middle of those that the reading does not distinguish: the likeliest at the posterior median of its centre along each axis,
-    /// the prior being flat over the 95 % interval and everything else the likeliest there. (The likeliest of all is as good as drawn by lot where
-    /// force and place trade off.)
+    /// One of the loads, in the middle of those that the reading does not distinguish: the likeliest at the posterior median of its centre along each
+    /// axis. The prior is flat over the 95 % interval, and everything else is the likeliest there. (Where force and place trade off, the likeliest
+    /// load of all depends on chance.)
     pub fn middle_load(&self, number: usize) -> UniformLoad {
         let mut middle = self.best.unknowns.clone();
         let centres: Vec<usize> =
@@ -342,7 +342,7 @@ impl<'a> EvenLoads<'a> {
         slope
     }
 
-    /// The range of an unknown. A force of nothing would have no centre.
+    /// The range of an unknown. A force of 0 would have no centre.
     fn range(&self, unknown: usize) -> (f64, f64) {
         match unknown % self.each() {
             0 => (LEAST_FORCE_N, f64::INFINITY),
@@ -355,7 +355,7 @@ impl<'a> EvenLoads<'a> {
         }
     }
 
-    /// The minimum of the misfit near some unknowns, of which some are held; a value may be drawn.
+    /// The minimum of the misfit near some unknowns, with the unknowns `held` fixed; a value may be drawn towards a target.
     fn minimum(&self, mut unknowns: Vec<f64>, drawn: Option<Drawn>, held: &[usize]) -> Minimum {
         let mut damping = FIRST_DAMPING;
         let mut here = self.normal_equations(&unknowns, drawn);
@@ -398,8 +398,8 @@ impl<'a> EvenLoads<'a> {
         found
     }
 
-    /// Unknowns after a step of Levenberg and Marquardt, in which those at an end of their range stay there or come away from it; `None` where the
-    /// equations have no solution.
+    /// Unknowns after a Levenberg–Marquardt step. Unknowns at an end of their range stay there or move away from it. `None` where the equations have
+    /// no solution.
     fn step(
         &self,
         unknowns: &[f64],
@@ -428,7 +428,7 @@ impl<'a> EvenLoads<'a> {
         }
     }
 
-    /// Standard deviation of a value to first order; `None` where the reading does not tell it.
+    /// Standard deviation of a value to first order; `None` where the reading does not determine it.
     pub fn sd(&self, aim: Aim) -> Option<f64> {
         let unknowns = &self.best.unknowns;
         let here = self.normal_equations(unknowns, None);
@@ -443,7 +443,7 @@ impl<'a> EvenLoads<'a> {
     fn end(&self, aim: Aim, step: f64) -> Option<f64> {
         let (end, unknowns) = self.end_at(aim, step, RATIO_95)?;
         if unknowns.chunks(self.each()).any(|load| self.is_whole(load)) {
-            // No other load has the force of this one, so that it tells centres and widths as well.
+            // No other load has the force of this one, so that its force determines centres and widths as well.
             let ratio = chi_squared_critical_value(0.05, self.each());
             return self.end_at(aim, step, ratio).map(|(end, _)| end);
         }
@@ -456,7 +456,7 @@ impl<'a> EvenLoads<'a> {
         (0..self.dimensions).all(|axis| ends_m[axis][1] - ends_m[axis][0] >= WHOLE * self.table.side_m(axis))
     }
 
-    /// The same for misfits that exceed the least by a given ratio at most, with the unknowns there.
+    /// The end of the interval for misfits that exceed the least by `ratio` at most, with the unknowns there.
     fn end_at(&self, aim: Aim, step: f64, ratio: f64) -> Option<(f64, Vec<f64>)> {
         let most = self.best.misfit + ratio;
         let stiffness = 1.0 / (step * step);
@@ -470,7 +470,8 @@ impl<'a> EvenLoads<'a> {
             }
             let (was, is) = (self.value_at(aim, &inside.unknowns), self.value_at(aim, &found.unknowns));
             (inside, from) = (found, t);
-            // It does not follow. (One that hardly does may be told far better than to first order, as the force of a load that can be no wider.)
+            // The value does not follow the target. (A value that hardly follows may be determined far better than to first order, as the force of a
+            // load of greatest width.)
             if way.abs() > 8.0 * step.abs() && (is - was).abs() < 1e-9 * step.abs() {
                 return (!self.is_at_edge(aim, &inside.unknowns)).then_some((is, inside.unknowns));
             }
@@ -502,7 +503,7 @@ impl<'a> EvenLoads<'a> {
         (!self.is_at_edge(aim, &inside.1.unknowns)).then_some((end, inside.1.unknowns))
     }
 
-    /// True for a value of a load whose centre is at an end of its range. The value has no bound then: a narrower load could be nearer to the edge, and
+    /// True for a value of a load with a centre at an end of its range. The value has no bound then: a narrower load could be nearer to the edge, and
     /// harder.
     fn is_at_edge(&self, aim: Aim, unknowns: &[f64]) -> bool {
         let is_at_end = |i: usize| {
@@ -526,18 +527,18 @@ const LEAST_FORCE_N: f64 = 1e-12;
 /// Half of the misfit's derivatives, to first order in the residuals' own.
 struct NormalEquations {
     misfit: f64,
-    /// The misfit with what a value is drawn by.
+    /// The misfit, with the penalty on the drawn value.
     cost: f64,
     gradient: Array1<f64>,
     hessian: Array2<f64>,
 }
 
-/// Solves the listed rows and columns for the same rows of `right`, with the diagonal raised by a share; `None` where there is no solution.
+/// Solves the listed rows and columns for the same rows of `right`, with the diagonal raised by a share; `None` for a singular matrix.
 fn solve(hessian: &Array2<f64>, listed: &[usize], share: f64, right: &Array1<f64>) -> Option<Array1<f64>> {
     if listed.is_empty() {
         return None;
     }
-    // In units of each unknown, so that newtons and metres weigh alike.
+    // In units of each unknown, so that newtons and metres have equal weight.
     let scales: Vec<f64> = listed.iter().map(|i| hessian[[*i, *i]].sqrt().max(f64::MIN_POSITIVE)).collect();
     let scaled = Array2::from_shape_fn((listed.len(), listed.len()), |(i, j)| {
         let value = hessian[[listed[i], listed[j]]] / scales[i] / scales[j];
@@ -556,9 +557,9 @@ mod tests {
     use super::*;
     use palpate_mechanics::sensing::{Layout, SensorKind};
 
-    /// A deflection of a simple beam is a·F times a quadratic in a², a being the place of F on the near side of the sensor: it tells F·c and the mean
-    /// square c² + w²/4 of a³ over a, and no width apart from the centre. So the centre is from R/√2, where the load begins at the support, to
-    /// R = √(c² + w²/4), where it has no width, and the force from F·c/R on.
+    /// A deflection of a simple beam is a·F times a quadratic in a², a being the place of F on the near side of the sensor. It determines F·c and the
+    /// mean square c² + w²/4 of a³ over a, but no width apart from the centre. So the centre ranges from R/√2, where the load begins at the support,
+    /// to R = √(c² + w²/4), where it has no width, and the force from F·c/R on.
     #[test]
     fn loads_that_read_alike_are_in_the_interval() {
         let beam = beam();

@@ -1,18 +1,19 @@
 //! Load profiles: how force is spread over a surface, from one reading.
 //!
 //! A load p(a) ≥ 0 is read as y_i = ∫ f_i(a)·p(a) da + noise, where f_i is the influence function of sensor i. A few readings do
-//! not tell a whole function, so p is sought among the non-negative ones that are as smooth as the reading allows:
+//! not determine a whole function, so p is the non-negative function that is as smooth as the reading allows:
 //!
 //! 1. p is a force in each of n cells ([`Cells`]); A holds each sensor's mean influence over each cell, in units of its noise.
 //! 2. For a smoothness λ, x minimises ½·‖A·x − y‖² + ½·λ·xᵀP·x + μ·Σx over x ≥ 0, where xᵀP·x sums the squares of second
-//!    differences (the bending energy on a plane), with no load beyond the edges, and μ = n/F makes the force of a cell
-//!    exponentially distributed with mean F/n, of all non-negative distributions the least committed: load that hardly any
-//!    sensor sees, as next to a support, is not invented.
-//! 3. Smoothness is weighed by its evidence, the probability of the reading under it, in the Gaussian approximation on the
+//!    differences (the bending energy on a plane), with no load beyond the edges. μ = n/F makes the force of a cell
+//!    exponentially distributed with mean F/n, the maximum-entropy distribution of a non-negative force with that mean: load where hardly any
+//!    sensor is sensitive, as next to a support, is not invented.
+//! 3. Each smoothness is weighted by its evidence, the probability of the reading under it, in the Gaussian approximation on the
 //!    cells that are not zero; profile and covariance are the mixture over all λ.
 //! 4. Patches are the connected parts that carry load, and more where the reading needs more even loads to be explained (`patch_number`). Their
-//!    forces and centres, and the centre of pressure, have the intervals of even loads, which no prior decides, and the values of such loads where
-//!    the mixture's are outside of these. Where no even loads explain the reading, the intervals are those of loads of any shape (`bounds`).
+//!    forces and centres, and the centre of pressure, have the intervals of even loads, which do not depend on a prior. Where the mixture's values
+//!    are outside of these intervals, those of the even loads replace them. Where no even loads explain the reading, the intervals are those of loads
+//!    of any shape (`bounds`).
 //! 5. The whole force is bounded over loads of any shape.
 //!
 //! The method is penalised non-negative least squares in Bayesian dress: MacKay, *Bayesian Interpolation*, Neural
@@ -69,35 +70,35 @@ pub struct LoadSensors<'a> {
     pub channels: Vec<Option<LoadChannel<'a>>>,
 }
 
-/// A setup whose readings cannot become a profile.
+/// A setup that cannot be used for load profiles.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LoadSensorsError {
-    /// The surface has no model, and nothing was fitted.
+    /// A surface without a model or fitted influence functions.
     #[error(
         "a measured surface has no influence functions of a spread load; give a surface with a model, such as a beam"
     )]
     NoModel,
-    /// A live sensor has no noise, or none is alive.
+    /// A live sensor has no noise, or all sensors are dead.
     #[error(transparent)]
     Noise(#[from] NoiseError),
-    /// The equations of the surface have no solution that is in balance.
+    /// The equations of the surface have no solution in balance.
     #[error("the equations of the surface could not be solved: {error}; {help}", error = .0, help = .0.help())]
     Surface(#[from] Unsolvable),
 }
 
 impl<'a> LoadSensors<'a> {
-    /// The sensors of `layout` under a surface with a model; the noise of each is √(σ² + q²/12), q being its resolution.
+    /// The sensors of `layout` under a surface with a model. The noise of each is √(σ² + q²/12), with its resolution q.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] for a live sensor without noise, when none is alive, or for a surface that cannot be solved.
+    /// [`LoadSensorsError`] for a live sensor without noise, for a layout of dead sensors, or for a surface that cannot be solved.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LoadSensorsError> {
         Self::new_watched(surface, layout, Watch::NONE)
     }
 
-    /// The same, watched while the surface is solved.
+    /// The sensors of [`LoadSensors::new`], watched while the surface is solved.
     ///
     /// # Errors
-    /// Those of [`LoadSensors::new`]; where the watch stopped it, [`LoadSensorsError::Surface`] with [`Unsolvable::Cancelled`].
+    /// As for [`LoadSensors::new`]; where the watch stopped it, [`LoadSensorsError::Surface`] with [`Unsolvable::Cancelled`].
     pub fn new_watched(
         surface: &'a dyn Surface,
         layout: &Layout,
@@ -117,21 +118,21 @@ impl<'a> LoadSensors<'a> {
     /// The sensors of a setup, by mechanics.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] for a surface without a model, a live sensor without noise, or when none is alive.
+    /// [`LoadSensorsError`] for a surface without a model, a live sensor without noise, or a layout of dead sensors.
     pub fn from_setup(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
         Self::from_setup_watched(setup, Watch::NONE)
     }
 
-    /// The same, watched while the surface is solved.
+    /// The sensors of [`LoadSensors::from_setup`], watched while the surface is solved.
     ///
     /// # Errors
-    /// Those of [`LoadSensors::from_setup`] and of [`LoadSensors::new_watched`].
+    /// As for [`LoadSensors::from_setup`] and [`LoadSensors::new_watched`].
     pub fn from_setup_watched(setup: &'a Setup, watch: Watch) -> Result<Self, LoadSensorsError> {
         let model = setup.surface().model().ok_or(LoadSensorsError::NoModel)?;
         Self::new_watched(model, setup.layout(), watch)
     }
 
-    /// The channels that live.
+    /// The channels that are not dead.
     pub fn alive(&self) -> impl Iterator<Item = &LoadChannel<'a>> {
         self.channels.iter().flatten()
     }
@@ -161,11 +162,11 @@ pub struct Profiler<'a> {
     worst_misfit: f64,
 }
 
-/// A load, as one reading tells it.
+/// A load, estimated from one reading.
 #[derive(Clone, Debug)]
 pub struct LoadProfile {
-    /// Status of the profile: located; ambiguous, when the number of patches is not resolved; no contact; or outside the model, when no load
-    /// explains the reading within its noise.
+    /// Status of the profile: located; ambiguous, when the number of patches is not resolved; no contact; or outside the model, when no load explains
+    /// the reading within its noise.
     pub status: Status,
     /// The cells of the surface.
     pub cells: Cells,
@@ -179,7 +180,7 @@ pub struct LoadProfile {
     pub total_sd_n: f64,
     /// Bounds of the sum.
     pub bounds: ForceBounds,
-    /// Centre of the whole force, as far as it is in patches: what lies unseen beside an edge is not in it; `None` without load.
+    /// Centre of the force in the patches, without load beside an edge that the sensors do not detect; `None` without load.
     pub centre: Option<CentreOfPressure>,
     /// The patches that carry load, along x.
     pub patches: Vec<Patch>,
@@ -187,9 +188,9 @@ pub struct LoadProfile {
     pub fitted: Vec<Option<f64>>,
     /// Reading less fitted, over the standard deviation of the noise; `None` for dead channels.
     pub residuals: Vec<Option<f64>>,
-    /// The least sum of squared residuals that any smoothness leaves, or even loads in the places of the patches.
+    /// The least sum of squared residuals of any smoothness, or of even loads in the places of the patches.
     pub misfit: f64,
-    /// Bound of the misfit, exceeded by noise in one of a thousand readings, whatever the load.
+    /// Bound of the misfit, exceeded by noise in one of a thousand readings, for any load.
     pub worst_misfit: f64,
     /// λ of the most probable smoothness, in 1/N²; `None` without load.
     pub smoothness: Option<f64>,
@@ -198,11 +199,11 @@ pub struct LoadProfile {
 /// 95 % intervals of a load's whole force, over loads of any shape; an upper end is infinite where the reading does not bound it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ForceBounds {
-    /// Of the whole force, in newtons.
+    /// Interval of the whole force, in newtons.
     pub total_95_n: (f64, f64),
-    /// Distance from the edges, in metres, within which a load of this force is not told from a harder one at the edge.
+    /// Distance from the edges, in metres, within which a load of this force cannot be distinguished from a harder one at the edge.
     pub margin_m: f64,
-    /// Of the whole force, where nothing lies within that distance.
+    /// Interval of the whole force, in newtons, if no load lies within that distance.
     pub seen_95_n: (f64, f64),
 }
 
@@ -234,7 +235,7 @@ impl<'a> Profiler<'a> {
         &self.sensors
     }
 
-    /// The load that a reading tells: one finite value a channel, in SI units.
+    /// The load, estimated from a reading: one finite value a channel, in SI units.
     ///
     /// # Errors
     /// [`ReadingError`] for another number of channels or a value that is not finite.
@@ -243,7 +244,7 @@ impl<'a> Profiler<'a> {
         let channels = self.sensors.channels.iter().zip(reading);
         let whitened = channels.filter_map(|(channel, value)| {
             let channel = channel.as_ref()?;
-            // Of values beyond all bounds the squares are still numbers.
+            // Clamped, so that the squares of huge values are finite.
             Some(((value - channel.offset) / channel.noise_sd).clamp(-LARGEST, LARGEST))
         });
         let y: Array1<f64> = whitened.collect();
@@ -314,7 +315,7 @@ impl<'a> Profiler<'a> {
         ForceBounds { total_95_n, margin_m, seen_95_n: holding(of_seen, total_n) }
     }
 
-    /// Even loads that explain a whitened reading; `None` where they leave a misfit that noise seldom exceeds.
+    /// Even loads that explain a whitened reading; `None` where their misfit exceeds that by noise.
     fn patch_loads(
         &'a self,
         shapes: &Bounds,
@@ -331,8 +332,8 @@ impl<'a> Profiler<'a> {
         PatchLoads::new(&tables, y, &starts).filter(|even| even.reported.misfit() <= self.worst_misfit)
     }
 
-    /// Gives patches, their centre and their sum the number and the intervals of even loads, and the values of such loads where the intervals do
-    /// not contain those of the profile.
+    /// Gives patches, their centre and their sum the number and the intervals of even loads, and the values of these loads where the intervals do not
+    /// contain those of the profile.
     fn follow(
         &self,
         PatchLoads { reported, unresolved }: &PatchLoads,
@@ -386,7 +387,7 @@ impl<'a> Profiler<'a> {
         centre.take_bounds(bounds, &self.cells, &everything);
     }
 
-    /// Cells beside an edge in which a load of this force is not told from one at the edge: its distance from there is within 1.96 standard
+    /// Cells beside an edge in which a load of this force cannot be distinguished from one at the edge: its distance from there is within 1.96 standard
     /// deviations of its limit.
     fn blind_cells(&self, force_n: f64) -> Vec<usize> {
         let extent = self.cells.extent;
@@ -400,7 +401,7 @@ impl<'a> Profiler<'a> {
             within(x_m, extent.length_m(), limit.sd_x_m)
                 || extent.width_m().is_some_and(|width_m| within(y_m, width_m, limit.sd_y_m))
         };
-        // From the edges inwards, as long as there are any.
+        // From the edges inwards, as long as such cells follow.
         let Cells { columns, rows, .. } = self.cells;
         let from_edge = |cell: &usize| {
             let (column, row) = (cell % columns, cell / columns);
@@ -445,7 +446,7 @@ impl<'a> Profiler<'a> {
 }
 
 impl LoadProfile {
-    /// Density of the load in a cell and the ends of its 95 % interval, held at 0: N/m on a line, N/m² on a plane.
+    /// Density of the load in a cell and its 95 % interval, clipped at 0: N/m on a line, N/m² on a plane.
     pub fn density(&self, cell: usize) -> (f64, (f64, f64)) {
         let measure = self.cells.measure();
         let (force, sd) = (self.forces_n[cell], self.covariance_n2[[cell, cell]].sqrt());
@@ -462,18 +463,18 @@ impl LoadProfile {
 /// Least standard deviations for one of several patches.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PatchLimit {
-    /// Of its centre along x, in metres.
+    /// Standard deviation of its centre along x, in metres.
     pub sd_x_m: f64,
-    /// Of its centre along y, in metres; 0 on a line.
+    /// Standard deviation of its centre along y, in metres; 0 on a line.
     pub sd_y_m: f64,
-    /// Of its force, in newtons.
+    /// Standard deviation of its force, in newtons.
     pub sd_force_n: f64,
 }
 
 /// The limits of patches that are each loaded evenly, of known number and sizes: the diagonal of the inverse of the Fisher
 /// information Σ_i ∇m_i·∇m_iᵀ/σ_i², where m_i is what sensor i reads of all patches and ∇ goes over all centres and forces
 /// (Kay, *Fundamentals of Statistical Signal Processing: Estimation Theory*, 1993, section 3.9). `None` where the readings do
-/// not tell them all.
+/// not determine them all.
 pub fn patch_limits(sensors: &LoadSensors, loads: &[UniformLoad]) -> Option<Vec<PatchLimit>> {
     // Force, and the coordinates of the centre.
     let each = 1 + sensors.extent.dimensions();
@@ -488,7 +489,7 @@ pub fn patch_limits(sensors: &LoadSensors, loads: &[UniformLoad]) -> Option<Vec<
             }
         }
     }
-    // Columns of length 1, so that newtons and metres weigh alike.
+    // Columns of length 1, so that newtons and metres have equal weight.
     let lengths: Vec<f64> = slopes.columns().into_iter().map(|column| column.dot(&column).sqrt()).collect();
     for (mut column, length) in slopes.columns_mut().into_iter().zip(&lengths) {
         column /= *length;
@@ -503,9 +504,9 @@ pub fn patch_limits(sensors: &LoadSensors, loads: &[UniformLoad]) -> Option<Vec<
     Some((0..loads.len()).map(limit).collect())
 }
 
-/// Averaging kernels of the linearised inverse: without the bound at 0, the force told of cell i is Σ_k R_ik times the force
+/// Averaging kernels of the linearised inverse: without the bound at 0, the estimated force of cell i is Σ_k R_ik times the force
 /// of cell k, with R = (AᵀA + λ·P)⁻¹·AᵀA (Backus and Gilbert, *The Resolving Power of Gross Earth Data*, Geophys. J. R. astr.
-/// Soc. 16, 1968). That no load is negative resolves more than this where there is none beside.
+/// Soc. 16, 1968). The constraint that no load is negative resolves more than this where adjacent cells have no load.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resolution {
     /// The cells.
@@ -532,7 +533,7 @@ fn width_m(cells: &Cells, kernel: &[f64]) -> f64 {
         let above = kernel.iter().filter(|value| **value > half).count();
         return (above as f64 * cells.measure()).sqrt();
     }
-    // Cells from the top to where the kernel falls to half, between two cells in proportion; the edge is an end too.
+    // Cells from the top to where the kernel falls to half, interpolated between two cells; the edge is an end too.
     let reach = |steps: &mut dyn Iterator<Item = usize>| {
         let (mut before, mut reached) = (kernel[top], 0.0);
         for cell in steps {

@@ -18,7 +18,7 @@ const UNRESOLVED_RATE: f64 = 0.05;
 
 /// Even loads of a reading.
 pub(super) struct PatchLoads<'a> {
-    /// The patches that stand out.
+    /// The patches that are significant.
     pub reported: EvenLoads<'a>,
     /// More loads, where the number of the reported ones is rejected at 5 %.
     pub unresolved: Option<EvenLoads<'a>>,

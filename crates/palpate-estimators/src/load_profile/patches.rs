@@ -54,7 +54,7 @@ impl CentreOfPressure {
         Self { position, sd_x_m, sd_y_m, x_95_m, y_95_m }
     }
 
-    /// Takes the intervals of even loads; true where they contain the place.
+    /// Takes the intervals of even loads; true where these contain the place.
     pub(super) fn follow(&mut self, even: &EvenLoads, extent: Extent, aim: impl Fn(usize) -> Aim) -> bool {
         self.x_95_m = even.interval_95(aim(0));
         if extent.dimensions() > 1 {
@@ -95,7 +95,7 @@ impl CentreOfPressure {
         }
     }
 
-    /// Moves it, and its intervals with it where they do not hold it there.
+    /// Moves the patch; its intervals are extended where they would not contain the new position.
     pub(super) fn move_to(&mut self, position: Position) {
         self.position = position;
         self.x_95_m = holding(self.x_95_m, position.x_m);
@@ -151,7 +151,7 @@ impl Patch {
         along.hypot(beyond(position.y_m, self.from.y_m, self.to.y_m))
     }
 
-    /// An even load of its force and sizes around its centre, as far as the surface reaches: what its limit is of.
+    /// An even load with its force and sizes around its centre, no wider than the surface allows: the load of its limit.
     pub fn as_load(&self, extent: Extent) -> UniformLoad {
         let Position { x_m, y_m } = self.centre.position;
         let side = |centre: f64, (from, to): (f64, f64), size: f64| {
@@ -222,9 +222,9 @@ struct Part {
 
 /// The patches of a profile, along x.
 ///
-/// Connected cells above the share of the highest are patches; each takes the cells downhill from it as its flanks, up to the
-/// valley to the next. A patch whose force does not stand out of its own uncertainty becomes a part of the one beside it, or,
-/// where there is none, is none.
+/// Connected cells above the share of the highest are patches. Each takes the cells downhill from it as its flanks, up to the
+/// valley to the next. A patch with a force that is not significant against its own uncertainty becomes a part of the one beside it, or,
+/// without a neighbour, is dropped.
 pub(super) fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<Patch> {
     let mut parts = grow(cells, forces_n, cores(cells, forces_n));
     let least_ratio = normal_quantile(1.0 - OUTSIDE_MODEL_RATE);

@@ -4,12 +4,12 @@ use ndarray::{Array1, Array2, Axis};
 use palpate_numerics::Cholesky;
 
 /// Second differences of the forces of cells have standard deviations from 10⁻³ to 10² of a cell's mean force, a quarter of
-/// a decade apart: from a load that is all but a straight line to one whose cells know nothing of each other.
+/// a decade apart: from a load that is almost a straight line to one with independent cells.
 const DECADES: (i32, i32) = (-3, 2);
 const LEVELS_A_DECADE: i32 = 4;
-/// Smoothness for the first guess of the force, as a share of what the readings say.
+/// Smoothness for the first guess of the force, as a share of the information of the readings.
 const FIRST_SHARE: f64 = 1e-4;
-/// A level with a smaller share of the probability changes nothing.
+/// Least share of the probability with which a level counts in the covariance.
 const SHARE_THAT_MATTERS: f64 = 1e-4;
 
 /// Least-squares problem of the forces of cells, with its smoothness penalty.
@@ -26,7 +26,7 @@ pub(super) struct Problem {
 pub(super) struct Mixture {
     /// Mean force of each cell, in newtons.
     pub forces: Array1<f64>,
-    /// Their covariance, in N².
+    /// Covariance of the forces, in N².
     pub covariance: Array2<f64>,
     /// λ of the most probable level, in 1/N².
     pub smoothness: f64,
@@ -47,7 +47,7 @@ impl Problem {
         Self { gram: influence.t().dot(&influence), influence, roughness }
     }
 
-    /// The forces that a whitened reading y tells; `None` where no load at all explains it best.
+    /// The forces for a whitened reading y; `None` where no load at all explains it best.
     pub fn solve(&self, y: &Array1<f64>) -> Option<Mixture> {
         let levels = self.levels(y)?;
         let best = levels.iter().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
@@ -90,8 +90,8 @@ impl Problem {
         &self.gram + &(smoothness * &self.roughness)
     }
 
-    /// Evidence of a level: ln of ∫ exp(−½·‖A·x − y‖² − ½·λ·xᵀP·x − μ·Σx) dx over the free cells, by Laplace's method, less
-    /// the logarithm of the same without readings; that of μ is the same for all levels and left out.
+    /// Evidence of a level: ln of ∫ exp(−½·‖A·x − y‖² − ½·λ·xᵀP·x − μ·Σx) dx over the free cells, by Laplace's method, less the logarithm of the
+    /// integral without readings. The part of μ is equal for all levels and omitted.
     fn level(&self, y: &Array1<f64>, smoothness: f64, rate: f64, minimum: NonNegative) -> Option<Level> {
         let x = &minimum.solution;
         let force = x.sum();
@@ -145,7 +145,7 @@ const ROUNDING: f64 = 1e-11;
 pub(super) struct NonNegative {
     /// x.
     pub solution: Array1<f64>,
-    /// The unknowns that are not held at 0, in rising order.
+    /// The unknowns above 0, in rising order.
     pub free: Vec<usize>,
     /// The Cholesky factor of H on them.
     pub factor: Cholesky,

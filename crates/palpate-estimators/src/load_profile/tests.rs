@@ -1,4 +1,4 @@
-//! Profiles of loads that are known, over many readings.
+//! Profiles of known loads, over many readings.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub(super) fn beam() -> Beam {
     Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap()
 }
 
-/// Eight deflection sensors with 2 µm noise, and as many strain sensors with 0.5 µε where they are wanted.
+/// Eight deflection sensors with 2 µm noise, and eight strain sensors with 0.5 µε if `strain`.
 pub(super) fn layout(strain: bool) -> Layout {
     let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
     layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 2e-6)).unwrap();
@@ -47,7 +47,7 @@ pub(super) fn noisy(sensors: &LoadSensors, clean: &[f64], rng: &mut Xoshiro256Pl
     each.map(|(sd, value)| value + sd * rng.sample::<f64, _>(StandardNormal)).collect()
 }
 
-/// Counts and errors of two patches of 2 N each, 120 mm apart, as many readings tell them.
+/// Counts and errors of two patches of 2 N each, 120 mm apart, over many readings.
 #[derive(Debug, Default)]
 struct Tally {
     resolved: usize,
@@ -96,8 +96,8 @@ fn tally(strain: bool, readings: usize) -> Tally {
     tally
 }
 
-/// docs/load-profiles.md has these for 200 readings: PALPATE_READINGS=200. Few readings are far off, and four of them are among the
-/// first forty: a share needs a hundred.
+/// docs/load-profiles.md has these for 200 readings: PALPATE_READINGS=200. Few readings are far off, and four of them are among the first forty, so a
+/// share needs a hundred readings.
 fn readings() -> usize {
     fixtures::readings(100)
 }
@@ -112,7 +112,7 @@ fn two_patches_are_told_at_their_limits() {
     assert!(tally.centre_squares < 1.4 * 1.4 * 2.0 * tally.two as f64, "{tally:?}");
     // A third load is significant at 5 % in one of twenty readings.
     assert!(tally.resolved * 100 >= 88 * readings, "{tally:?}");
-    // Intervals that say 95 %.
+    // Shares of the 95 % intervals that contain the truth.
     let shares =
         [tally.centres_covered, tally.forces_covered, 2 * tally.total_covered, 2 * tally.pressure_covered];
     assert!(shares.iter().all(|covered| covered * 100 >= 85 * 2 * tally.two), "{tally:?}");
@@ -140,7 +140,7 @@ fn the_same_reading_gives_the_same_profile_and_twice_the_load_twice_the_profile(
     // Without noise the truth is within the interval of the patch's centre, and no load is negative.
     assert!((one.patches[0].centre.position.x_m - 0.14).abs() < 2e-3);
     assert!(one.forces_n.iter().all(|force| *force >= 0.0));
-    // Reading less residual is what the sensors would read of the profile.
+    // Reading less residual is the sensors' reading of the profile.
     for ((channel, fitted), (value, residual)) in
         sensors.channels.iter().zip(&one.fitted).zip(once.iter().zip(&one.residuals))
     {
@@ -159,7 +159,7 @@ fn an_even_load_is_smooth_and_one_patch() {
     // A second load is significant at 5 % in this reading, though not at one in a thousand.
     assert_eq!((profile.status, profile.patches.len()), (Status::Ambiguous, 1));
     assert!((profile.total_n - 4.0).abs() < 0.2, "{}", profile.total_n);
-    // Half of its length, from 100 mm to 300 mm: the sums are told better than the shape.
+    // Half of its length, from 100 mm to 300 mm: the sums are determined better than the shape.
     let middle: f64 = profile.forces_n[20..60].iter().sum();
     assert!((middle / (4.0 * 0.2 / 0.36) - 1.0).abs() < 0.05, "{middle}");
 }
@@ -175,17 +175,17 @@ fn silence_and_impossible_readings_have_their_status() {
     assert_eq!((silent.status, silent.total_n, silent.patches.len()), (Status::NoContact, 0.0, 0));
     assert!(profiler.resolution(&silent).is_none() && silent.centre.is_none());
     let mut reading = clean(&sensors, &[patch(0.14, 2.0)]);
-    // A dead channel says nothing, whatever it reads.
+    // A dead channel has no effect, for any reading.
     reading[3] = 1.0;
     assert_eq!(profiler.profile(&reading).unwrap().status, Status::Located);
-    // One deflection sensor a tenth of a millimetre off: no load bends a beam like that.
+    // One deflection sensor a tenth of a millimetre off, which no load explains.
     reading[5] += 1e-4;
     assert_eq!(profiler.profile(&reading).unwrap().status, Status::OutsideModel);
     // A load that pulls.
     let pulled: Vec<f64> = clean(&sensors, &[patch(0.14, 2.0)]).iter().map(|value| -value).collect();
     assert_eq!(profiler.profile(&pulled).unwrap().status, Status::OutsideModel);
     assert!(profiler.profile(&[0.0; 3]).is_err() && profiler.profile(&[f64::NAN; 16]).is_err());
-    // Values beyond all bounds have numbers for an answer.
+    // Huge values give finite results.
     let absurd = profiler.profile(&[1e300; 16]).unwrap();
     assert!(absurd.status == Status::OutsideModel && absurd.misfit.is_finite(), "{}", absurd.misfit);
     assert!(absurd.total_n.is_finite() && absurd.forces_n.iter().all(|force| force.is_finite()));
@@ -211,7 +211,7 @@ fn the_resolution_is_finer_with_strain() {
         let reading = clean(&sensors, &[patch(0.14, 2.0), patch(0.26, 2.0)]);
         let profiler = Profiler::new(sensors);
         let resolution = profiler.resolution(&profiler.profile(&reading).unwrap()).unwrap();
-        // A kernel averages where it stands, away from the edges.
+        // The kernel of a cell away from the edges averages around that cell.
         let kernel = resolution.kernels.row(40);
         let top = (0..80).max_by(|a, b| kernel[*a].total_cmp(&kernel[*b])).unwrap();
         assert!(top.abs_diff(40) <= 4, "{top}");
@@ -297,8 +297,8 @@ fn on_a_plane_two_squares_are_told_apart() {
     }
 }
 
-/// Loads of one or two pads of 20 mm by the distance of the outermost pad's centre from a support: how often the total's interval holds it, and
-/// without what lies within the margin.
+/// Loads of one or two pads of 20 mm by the distance of the outermost pad's centre from a support: how often the total's interval contains the total,
+/// with and without the load within the margin.
 fn covered_by_distance(readings: usize) -> Vec<[f64; 3]> {
     let beam = beam();
     let mut layout = layout(false);

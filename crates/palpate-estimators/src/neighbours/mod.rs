@@ -1,4 +1,4 @@
-//! The k nearest neighbours: a contact is where the training presses were whose readings are most alike.
+//! The k nearest neighbours: the contact is estimated from the training presses with the most similar readings.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,8 +14,8 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// The k nearest neighbours, weighted by their inverse distance, in the space of the reading's [`Features`], each of which
-/// has variance 1. Whitening by their full covariance would blow directions of mere noise up to the size of the others.
+/// The k nearest neighbours, weighted by their inverse distance, in the space of the reading's [`Features`], each scaled
+/// to variance 1. Whitening by their full covariance would amplify directions of pure noise to the size of the others.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, neighbours::Neighbours};
@@ -30,8 +30,8 @@ use palpate_numerics::watch::{Cancelled, Watch};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Neighbours {
-    /// Most neighbours to try, at least 1. Of k = 1, 2, … that which is nearest to the training rows in the root mean square
-    /// is taken, each row located by the rows at other positions; of several kinds of features that with the nearest of all.
+    /// Most neighbours to try, at least 1. Each training row is located by the rows at other positions; the number k = 1, 2, … with the least
+    /// root-mean-square error is chosen, and among several kinds of features the one with the least error.
     pub most: usize,
 }
 
@@ -44,10 +44,10 @@ impl Default for Neighbours {
 /// A recording that the neighbours do not suit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NeighboursFitError {
-    /// No position has another one to be judged by.
+    /// Too few positions: each needs another one to be located by.
     #[error(transparent)]
     Positions(#[from] TooFewPositions),
-    /// Nothing to compare readings by.
+    /// Constant readings, which cannot be compared.
     #[error(transparent)]
     Features(#[from] NoFeatures),
     /// The recording's channels are not the setup's.
@@ -73,7 +73,7 @@ impl Fit for Neighbours {
             }
         }
         let none = NoFeatures { channels: recording.channels.len(), rows: recording.rows.len() };
-        // Contenders are never none.
+        // The list of contenders is never empty.
         Ok(best.ok_or(none)?.1)
     }
 }
@@ -106,7 +106,7 @@ impl Neighbours {
     }
 }
 
-/// Rows that are held out; their errors tell the number of neighbours and how far off they are long before all are.
+/// Most rows that are held out: so many errors suffice to choose the number of neighbours and to estimate the error.
 pub(crate) const MOST_HELD_OUT: usize = 4000;
 
 /// Errors (x, y) in metres of every row, or of evenly picked ones, by 1, 2, … neighbours at other positions, up to `most` or as many
@@ -140,7 +140,7 @@ pub struct NeighboursLocator {
     pub count: usize,
     /// The training rows.
     pub rows: Vec<Neighbour>,
-    /// The contact's force in newtons, where the bench knows it.
+    /// The contact's force in newtons, where it is known.
     pub force_n: Option<f64>,
     /// Errors of the neighbours at other positions.
     pub spread: Option<HeldOutErrors>,

@@ -1,4 +1,4 @@
-//! Neighbours on surfaces whose readings are the position itself.
+//! Neighbours on surfaces with readings that are the position itself.
 
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};

@@ -4,8 +4,8 @@ use super::Activation;
 use palpate_numerics::simd::{Real, Vector};
 use std::f64::consts::LOG2_E;
 
-/// Values that are worked on together: enough independent multiply-adds to keep two units busy over the latency of
-/// one, and the founding paper's ten hidden nodes in one go.
+/// Values that are computed together: enough independent multiply-adds to keep two units busy over the latency of one, and the founding paper's ten
+/// hidden nodes at once.
 const BLOCK: usize = 10;
 
 /// 1 + exp(−z) of B values in step, by 2^x = 2^n · 2^r with n the whole number next to x and a polynomial in r.

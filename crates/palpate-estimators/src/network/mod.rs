@@ -2,10 +2,10 @@
 //!
 //! There are four forward passes, each where another would be slower or could not run:
 //!
-//! - [`palpate_core::Network`], row by row, needs no memory but its scratch: it runs on a chip, and the others are tested against it.
-//! - [`PreparedNetwork`] locates. It takes a third of the time, as its weights lie in columns, which a chip has no room to lay out. (The
-//!   same rows with AVX2 and FMA take two and a half times as long.)
-//! - [`train_many`] and [`train_one`] train: weights of several networks lie side by side, and the pass over the first layer is one with its update.
+//! - [`palpate_core::Network`], row by row, needs only its scratch memory: it runs on a chip, and the others are tested against it.
+//! - [`PreparedNetwork`] locates. It takes a third of the time, as its weights lie in columns; a chip does not have the memory for these. (The same
+//!   rows with AVX2 and FMA take two and a half times as long.)
+//! - [`train_many`] and [`train_one`] train: weights of several networks lie side by side, and the pass over the first layer includes its update.
 //! - [`LevenbergMarquardt`] keeps the outputs of every layer, which derivatives by the weights need and the faster passes do not keep.
 
 mod levenberg_marquardt;
@@ -65,7 +65,7 @@ pub struct Network {
     pub input_scale: InputScale,
     /// Training rule.
     pub training: BackPropagation,
-    /// The arithmetic of training; estimates are made in 64 bits whatever it is.
+    /// The arithmetic of training; estimates are always made in 64 bits.
     pub precision: Precision,
 }
 
@@ -94,7 +94,7 @@ pub enum OutputCoding {
     Normalized,
 }
 
-/// Scaling of readings into network inputs. The paper does not say; the choice decides how fast and how well it trains.
+/// Scaling of readings into network inputs. The paper does not give it; the choice decides how fast and how well the network trains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InputScale {
     /// Each sensor kind divided by the largest reading that the contact force can cause anywhere on the surface; for
@@ -137,8 +137,8 @@ impl Default for BackPropagation {
 }
 
 impl BackPropagation {
-    /// Epochs after which training on so many patterns is capped: `max_epochs`, and with more patterns than 65,536 no more than are
-    /// 200 million presentations, which take a minute.
+    /// Epochs after which training on so many patterns is capped: `max_epochs`, and with more than 65,536 patterns at most 200 million presentations,
+    /// which take a minute.
     pub fn most_epochs(&self, patterns: usize) -> u32 {
         const FEW_PATTERNS: usize = 1 << 16;
         const MOST_PRESENTATIONS: usize = 200_000_000;
@@ -161,7 +161,7 @@ pub enum PresentationOrder {
 
 /// Layer sizes, activations and biases of a fully connected feed-forward network.
 ///
-/// Weights are one flat list: layer by layer, node by node; a node's row holds one weight an input and, with biases,
+/// Weights are one flat list: layer by layer, node by node. A node's row has one weight an input and, with biases,
 /// the bias last, as the weight of an input that is always 1.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Topology {
@@ -176,7 +176,7 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// The topology that `config` asks for between `inputs` readings and `outputs` coordinates.
+    /// The topology of `config` with `inputs` readings and `outputs` coordinates.
     pub fn new(config: &Network, inputs: usize, outputs: usize) -> Self {
         let sizes = std::iter::once(inputs).chain(config.hidden.iter().copied()).chain([outputs]).collect();
         Self {
@@ -255,7 +255,7 @@ pub struct TrainingSet {
 }
 
 impl TrainingSet {
-    /// The largest number of patterns: up to here 32 random bits pick any of them as often as any other to within 0.4 %.
+    /// The largest number of patterns: up to here 32 random bits pick all patterns equally often to within 0.4 %.
     pub const MOST: usize = 1 << 24;
 
     /// Number of patterns.
@@ -275,10 +275,10 @@ pub enum NetworkFitError {
         /// Bound.
         most: usize,
     },
-    /// Nothing to learn from.
+    /// A recording without rows.
     #[error("the recording has no rows; a network needs at least 1")]
     NoRows,
-    /// A channel's readings do not scale.
+    /// A channel with readings that cannot be scaled.
     #[error(
         "channel `{channel}` cannot be scaled: its {what} is {value}; it must be a number greater than 0"
     )]
@@ -323,7 +323,7 @@ impl Fit for Network {
 }
 
 impl Network {
-    /// The locator that an earlier fit gave, from its weights and outcome; `None` when their number is not the network's.
+    /// The locator of an earlier fit, from its weights and outcome; `None` for another number of weights than the network's.
     ///
     /// # Errors
     /// [`NetworkFitError`] when the recording cannot be coded.
@@ -429,7 +429,7 @@ pub enum TrainingStatus {
     Converged,
     /// The epoch cap came first.
     Capped,
-    /// The weights left the numbers.
+    /// A weight is not finite any more.
     Diverged,
 }
 
@@ -443,7 +443,7 @@ impl std::fmt::Display for TrainingStatus {
     }
 }
 
-/// Outcome of a training. Not converging is a status, never an error.
+/// Outcome of a training. A training that does not converge has a status, not an error.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TrainingOutcome {
     /// Status.
@@ -455,14 +455,14 @@ pub struct TrainingOutcome {
 }
 
 impl Default for TrainingOutcome {
-    /// Outcome of a method that is not trained by epochs: converged before the first.
+    /// Outcome of a method without training by epochs: converged before the first.
     fn default() -> Self {
         Self { status: TrainingStatus::Converged, epochs: 0, aggregate_error: 0.0 }
     }
 }
 
 impl TrainingOutcome {
-    /// The verdict after an epoch: `None` while training goes on.
+    /// The outcome after an epoch; `None` while training continues.
     fn after_epoch(epochs: u32, error: f64, task: &TrainingTask) -> Option<Self> {
         let status = if !error.is_finite() {
             TrainingStatus::Diverged
@@ -477,7 +477,7 @@ impl TrainingOutcome {
     }
 }
 
-/// A network's weights, and how they were found.
+/// A network's weights, and the outcome of their training.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainedNetwork {
     /// Shape.
@@ -505,7 +505,7 @@ impl ChannelScaling {
     }
 }
 
-/// Parts of a trained network, as a locator file holds them.
+/// Parts of a trained network, as in a locator file.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NetworkParts {
@@ -573,12 +573,12 @@ impl NetworkParts {
 const FEW_CHANNELS: usize = 16;
 
 impl NetworkLocator {
-    /// The parts that it was made from.
+    /// The parts of the network.
     pub fn parts(&self) -> &NetworkParts {
         &self.parts
     }
 
-    /// The position for a reading of as many channels as the network has inputs; elsewhere `None`.
+    /// The position for a reading with as many channels as the network has inputs; `None` for another number.
     pub fn position(&self, reading: &[f64]) -> Option<Position> {
         let (mut few, mut many) = ([0.0; FEW_CHANNELS], Vec::new());
         let inputs = if let Some(inputs) = few.get_mut(..reading.len()) {

@@ -1,14 +1,14 @@
 //! The forward pass of one network over one reading, four nodes a register.
 //!
-//! Its bound is latency. A layer waits for the one below through four multiply-adds, the logistic function's dozen steps and its division,
-//! some seventy cycles, and the machine's window holds little of the next reading meanwhile. Hence multiply-adds that round once, a
-//! quotient for 2^r rather than a long polynomial, and registers of four: eight lanes would save work, which is not what is waited for.
+//! The pass is bound by latency. A layer waits for the one below through four multiply-adds, the logistic function's dozen steps and its
+//! division, some seventy cycles; the machine's window covers little of the next reading meanwhile. Hence multiply-adds that round once, a
+//! quotient for 2^r rather than a long polynomial, and registers of four: eight lanes would save work, but not latency.
 
 use super::{Activation, Topology};
 use palpate_core::{BufferMismatch, Logistic};
 use palpate_numerics::simd::{Kernel, Real, Simd, Vector, run_loops};
 
-/// A network in double precision whose weights lie in columns, as vector units want them. With weights of size 1 its outputs are those of
+/// A network in double precision with its weights in columns, as vector units need them. With weights of size 1 its outputs are those of
 /// [`palpate_core::Network::forward_into`] to within 10⁻¹⁴.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PreparedNetwork {
@@ -18,8 +18,8 @@ pub struct PreparedNetwork {
 }
 
 impl PreparedNetwork {
-    /// Takes a network's shape and its weights, in the order that [`Topology`] states; `None` when the shape has fewer than two layers or
-    /// one without nodes, or when there are not as many weights as it asks for.
+    /// Takes a network's shape and its weights, in the order that [`Topology`] states. `None` for a shape with fewer than two layers or with a layer
+    /// without nodes, and for another number of weights than the shape needs.
     pub fn new(topology: &Topology, weights: &[f64]) -> Option<Self> {
         let usable = topology.layers() > 0 && !topology.sizes.contains(&0);
         if !usable || topology.checked_weight_count() != Some(weights.len()) {
@@ -32,7 +32,7 @@ impl PreparedNetwork {
     /// a = f(W x + b), layer by layer, from scaled inputs to outputs.
     ///
     /// # Errors
-    /// [`BufferMismatch`] when `inputs` or `outputs` have another length than the network asks for.
+    /// [`BufferMismatch`] when `inputs` or `outputs` have another length than the network's.
     pub fn forward_into(&self, inputs: &[f64], outputs: &mut [f64]) -> Result<(), BufferMismatch> {
         check(self.inputs, inputs.len())?;
         check(self.outputs, outputs.len())?;
@@ -48,7 +48,7 @@ fn check(needed: usize, found: usize) -> Result<(), BufferMismatch> {
 /// Four numbers, one a node.
 type Four = [f64; 4];
 
-/// Weights of four nodes, none of them in two cache lines.
+/// Weights of four nodes; a column never crosses a cache line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(32))]
 struct Column(Four);
@@ -59,12 +59,12 @@ struct Layer {
     activation: Activation,
     inputs: usize,
     nodes: usize,
-    /// For every four nodes a column an input, and the biases. Nodes that are not there weigh everything by 0.
+    /// For every four nodes a column an input, and the biases. Missing nodes have weights of 0.
     columns: Vec<Column>,
 }
 
 impl Layer {
-    /// All layers of a network that has as many weights as `topology` asks for.
+    /// All layers of a network with as many weights as `topology` needs.
     fn all(topology: &Topology, mut weights: &[f64]) -> Vec<Self> {
         let mut layers = Vec::with_capacity(topology.layers());
         for k in 0..topology.layers() {
@@ -85,13 +85,13 @@ impl Layer {
         (self.inputs, self.nodes) == (inputs, nodes)
     }
 
-    /// Registers that its outputs fill.
+    /// Registers for its outputs.
     fn registers(&self) -> usize {
         self.nodes.div_ceil(4)
     }
 }
 
-/// Stands for a number of inputs or nodes that is known only when the program runs.
+/// Marker of a number of inputs or nodes that is known only at run time.
 const ANY: usize = 0;
 
 #[inline(always)]
@@ -102,7 +102,7 @@ fn known_or<const KNOWN: usize>(count: usize) -> usize {
 /// Registers of the widest layer for which a layer's outputs lie on the stack: 32 nodes.
 const FEW_REGISTERS: usize = 8;
 
-/// Inputs through layers, of which there is at least one.
+/// A pass of inputs through layers; there is at least one layer.
 struct Pass<'a> {
     layers: &'a [Layer],
     inputs: &'a [f64],
@@ -178,7 +178,7 @@ fn pass<V: Vector<4, Real = f64>, const INPUTS: usize, const NODES: usize>(
     }
 }
 
-/// Σ w·x + b in four sums, input i in sum i modulo 4, of which none waits for another.
+/// Σ w·x + b in four independent sums, input i in sum i modulo 4.
 #[inline(always)]
 fn weighted_sums<V: Vector<4, Real = f64>>(columns: &[Column], x: &[f64]) -> V {
     let (columns, biases) = columns.split_at(x.len());
@@ -197,7 +197,7 @@ fn weighted_sums<V: Vector<4, Real = f64>>(columns: &[Column], x: &[f64]) -> V {
     (sums[0] + sums[2]) + (sums[1] + sums[3])
 }
 
-/// σ by [`Logistic`]. The bound comes first in a comparison, which keeps the second where it is not a number.
+/// σ by [`Logistic`]. The bound is the first operand of a comparison, which returns the second where it is not a number.
 #[inline(always)]
 fn logistic<V: Vector<4, Real = f64>>(z: V) -> V {
     let ([e0, e1, e2], [o0, o1]) = (Logistic::EVEN.map(V::splat), Logistic::ODD.map(V::splat));

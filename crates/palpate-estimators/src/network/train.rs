@@ -3,7 +3,7 @@
 //! Symbols: w weights, Δ the last step of the weights, x inputs of a layer, z weighted sums, a outputs, t targets,
 //! δ = −∂E/∂z, η learning rate, α momentum.
 //!
-//! Its bound: the fused pass over the first layer reads w and its predecessor, writes the new w, and spends four
+//! The bound: the fused pass over the first layer reads w and its predecessor, writes the new w, and spends four
 //! multiply-add slots on each; the L1 ports and the two vector units saturate together. Hence three choices. Δ is kept
 //! as w − w_before, so that one store a weight suffices and the two buffers change places. A weight is updated and at
 //! once used for the next pattern's sum, while it is in a register. And patterns are looked up by permuting registers.
@@ -33,7 +33,7 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Networks that train side by side.
+    /// Number of networks that train side by side.
     pub fn lanes(self) -> usize {
         match self {
             Self::F64 => 8,
@@ -53,11 +53,11 @@ pub struct TrainingTask<'a> {
     pub rule: &'a BackPropagation,
 }
 
-/// Trains the queue's networks, as many at once as `precision` has lanes. A seed gives the same network in whatever lane, thread or company
-/// it is trained.
+/// Trains the queue's networks, as many at once as `precision` has lanes. A seed gives the same network in any lane or thread, and with any other
+/// seeds.
 ///
 /// # Errors
-/// [`Cancelled`] when `watch`, told of every epoch, stops it; what was not finished is given up.
+/// [`Cancelled`] when `watch`, called every epoch, stops it; unfinished networks are discarded.
 pub fn train_many(
     set: InstructionSet,
     precision: Precision,
@@ -71,7 +71,7 @@ pub fn train_many(
 /// Trains one network: the same bits as [`train_many`] gives for the seed.
 ///
 /// # Errors
-/// [`Cancelled`] when `watch`, told of every epoch, stops it.
+/// [`Cancelled`] when `watch`, called every epoch, stops it.
 pub fn train_one(
     precision: Precision,
     task: &TrainingTask,
@@ -84,8 +84,8 @@ pub fn train_one(
     Ok(trained.expect("a queue that nobody stops is trained to its end").1)
 }
 
-/// Training of networks one after the other where they are `ALONE`, as one is trained faster so than among lanes that are idle; else
-/// side by side, one a lane.
+/// Training of networks: one after the other where they are `ALONE`, as a single network trains faster without idle lanes; else side by side, one a
+/// lane.
 struct Training<'a, const ALONE: bool> {
     precision: Precision,
     task: &'a TrainingTask<'a>,
@@ -114,7 +114,7 @@ impl<const ALONE: bool> Kernel for Training<'_, ALONE> {
     }
 }
 
-/// Trains every network of the queue with the vectors `V` of `S`. A lane whose network has finished takes the next seed.
+/// Trains every network of the queue with the vectors `V` of `S`. When a lane's network has finished, the lane takes the next seed.
 #[inline(always)]
 fn train<S: Simd, V: Vector<N>, const N: usize>(
     task: &TrainingTask,
@@ -123,8 +123,8 @@ fn train<S: Simd, V: Vector<N>, const N: usize>(
 ) -> Result<(), Cancelled> {
     let topology = task.topology;
     let row_lens: Vec<usize> = (0..topology.layers()).map(|k| topology.row_len(k)).collect();
-    // Where registers hold the inputs of two patterns, to know the paper's shape saves a tenth of the time; elsewhere a fiftieth, which
-    // does not pay for the code.
+    // Where registers have room for the inputs of two patterns, a shape fixed at compile time, the paper's, saves a tenth of the time. Elsewhere it
+    // saves a fiftieth, which does not pay for the code.
     if const { S::REGISTERS >= 2 * 9 } && row_lens == [9, 11] {
         train_shape::<V, N, 9, 11>(task, queue, watch)
     } else {
@@ -132,7 +132,7 @@ fn train<S: Simd, V: Vector<N>, const N: usize>(
     }
 }
 
-/// Stands for a row length that is known only when the program runs.
+/// Marker of a row length that is known only at run time.
 const ANY: usize = 0;
 
 /// The row length `len`, as a constant where the shape is known: then loops over a row unroll, and the inputs of the
@@ -177,9 +177,9 @@ struct Layer<V> {
     row_len: usize,
     /// w, row by row.
     weights: Vec<V>,
-    /// w of one update before.
+    /// w before the last update.
     before: Vec<V>,
-    /// z, then a; followed by the constant 1 that biases weigh.
+    /// z, then a; followed by the constant 1 for the biases.
     outputs: Vec<V>,
     /// δ, gathered over the layer above.
     deltas: Vec<V>,
@@ -208,10 +208,10 @@ struct Group<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: 
     occupants: [Option<Occupant>; N],
     streams: Streams<N>,
     drawer: OrderDrawer,
-    /// This epoch's patterns, a row a presentation; and the next epoch's, whose first pattern ends this one.
+    /// This epoch's patterns, a row a presentation; and the next epoch's. The first pattern of the next epoch ends this one.
     order: Vec<[u32; N]>,
     next_order: Vec<[u32; N]>,
-    /// x of this pattern and of the next, each followed by the constant 1 that biases weigh.
+    /// x of this pattern and of the next, each followed by the constant 1 for the biases.
     inputs: Vec<V>,
     next_inputs: Vec<V>,
     targets: Vec<V>,
@@ -269,7 +269,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         self.streams.set(lane, &stream);
     }
 
-    /// Hands over the networks whose training ended with this epoch; true when a lane has a new one.
+    /// Hands over the networks that finished training with this epoch; true when a lane has a new one.
     fn retire(&mut self, errors: [V::Real; N], queue: &mut dyn SeedQueue<TrainedNetwork>) -> bool {
         let mut replaced = false;
         for (lane, error) in errors.into_iter().enumerate() {
@@ -298,7 +298,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         }
     }
 
-    /// Presents every pattern once; the sums of squared errors.
+    /// Presents every pattern once; returns the sums of squared errors.
     #[inline(always)]
     fn run_epoch(&mut self) -> V {
         if self.task.rule.order == PresentationOrder::Shuffled {
@@ -319,7 +319,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         error
     }
 
-    /// From the first layer's sums to the outputs.
+    /// The pass from the first layer's sums to the outputs.
     #[inline(always)]
     fn forward(&mut self) {
         for k in 0..self.layers.len() {
@@ -348,7 +348,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         error
     }
 
-    /// From the output layer down to the second: sends δ to the layer below, then updates the weights.
+    /// Back-propagation from the output layer down to the second: sends δ to the layer below, then updates the weights.
     #[inline(always)]
     fn backward(&mut self) {
         let (eta, alpha) = rates::<V, N>(self.task.rule);
@@ -480,7 +480,7 @@ impl<R: Real> Table<R> {
         Self { column_len, values }
     }
 
-    /// For every column, the value of each lane's pick, of which only the low bits count.
+    /// For every column, the value of each lane's pick; only the low bits of a pick count.
     #[inline(always)]
     fn look_up<V: Vector<N, Real = R>, const N: usize>(&self, picks: &[u32; N], values: &mut [V]) {
         if self.column_len == LOOK_UP {

@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The founding paper's beam, whose force is known, or not.
+/// The founding paper's beam, with a known or an unknown force.
 fn beam(force_n: Option<f64>) -> Setup {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
     Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0))).unwrap().with_force(force_n).unwrap()
@@ -23,7 +23,7 @@ fn presses() -> Recording {
     beam(Some(newtons(3.0))).simulate(&Training::even(20).repeated(10), 1).unwrap()
 }
 
-/// A locator of every learnt kind; networks are trained for as long as a test may take.
+/// A locator of every learnt kind. Networks are trained briefly, to keep the test short.
 fn learnt(setup: &Setup) -> Vec<Locator> {
     let presses = presses();
     let all = contenders(setup, &Estimator::default(), 20 * presses.rows.len());
@@ -35,7 +35,7 @@ fn learnt(setup: &Setup) -> Vec<Locator> {
     locators
 }
 
-/// Share of readings, in %, of which an estimate is as it should be.
+/// Share of the readings, in %, with an estimate that fulfils a condition.
 fn percent(
     locator: &Locator,
     readings: &[(Position, Vec<f64>)],
@@ -173,7 +173,7 @@ fn comparisons_of_unknown_forces_judge_by_several() {
 
 #[test]
 fn a_gaussian_process_is_as_good_at_other_forces() {
-    // ln‖r‖, which tells the position at the one force of the presses, led it astray by 25 mm at half of it.
+    // ln‖r‖ determines the position at the single force of the presses, and would shift it by 25 mm at half that force.
     let setup = beam(None);
     let locator = Estimator::GaussianProcess(Default::default())
         .fit_without_interval_check(FitTask::new(&setup, &presses()))
@@ -201,7 +201,7 @@ fn own_intervals_stand_where_they_are_shorter() {
     assert_eq!(&serde_json::from_str::<Box<ReadingCheck>>(&text).unwrap(), check);
     let neither = serde_json::from_str::<ReadingCheck>("{}").unwrap_err();
     assert!(neither.to_string().contains("either `influence` or `digit`"), "{neither}");
-    // Of the forces that were pressed, and beyond them.
+    // For the pressed forces, and beyond them.
     let widened = ReadingCheck { own_intervals: None, ..(**check).clone() };
     let extent = setup.surface().extent();
     let (mut kept, mut beyond) = (0, 0);

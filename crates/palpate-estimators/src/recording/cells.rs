@@ -1,4 +1,4 @@
-//! The fields of one line, found and read with errors that know their place.
+//! The fields of one line, with errors that contain line and column.
 
 use super::columns::{Column, Header, ValueColumn};
 use super::csv_error::{CsvError, CsvProblem};
@@ -22,7 +22,7 @@ pub(super) struct Cells<'a> {
 }
 
 impl<'a> Cells<'a> {
-    /// Cuts line number `line` of a file of this dialect.
+    /// Cuts line number `line` of a file of this dialect into fields.
     pub fn parse(
         line: usize,
         text: &'a str,
@@ -35,7 +35,7 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Fields of these texts, which no line has.
+    /// Fields with these texts, which belong to no line.
     pub fn of_texts(texts: &'a [String], dialect: &'a mut Dialect, groupings: &'a mut Groupings) -> Self {
         let field = |text: &'a String| Field { value: Cow::Borrowed(text), span: 0..0 };
         Self { line: 0, text: "", fields: texts.iter().map(field).collect(), dialect, groupings }
@@ -46,17 +46,17 @@ impl<'a> Cells<'a> {
         self.dialect
     }
 
-    /// Takes note that this line has the units of the columns.
+    /// Records that this line contains the units of the columns.
     pub fn note_units(&mut self) {
         self.dialect.units_line = Some(self.line);
     }
 
-    /// Takes note that this line is no row.
+    /// Records that this line is not a row.
     pub fn note_line(&mut self) {
         self.dialect.note_line(self.line, self.text);
     }
 
-    /// The error of a number of this line whose mark may be one of thousands.
+    /// Refuses the line if marks in column `index` may be separators of thousands.
     pub fn check_grouping(&self, index: usize) -> Result<(), CsvError> {
         self.groupings.doubt_in(index, &self.dialect.source).map_or(Ok(()), Err)
     }
@@ -71,12 +71,12 @@ impl<'a> Cells<'a> {
         self.fields.iter().map(|field| field.value.as_ref())
     }
 
-    /// Whether nothing is in any field.
+    /// True where all fields are empty.
     pub fn is_blank(&self) -> bool {
         self.fields.iter().all(|field| field.value.is_empty())
     }
 
-    /// Refuses a row that has more or fewer fields than `expected`; empty ones at its end do not count.
+    /// Refuses a row that has more or fewer fields than `expected`; further empty fields at its end do not count.
     pub fn check_width(&self, expected: usize) -> Result<(), CsvError> {
         let beyond = self.fields.get(expected..);
         match self.width() {
@@ -92,14 +92,14 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Whether commas between fields have cut numbers at their decimal commas: all that is left are whole numbers.
+    /// True where commas between fields may have cut numbers at their decimal commas: all fields are whole numbers.
     fn looks_cut_at_decimals(&self) -> bool {
         let whole = |field: &Field| field.value.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-');
         self.dialect.separator == Separator::Comma && self.fields.iter().all(whole)
     }
 
-    /// Index of a column of values among the fields of every line, from this first line of the file, which must not give it another
-    /// unit than the one it is to be read in; `key` says that unit in a rig.
+    /// Index of a column of values among the fields of every line, from this first line of the file. A heading with another unit than that of
+    /// `values` is refused; `key` is the key of the unit in a rig.
     pub fn find_values(
         &mut self,
         values: &ValueColumn,
@@ -116,7 +116,7 @@ impl<'a> Cells<'a> {
             (Some(_), Some(unit)) => {
                 (unit.dimension(), unit.factor()) == (values.unit.dimension(), values.unit.factor())
             }
-            // What stands elsewhere than in brackets may be anything, and who writes a heading out has seen what it says.
+            // Text outside brackets is not necessarily a unit. A rig with the complete heading has accepted its unit.
             (Some(_), None) => exact || !text.ends_with(']') || values.unit.dimension() == Dimension::Time,
         };
         if agrees {
@@ -127,7 +127,7 @@ impl<'a> Cells<'a> {
         Err(self.error(index, CsvProblem::OtherUnit { said, read_as: values.unit, key }))
     }
 
-    /// Index of `column` among the fields of every line, from this first line of the file: by its heading, or by that without a unit.
+    /// Index of `column` among the fields of every line, from this first line of the file: by its heading, or by its heading without a unit.
     pub fn find(&self, column: &Column, header: Header) -> Result<usize, CsvError> {
         let count = self.width();
         let name = match column {
@@ -168,7 +168,7 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Whether some field is called `column`, with or without a unit, or has its number.
+    /// True where a field has the name `column`, with or without a unit, or its number.
     pub fn has(&self, column: &Column) -> bool {
         match column {
             Column::Name(name) => self.fields.iter().any(|field| {
@@ -190,7 +190,7 @@ impl<'a> Cells<'a> {
         Ok(value)
     }
 
-    /// Whether nothing is in field `index`.
+    /// True where field `index` is empty or missing.
     pub fn is_empty(&self, index: usize) -> bool {
         self.fields.get(index).is_none_or(|field| field.value.is_empty())
     }
@@ -238,17 +238,17 @@ impl<'a> Cells<'a> {
     }
 }
 
-/// One field: its value, and the bytes of the line it came from.
+/// One field: its value and its place in the line.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Field<'a> {
     /// The value, without the spaces and quotes around it.
     pub value: Cow<'a, str>,
-    /// Place in the line, spaces around it left out.
+    /// Bytes of the line, without the spaces around the field.
     pub span: Range<usize>,
 }
 
-/// Cuts `line` at its separators, except within double quotes; a doubled quote within quotes is a quote (RFC 4180, but
-/// a field ends with its line, so that every row has one line number). The error is what follows a quote that stays open.
+/// Cuts `line` at its separators, except within double quotes; a doubled quote within quotes is a quote (RFC 4180, but a field ends with its line,
+/// so that every row has one line number). The error is the range from an unclosed quote to the end of the line.
 pub(super) fn split(line: &str, separator: Separator) -> Result<Vec<Field<'_>>, Range<usize>> {
     if separator == Separator::Blanks {
         return split_at_blanks(line);

@@ -1,4 +1,4 @@
-//! Which column of a CSV file plays which role.
+//! Roles of the columns of a CSV file.
 
 use std::fmt;
 
@@ -36,23 +36,23 @@ pub struct Columns {
     /// Columns of the further nuisance coordinates.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub further_nuisances: Vec<ValueColumn>,
-    /// Column of the time, of numbers in this unit or of timestamps; `None` for `time_s`, where the header has that. See
+    /// Column of the time, of numbers in this unit or of timestamps; `None` for the column `time_s`, if the header contains it. See
     /// [`Row::time_s`](super::Row::time_s).
     #[serde(default)]
     pub time: Option<ValueColumn>,
-    /// Column that marks the rows that are untouched, if there is one.
+    /// Column that marks untouched rows, if there is one.
     #[serde(default)]
     pub untouched: Option<Column>,
-    /// Times that are untouched.
+    /// Times at which the surface is untouched.
     #[serde(default)]
     pub untouched_times: Vec<TimeSpan>,
-    /// Greatest force, either way, of a row in which nothing touches, in newtons; `None` to find it from the rows.
+    /// Greatest magnitude of the force of an untouched row, in newtons; `None` to determine it from the rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_zero_n: Option<f64>,
-    /// Separator of the fields; `None` for what the first line tells.
+    /// Separator of the fields; `None` to determine it from the first line.
     #[serde(default)]
     pub separator: Option<Separator>,
-    /// Decimal mark; `None` for what the first number tells.
+    /// Decimal mark; `None` to determine it from the first number.
     #[serde(default)]
     pub decimal: Option<Decimal>,
     /// Treatment of rows that repeat the reading before them.
@@ -63,14 +63,14 @@ pub struct Columns {
     pub zero: Zero,
 }
 
-/// Conversion of a file's coordinates to positions on the surface: rounded, then less the origin.
+/// Conversion of a file's coordinates to positions on the surface: rounding, then subtraction of the origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
     /// The file's coordinates of the surface's left support or lower left corner, in metres.
     pub origin: Position,
-    /// Coordinates are rounded to whole multiples of this, in metres, greater than 0, so that presses of one place that
-    /// were logged a little apart have one position; `None` to take them as they are.
+    /// Rounding step of the coordinates, in metres, greater than 0; `None` for no rounding. With rounding, presses of one place with slightly
+    /// different logged coordinates have one position.
     pub round_m: Option<f64>,
 }
 
@@ -91,7 +91,7 @@ impl Frame {
 pub enum Header {
     /// The first line names them.
     Present,
-    /// The first line is a row like the others; columns are known by their numbers.
+    /// The first line is a row like the others; columns are identified by their numbers.
     Absent,
 }
 
@@ -170,8 +170,8 @@ pub enum Need {
 }
 
 impl Columns {
-    /// A file whose positions, in millimetres, stand in one column, and whose raw channels stand in these, by name or by
-    /// number from 1. Where any is a number, the file has no header.
+    /// A file with positions, in millimetres, in one column, and with raw channels in the given columns, by name or by number from 1. If any
+    /// channel is given by number, the file has no header.
     ///
     /// ```
     /// use palpate_estimators::recording::Columns;
@@ -187,7 +187,7 @@ impl Columns {
         Self::raw(PositionColumns::Along(position.into()), channels)
     }
 
-    /// The same with positions in two columns, along and across.
+    /// A file as for [`along`](Self::along), but with positions in two columns, along and across.
     pub fn plane<C: Into<Column>>(
         x: impl Into<Column>,
         y: impl Into<Column>,
@@ -223,15 +223,14 @@ impl Columns {
         }
     }
 
-    /// The same with the contact force, in newtons, in this column.
+    /// Sets the column of the contact force, in newtons.
     #[must_use]
     pub fn force(self, column: impl Into<Column>) -> Self {
         let values = ValueColumn { column: column.into(), unit: SensorKind::Reaction.unit() };
         Self { force: Some(ForceColumn { values, need: Need::Required }), ..self }
     }
 
-    /// The same with a nuisance coordinate in this column and unit, after those that it has; see
-    /// [`Row::nuisances`](super::Row::nuisances).
+    /// Adds a nuisance coordinate in this column and unit, after the existing ones; see [`Row::nuisances`](super::Row::nuisances).
     #[must_use]
     pub fn nuisance(mut self, column: impl Into<Column>, unit: Unit) -> Self {
         let values = ValueColumn { column: column.into(), unit };
@@ -247,14 +246,14 @@ impl Columns {
         self.nuisance.iter().chain(&self.further_nuisances)
     }
 
-    /// The same with the time of each row in this column, in seconds or as timestamps.
+    /// Sets the column of the time of each row, in seconds or as timestamps.
     #[must_use]
     pub fn time(self, column: impl Into<Column>) -> Self {
         let unit = Unit::from_symbol("s").unwrap_or(Unit::NONE);
         Self { time: Some(ValueColumn { column: column.into(), unit }), ..self }
     }
 
-    /// The same with coordinates of the file's own frame.
+    /// Sets the frame of the file's coordinates.
     #[must_use]
     pub fn in_frame(self, frame: Frame) -> Self {
         Self { frame, ..self }

@@ -28,32 +28,32 @@ pub struct CsvError {
 pub struct Place {
     /// The line, from 1.
     pub line: usize,
-    /// The column, from 1; `None` when the whole line is meant.
+    /// The column, from 1; `None` when the problem concerns the whole line.
     pub column: Option<usize>,
     /// The line's text.
     pub text: String,
-    /// The bytes of `text` that are meant.
+    /// The bytes of `text` that the problem concerns.
     pub span: Range<usize>,
 }
 
 /// Problem of a CSV file.
 #[derive(Debug, thiserror::Error)]
 pub enum CsvProblem {
-    /// The bytes cannot be had.
+    /// The bytes cannot be read.
     #[error("cannot be read: {0}")]
     Unreadable(#[source] std::io::Error),
-    /// There is not a single line with something in it.
+    /// The file has no line with content.
     #[error("the file is empty; a recording has at least 1 row")]
     Empty,
-    /// There is a header but nothing below it.
+    /// The file has a header but no rows below it.
     #[error("there are 0 rows below the header; a recording has at least 1")]
     NoRows,
     /// The text is neither UTF-8 nor Windows-1252.
-    #[error("the bytes are no text in UTF-8 or Windows-1252; save the file as CSV in UTF-8")]
+    #[error("the bytes are not text in UTF-8 or Windows-1252; save the file as CSV in UTF-8")]
     NotText,
-    /// Several separators are in the first line, and more than one of them gives the columns.
+    /// The first line contains several separators, and more than one of them gives the columns.
     #[error(
-        "fields may be separated by {first} or by {second}; say which as `separator` in [recording], \"comma\", \"semicolon\", \"tab\", \"pipe\" or \"blanks\""
+        "fields may be separated by {first} or by {second}; set `separator` in [recording], \"comma\", \"semicolon\", \"tab\", \"pipe\" or \"blanks\""
     )]
     ManySeparators {
         /// A separator that gives the columns.
@@ -61,45 +61,45 @@ pub enum CsvProblem {
         /// Another one.
         second: Separator,
     },
-    /// A quote stays open to the end of the line.
+    /// A quote is not closed on its line.
     #[error("a quoted field does not end on this line")]
     OpenQuote,
     /// The header lacks a column.
-    #[error("there is no column `{wanted}`; there are {}{}", list(present), advice_on_header(present))]
+    #[error("no column is named `{wanted}`; there are {}{}", list(present), advice_on_header(present))]
     MissingColumn {
-        /// The name that was looked for.
+        /// The requested name.
         wanted: String,
-        /// The names that are there.
+        /// The names in the header.
         present: Vec<String>,
     },
     /// A column number is 0 or beyond the last column.
-    #[error("there is no column number {wanted}; columns are numbered from 1 to {count}")]
+    #[error("no column has the number {wanted}; columns are numbered from 1 to {count}")]
     NoSuchColumn {
-        /// The number that was looked for.
+        /// The requested number.
         wanted: usize,
         /// Number of columns.
         count: usize,
     },
-    /// A column is meant by name, but the file has no header.
+    /// A column is given by name, but the file has no header.
     #[error(
         "column `{wanted}` is given by name, but the file has no header; give its number, from 1 to {count}"
     )]
     NameWithoutHeader {
-        /// The name that was looked for.
+        /// The requested name.
         wanted: String,
         /// Number of columns.
         count: usize,
     },
-    /// Two columns have the name of one that is needed.
+    /// Two columns have the name of a required column.
     #[error(
         "columns {first} and {second} are both named `{name}`; name the column by its number, {first} or {second}"
     )]
     DuplicateColumn {
         /// The name.
         name: String,
-        /// The first one's number, from 1.
+        /// Number of the first column, from 1.
         first: usize,
-        /// The second one's number, from 1.
+        /// Number of the second column, from 1.
         second: usize,
     },
     /// A row has more or fewer fields than the header (or the first row).
@@ -110,7 +110,7 @@ pub enum CsvProblem {
         /// Number of fields that it must have.
         expected: usize,
     },
-    /// A row between whose fields are blanks has more or fewer fields than the header.
+    /// A row with blanks between its fields has more or fewer fields than the header.
     #[error("the row has {found} fields; it must have {expected}: between blanks a field cannot be empty")]
     RowLengthBetweenBlanks {
         /// Number of fields in the row.
@@ -133,9 +133,9 @@ pub enum CsvProblem {
         /// The field.
         text: String,
     },
-    /// A whole number with a separator of thousands, or a number with a decimal comma: nobody can say.
+    /// A number that is ambiguous between a whole number with a separator of thousands and a number with a decimal comma.
     #[error(
-        "`{text}` may be {} or {}; say `decimal = \"comma\"` in [recording] for the second, or write it without the comma for the first",
+        "`{text}` may be {} or {}; set `decimal = \"comma\"` in [recording] for the second, or write it without the comma for the first",
         text.replace(',', ""),
         text.replace(',', ".")
     )]
@@ -157,14 +157,14 @@ pub enum CsvProblem {
         /// A whole number of the same column.
         beside: String,
     },
-    /// A number has another decimal mark than those before it.
+    /// A number has another decimal mark than the numbers before it.
     #[error(
         "`{text}` does not go with the {decimal} of the numbers before it or of the rig; write all numbers in one way"
     )]
     OtherDecimal {
         /// The field.
         text: String,
-        /// The mark of the others.
+        /// Decimal mark of the other numbers.
         decimal: Decimal,
     },
     /// A number has separators of thousands.
@@ -183,56 +183,56 @@ pub enum CsvProblem {
         /// Number of fields that it must have.
         expected: usize,
     },
-    /// A heading says another unit than its column is to be read in.
+    /// A heading contains another unit than the one in which its column is read.
     #[error(
-        "the header says `{said}`, but the column is read in {read_as}; say the unit as `{key}`, or correct the header"
+        "the unit in the header is `{said}`, but the column is read in {read_as}; set `{key}`, or correct the header"
     )]
     OtherUnit {
         /// The unit in the header.
         said: String,
         /// The unit of the column's role.
         read_as: Unit,
-        /// The key that says the unit.
+        /// The key of the unit in a rig.
         key: &'static str,
     },
-    /// Two columns have the name of one that is needed, but for their units.
+    /// Two columns have the name of a required column and differ only in their units.
     #[error(
         "columns {first} and {second} are both `{name}` but for what stands behind it; write out the one that is meant, as in `{example}`"
     )]
     ManyUnits {
         /// The name.
         name: String,
-        /// The first one's number, from 1.
+        /// Number of the first column, from 1.
         first: usize,
-        /// The second one's number, from 1.
+        /// Number of the second column, from 1.
         second: usize,
-        /// The first one's heading.
+        /// Heading of the first column.
         example: String,
     },
-    /// A field of the column that marks untouched rows says neither yes nor no.
+    /// A field of the column that marks untouched rows is neither a yes nor a no.
     #[error(
-        "`{text}` does not say whether the row is untouched; write 1, true or yes where it is, and 0, false, no or nothing where it is not"
+        "`{text}` is not a mark of untouched rows; write 1, true or yes in untouched rows, and 0, false, no or an empty field in others"
     )]
     NotAMark {
         /// The field.
         text: String,
     },
-    /// Times are untouched, but the file has none.
+    /// Untouched times are given, but the rows of the file have no time.
     #[error(
-        "`untouched_times` says when nothing touched, but the rows have no time; name its column as `time` in [recording]"
+        "`untouched_times` gives untouched times, but the rows have no time; name its column as `time` in [recording]"
     )]
     NoTimes,
-    /// No row has a time at which nothing is to have touched.
+    /// No row has a time within an untouched span.
     #[error("no row has a time within the untouched {span}; the rows are from {from_s} s to {to_s} s")]
     NothingUntouched {
-        /// The times that are untouched.
+        /// The untouched span.
         span: TimeSpan,
         /// Least time of a row, in seconds.
         from_s: f64,
         /// Greatest time of a row, in seconds.
         to_s: f64,
     },
-    /// No row is untouched, and the zero of the readings needs such rows.
+    /// No row is untouched, but the zero of the readings needs such rows.
     #[error("{0}")]
     NoZero(#[from] super::zero::NoUntouchedRow),
     /// A field of the time column is neither a number nor a timestamp.
@@ -243,7 +243,7 @@ pub enum CsvProblem {
         /// The field.
         text: String,
     },
-    /// A time is written in another way than the first row's.
+    /// A time has another notation than that of the first row.
     #[error("`{text}` is written in another way than the time of the first row; all rows must have one way")]
     OtherTime {
         /// The field.
@@ -271,7 +271,7 @@ pub enum CsvProblem {
         /// The surface.
         extent: Extent,
     },
-    /// The readings and the contacts are not equally many.
+    /// The numbers of readings and contacts differ.
     #[error("there are {readings} readings but {contacts} contacts; row by row they must pair")]
     RowsDiffer {
         /// Rows of the readings' file.
@@ -279,12 +279,12 @@ pub enum CsvProblem {
         /// Rows of the contacts' file.
         contacts: usize,
     },
-    /// The columns are not as many as the sensors.
+    /// The numbers of channel columns and sensors differ.
     #[error("{columns} columns are channels, but the layout has {sensors} sensors; they must be as many")]
     ChannelCount {
-        /// Columns that hold channels.
+        /// Number of channel columns.
         columns: usize,
-        /// Sensors of the layout.
+        /// Number of sensors of the layout.
         sensors: usize,
     },
 }
@@ -319,7 +319,7 @@ impl fmt::Display for Prefix<'_> {
     }
 }
 
-/// Advice where the header has numbers alone.
+/// Advice for a header of numbers only.
 fn advice_on_header(names: &[String]) -> &'static str {
     if names.iter().all(|name| name.replace(',', ".").trim().parse::<f64>().is_ok()) {
         ": numbers; where no line names the columns, give `--no-header`, or `header = false` in [recording]"

@@ -27,7 +27,7 @@ pub struct Schema<'a> {
     pub layout: &'a Layout,
     /// Extent of the surface, within which contacts lie.
     pub extent: Extent,
-    /// The force of every contact, in newtons, where it is known and the file does not say.
+    /// The known force of every contact, in newtons, for contacts without a force in the file.
     pub known_force_n: Option<f64>,
 }
 
@@ -57,8 +57,8 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
     Ok(recording)
 }
 
-/// Reads a recording from two CSV files, of readings and of contacts, that pair row by row; the time column is that of the first
-/// file, the position and force columns are those of the second. `readings` and `contacts` are each a name and its bytes.
+/// Reads a recording from two CSV files, of readings and of contacts, that pair row by row. The time column is in the first file; the position and
+/// force columns are in the second. `readings` and `contacts` are each a name and its bytes.
 ///
 /// # Errors
 /// [`CsvError`] as for [`read`], and when the files have different numbers of rows.
@@ -106,7 +106,7 @@ impl Schema<'_> {
         }
     }
 
-    /// Checks that every span of untouched times holds a row.
+    /// Checks that every span of untouched times contains a row.
     fn check_untouched_times(&self, source: &str, rows: &[Row]) -> Result<(), CsvError> {
         for span in &self.columns.untouched_times {
             let times = || rows.iter().filter_map(|row| row.time_s);
@@ -137,12 +137,12 @@ impl Schema<'_> {
     }
 }
 
-/// A row as it is written, while it is open which forces are 0 but for noise.
+/// A row as written, before the recognition of forces that are 0 except for noise.
 #[derive(Debug)]
 struct OpenRow {
     row: Row,
     has_position: bool,
-    /// The error of the row where its force is not 0.
+    /// The error of the row, valid if its force is not 0.
     refusal: Option<Box<CsvError>>,
 }
 
@@ -152,13 +152,13 @@ impl OpenRow {
         self
     }
 
-    /// The row, if its force is what it says.
+    /// The row, or its remaining error.
     fn settled(self) -> Result<Row, CsvError> {
         self.refusal.map_or(Ok(self.row), |error| Err(*error))
     }
 }
 
-/// The rows, with those untouched whose force is 0 but for noise: as the columns say, or as the rows show.
+/// The rows, with a force of 0 where it is 0 except for noise: by the bound of the columns, or by recognition from the rows.
 fn settle_forces(rows: Vec<OpenRow>, columns: &Columns, dialect: &mut Dialect) -> Result<Vec<Row>, CsvError> {
     if columns.force_zero_n.is_none() {
         let samples = rows.iter().map(|open| Sample { row: &open.row, has_position: open.has_position });
@@ -178,7 +178,7 @@ fn settle_forces(rows: Vec<OpenRow>, columns: &Columns, dialect: &mut Dialect) -
 /// A file in memory.
 pub(super) struct File<'s> {
     pub source: &'s str,
-    /// In UTF-8, unless it is none.
+    /// In UTF-8, if the encoding is UTF-8 or UTF-16.
     content: Vec<u8>,
     digest: String,
     pub is_utf16: bool,
@@ -196,13 +196,13 @@ impl<'s> File<'s> {
         Ok(Self { source, content: text, digest, is_utf16 })
     }
 
-    /// Lines, with their ends, which some older spreadsheets write as carriage returns alone.
+    /// Lines with their ends. Some older spreadsheets end lines with carriage returns alone.
     pub fn lines(&self) -> impl Iterator<Item = &[u8]> {
         let end = if self.content.contains(&b'\n') { b'\n' } else { b'\r' };
         self.content.split_inclusive(move |byte| *byte == end)
     }
 
-    /// Every row, read by `row`, after `find` has found the columns in the heading; and the dialect.
+    /// Every row, read by `row`, and the dialect. `find` determines the columns from the heading.
     fn rows<C, T>(
         &self,
         columns: &Columns,
@@ -267,7 +267,7 @@ impl ContactFields {
         Ok(Self { x, y, position_unit, frame: columns.frame, force, nuisances, untouched })
     }
 
-    /// The row of a contact at a time, its reading still empty.
+    /// The row of a contact at a time, with an empty reading.
     fn row(&self, cells: &mut Cells, schema: &Schema, time_s: Option<f64>) -> Result<OpenRow, CsvError> {
         let position = self.position(cells)?;
         let is_marked = self.is_marked(cells, schema, time_s)?;
@@ -305,7 +305,7 @@ impl ContactFields {
         Ok(OpenRow { row, has_position: true, refusal: None })
     }
 
-    /// The error of a press without a position, or with one off the surface.
+    /// The error of a press without a position, or with a position off the surface.
     fn refusal(
         &self,
         cells: &mut Cells,
@@ -339,14 +339,14 @@ impl ContactFields {
         self.nuisances.iter().map(|(field, unit)| cells.number(*field, *unit)).collect()
     }
 
-    /// Whether the row is marked as untouched, or its time is among those that are untouched.
+    /// True for a row that is marked as untouched, or with a time within an untouched span.
     fn is_marked(&self, cells: &Cells, schema: &Schema, time_s: Option<f64>) -> Result<bool, CsvError> {
         let is_time = |time_s| schema.columns.untouched_times.iter().any(|span| span.contains(time_s));
         let marked = self.untouched.map_or(Ok(false), |field| cells.is_marked(field))?;
         Ok(marked || time_s.is_some_and(is_time))
     }
 
-    /// The row of no contact: its position means nothing, and is kept where it is one of the surface.
+    /// The row of an untouched surface. The position has no meaning and is kept if it lies on the surface.
     fn untouched_row(
         &self,
         cells: &mut Cells,
@@ -369,7 +369,7 @@ impl ContactFields {
 struct TimeField(Option<(usize, Unit)>);
 
 impl TimeField {
-    /// The field of the column that is named, which must be there, or of `time_s`, which may be.
+    /// The field of the named column, which is required, or of `time_s`, which is optional.
     fn find(head: &mut Cells, columns: &Columns) -> Result<Self, CsvError> {
         let own =
             || Some(Column::from(TIME)).filter(|own| columns.header == Header::Present && head.has(own));
@@ -381,7 +381,7 @@ impl TimeField {
         time.map(field).transpose().map(Self)
     }
 
-    /// The field where the column is there.
+    /// The field of the column, if the file has it.
     fn find_optional(head: &mut Cells, columns: &Columns) -> Result<Self, CsvError> {
         match Self::find(head, columns) {
             Err(CsvError { problem: CsvProblem::MissingColumn { .. }, .. }) => Ok(Self(None)),
@@ -394,24 +394,24 @@ impl TimeField {
     }
 }
 
-/// A parser of the lines of a stream, one by one, which finds its columns by the first of them.
+/// A parser of the lines of a stream, one by one. The first of them determine its columns.
 pub trait LineParser {
     /// The values of a line.
     type Parsed;
 
-    /// Reads the next line; `None` for the header, a blank line or a comment (`#`). After an error the parser goes on with the next line.
+    /// Reads the next line; `None` for the header, a blank line or a comment (`#`). After an error the parser continues with the next line.
     ///
     /// # Errors
     /// [`CsvError`] with line and column: a header that lacks a channel or names one twice, another number of fields
-    /// than the header or the first row, a field that is not a finite number, text that is not UTF-8; of readings in time also a time or a
-    /// contact that is no number, and a contact off the surface.
+    /// than the header or the first row, a field that is not a finite number, text that is not UTF-8. For readings in time also a time or a
+    /// contact that is not a number, and a contact off the surface.
     fn parse_line(&mut self, line: &[u8]) -> Result<Option<Self::Parsed>, CsvError>;
 
     /// Progress through the lines.
     fn progress(&mut self) -> &mut dyn LineProgress;
 }
 
-/// Turns lines of CSV into readings; only the channel columns need to be there.
+/// Converts lines of CSV to readings; only the channel columns are required.
 #[derive(Debug)]
 pub struct ReadingParser {
     lines: Lines<(ChannelFields, TimeField)>,
@@ -421,7 +421,7 @@ pub struct ReadingParser {
 }
 
 impl ReadingParser {
-    /// A parser for the lines of `source`, from the first one; the position and force columns need not be there.
+    /// A parser for the lines of `source`, from the first one; the position and force columns are optional.
     pub fn new(source: &str, columns: &Columns) -> Self {
         let lines = Lines::new(source, Reading::of(columns, Origin::Stream));
         Self { lines, columns: columns.clone(), clock: Clock::default(), time_s: None }
@@ -449,7 +449,7 @@ impl LineParser for ReadingParser {
         })?;
         let Some((mut cells, (channels, time))) = next else { return Ok(None) };
         let reading = channels.checked_reading(&mut cells)?;
-        // A reading without its time is a reading all the same.
+        // A reading without a valid time is still valid.
         *time_s = time.read(&mut cells, clock).unwrap_or(None);
         Ok(Some(reading))
     }
@@ -475,7 +475,7 @@ impl ChannelFields {
         self.0.iter().map(|(index, unit)| cells.number(*index, *unit)).collect()
     }
 
-    /// The reading of a stream, refused at once where a number may have a mark of thousands.
+    /// The reading of a line of a stream, refused at once if a number may have a mark of thousands.
     fn checked_reading(&self, cells: &mut Cells) -> Result<Vec<f64>, CsvError> {
         let reading = self.reading(cells)?;
         self.0.iter().try_for_each(|(index, _)| cells.check_grouping(*index))?;
@@ -489,22 +489,22 @@ pub(super) const TIME: &str = "time_s";
 /// The columns of a second contact.
 pub(super) const SECOND: [&str; 2] = ["position_2_mm", "force_2_n"];
 
-/// A recording of contacts that move, with the time of every row and, where there is one, the second contact.
+/// A recording of moving contacts, with the time of every row and the second contact, if there is one.
 ///
-/// Its file has a `time_s` column beside the others; whoever reads it as an ordinary recording passes that over, as any column without
-/// a role.
+/// The file of this recording has a `time_s` column beside the others, and two columns for a second contact. [`read`] ignores the columns of the
+/// second contact, as any column without a role.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedRecording {
-    /// The rows; a force of 0 says that nothing touched.
+    /// The rows; a force of 0 marks an untouched row.
     pub recording: Recording,
     /// Time of each row, in seconds.
     pub times_s: Vec<f64>,
-    /// The second contact of each row; nothing where there is but one contact.
+    /// The second contact of each row; empty for a recording of one contact.
     pub second: Vec<Contact>,
 }
 
 impl TimedRecording {
-    /// The true contacts of every row whose force is known.
+    /// The true contacts of every row with a known force.
     pub fn truths(&self) -> Vec<Vec<Contact>> {
         let rows = self.recording.rows.iter().enumerate();
         let all = rows.filter_map(|(i, row)| {
@@ -517,15 +517,15 @@ impl TimedRecording {
 /// One line of readings in time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedReading {
-    /// Its time in seconds, where the file has one.
+    /// Time in seconds, if the file has one.
     pub time_s: Option<f64>,
-    /// The true contacts, where the file says; the force is 0 of one that did not touch.
+    /// The true contacts, if the file contains them; the force is 0 for a contact that did not touch.
     pub truth: Option<Vec<Contact>>,
     /// One value a channel, in SI units.
     pub reading: Vec<f64>,
 }
 
-/// Turns lines of CSV into readings in time; only the channel columns need to be there.
+/// Converts lines of CSV to readings in time; only the channel columns are required.
 pub struct TimedParser<'a> {
     lines: Lines<TimedFields>,
     clock: Clock,
@@ -548,7 +548,7 @@ impl<'a> TimedParser<'a> {
         Self { lines, clock: Clock::default(), schema }
     }
 
-    /// Whether a column tells the time.
+    /// True where a column has the time.
     pub fn has_time(&self) -> bool {
         self.lines.fields().is_some_and(|fields| fields.time.0.is_some())
     }
@@ -564,7 +564,7 @@ impl LineParser for TimedParser<'_> {
         let time_s = fields.time.read(&mut cells, clock)?;
         let contact = fields.contact.as_ref();
         let row = contact.map(|contact| contact.row(&mut cells, schema, time_s)?.settled()).transpose()?;
-        // A force that nobody knows is not 0: something touched.
+        // An unknown force is not 0: the surface is touched.
         let truth = row.map(|Row { position, force_n, .. }| Contact {
             position,
             force_n: force_n.unwrap_or(f64::INFINITY),

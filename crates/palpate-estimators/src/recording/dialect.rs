@@ -1,8 +1,8 @@
 //! The dialect of a file: its separator and its decimal mark.
 //!
-//! A plain file has commas between fields and decimal points. Spreadsheets of half the world write semicolons and decimal commas instead.
-//! The first line tells the separator, the first number with a comma or a point tells the decimal mark, and from there on both hold:
-//! a stream is read by the same rules as a file. What no rule can tell is refused.
+//! A plain file has commas between fields and decimal points. Spreadsheets in many countries write semicolons and decimal commas instead. The
+//! first line determines the separator; the first number with a comma or a point determines the decimal mark. Both stay valid from there on: a
+//! stream is read by the same rules as a file. A text that no rule decides is refused.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ use super::marks::{Decimal, Separator};
 use super::zero_force::ZeroForce;
 use palpate_mechanics::units::Unit;
 
-/// Dialect of a file, as far as its lines have told.
+/// Dialect of a file, as far as its lines determine it.
 ///
 /// Displayed in a few words, such as `semicolons, decimal commas, units in the header`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,28 +25,28 @@ pub struct Dialect {
     pub separator: Separator,
     /// Decimal mark; `None` while all numbers are whole.
     pub decimal: Option<Decimal>,
-    /// The number that has told the decimal mark, where others would read its mark as one of thousands.
+    /// The number that determined the decimal mark, if its mark could also be a separator of thousands.
     pub doubtful: Option<String>,
-    /// Whether columns were found by their names without the units behind them.
+    /// Whether columns were identified by their names without the units after them.
     pub units_in_header: bool,
     /// Whether some text was Windows-1252, not UTF-8.
     pub windows_1252: bool,
-    /// Rows without a position, which were taken as untouched as nothing else said so.
+    /// Number of rows that counted as untouched only because they have no position.
     #[serde(default)]
     pub without_position: usize,
     /// Whether the text was UTF-16.
     #[serde(default, skip_serializing_if = "is_false")]
     pub utf16: bool,
-    /// Lines above the heading that are no comments.
+    /// Lines above the heading that are not comments.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub preamble: Option<Preamble>,
     /// Line of the row of units below the heading.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units_line: Option<usize>,
-    /// Lines below the heading that are no rows.
+    /// Lines below the heading that are not rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub notes: Option<Notes>,
-    /// Rows whose force was taken as 0, as nothing said which forces are.
+    /// Rows with a force that was recognised as 0, without a bound in the rig.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zero_force: Option<ZeroForce>,
 }
@@ -60,30 +60,30 @@ pub struct Preamble {
     pub heading_line: usize,
 }
 
-/// Lines below the heading that are no rows: the name of a run, a total, the heading again.
+/// Lines below the heading that are not rows: the name of a run, a total, the heading again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Notes {
     /// Number of lines.
     pub lines: usize,
     /// The first of them.
     pub first_line: usize,
-    /// Text, or the beginning of it.
+    /// Text of the first line, or its beginning.
     pub text: String,
 }
 
-// serde asks with a reference.
+// serde passes a reference.
 #[allow(clippy::trivially_copy_pass_by_ref)]
 fn is_false(value: &bool) -> bool {
     !*value
 }
 
 impl Dialect {
-    /// The dialect of a file of which nothing has been read: `decimal` is what the rig says.
+    /// The dialect of an unread file; `decimal` is the decimal mark in the rig.
     pub(super) fn new(source: &str, decimal: Option<Decimal>) -> Self {
         Self { source: source.to_owned(), decimal, ..Self::default() }
     }
 
-    /// Whether there is nothing to say of it.
+    /// True for plain CSV, which needs no remark.
     pub fn is_plain(&self) -> bool {
         let plain = Self {
             source: self.source.clone(),
@@ -93,12 +93,12 @@ impl Dialect {
         *self == plain
     }
 
-    /// Takes note of `lines` above the heading.
+    /// Records the number of `lines` above the heading.
     pub(super) fn note_preamble(&mut self, heading_line: usize, lines: usize) {
         self.preamble = (lines > 0).then_some(Preamble { lines, heading_line });
     }
 
-    /// Takes note of a line that is no row.
+    /// Records a line that is not a row.
     pub(super) fn note_line(&mut self, line: usize, text: &str) {
         const MOST: usize = 40;
         let shown = || text.chars().map(|c| if c.is_control() { ' ' } else { c });
@@ -108,7 +108,7 @@ impl Dialect {
         self.notes.get_or_insert_with(first).lines += 1;
     }
 
-    /// The finite number that `text` is, in SI units.
+    /// The finite number in `text`, in SI units.
     pub(super) fn number(&mut self, text: &str, unit: Unit) -> Result<f64, CsvProblem> {
         let commas = text.bytes().filter(|byte| *byte == b',').count();
         let parsed = match commas {
@@ -135,7 +135,7 @@ impl Dialect {
         }
     }
 
-    /// Takes the mark of a number for that of the file, or refuses it beside the file's.
+    /// Adopts the mark of a number as that of the file, or refuses a mark that differs from that of the file.
     fn see(&mut self, mark: Decimal, text: &str) -> Result<(), CsvProblem> {
         let doubtful = looks_grouped(text);
         match self.decimal {
@@ -144,13 +144,13 @@ impl Dialect {
             }
             Some(_) if doubtful => return Ok(()),
             Some(_) => {}
-            // Between commas, whoever quotes a number for its comma may well mean thousands.
+            // Between commas, the comma of a quoted number may well separate thousands.
             None if doubtful && mark == Decimal::Comma && self.separator == Separator::Comma => {
                 return Err(CsvProblem::DoubtfulNumber { text: text.to_owned() });
             }
             None => self.decimal = Some(mark),
         }
-        // Points are what a plain file has; beside semicolons they may be thousands.
+        // A plain file has decimal points; beside semicolons, a point may separate thousands.
         let doubtful = doubtful && (mark == Decimal::Comma || self.separator == Separator::Semicolon);
         self.doubtful = doubtful.then(|| text.to_owned());
         Ok(())
@@ -208,7 +208,7 @@ fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Whether a text is a number but for several points or commas.
+/// True for a text that is a number except for several points or commas.
 fn has_thousands(text: &str) -> bool {
     let number: String = text.chars().filter(|c| !matches!(c, ',' | '.')).collect();
     let marks = text.len() - number.len();
@@ -221,7 +221,7 @@ fn has_thousands(text: &str) -> bool {
 mod tests {
     use super::*;
 
-    /// Remarks after numbers have been read, or the first refusal.
+    /// The numbers and the remarks on them, or the first error.
     fn said(separator: Separator, texts: &[&str]) -> String {
         let mut dialect = Dialect { separator, ..Dialect::default() };
         let numbers: Result<Vec<f64>, _> =

@@ -27,7 +27,7 @@ fn own() -> Columns {
     columns("position_mm", "force_n", ["S1", "S2", "S3", "S4"])
 }
 
-/// The recording, and what is said of its file.
+/// The recording and the remarks on its file.
 fn read_as(columns: &Columns, text: &[u8]) -> Result<(Recording, String), String> {
     let layout = Layout::even(SensorKind::Raw, 4, 0.1);
     let extent = Extent::line(0.1).unwrap();
@@ -155,7 +155,7 @@ fn marks_that_may_be_of_thousands_are_refused_with_both_readings() {
         of(',', &["0", "1.003", "1.998"]),
     ];
     insta::assert_snapshot!(cases.join("\n"));
-    // A decimal mark in another column does not settle it.
+    // A decimal mark in another column does not decide.
     let beside = said(&titled(), &format!("{HEADING}\n10.5,1,503,1,1,1\n10.5,1,1.003,1,1,1\n"));
     assert!(beside.contains("may be 1003 or 1.003"), "{beside}");
     let point = Columns { decimal: Some(Decimal::Point), ..titled() };
@@ -179,7 +179,7 @@ fn a_stream_finds_its_heading_and_loses_no_line_in_silence() {
     let mut parser = ReadingParser::new("stdin", &titled());
     assert_eq!(parser.parse_line(b"S1,S2,S3,S5").unwrap(), None);
     let error = parser.parse_line(b"1,2,3,4").unwrap_err().to_string();
-    assert!(error.starts_with("stdin:1: there is no column `S4`"), "{error}");
+    assert!(error.starts_with("stdin:1: no column is named `S4`"), "{error}");
     assert!(parser.progress().awaits_columns());
 
     let mut parser = ReadingParser::new("stdin", &titled());
@@ -187,8 +187,8 @@ fn a_stream_finds_its_heading_and_loses_no_line_in_silence() {
     assert_eq!(refused, Some(199));
 }
 
-/// The remarks on the base recording with `force` of each row's force and number, and untouched rows at `place`. If any row is untouched,
-/// all of them are that were.
+/// The remarks on the base recording with `force` of each row's force and number, and untouched rows at `place`. If any row is read as untouched,
+/// the untouched rows are those of the base recording.
 fn with_forces(force: impl Fn(f64, usize) -> String, place: &str) -> String {
     let mut text = BASE.lines().next().unwrap().to_owned() + "\n";
     let mut expected = Vec::new();
@@ -226,7 +226,7 @@ fn forces_that_are_0_but_for_noise_are_untouched() {
         with_forces(noisy, "50"),
         // An offset of the load cell.
         with_forces(|force_n, i| noisy(force_n + 0.03, i), ""),
-        // No force but noise.
+        // Forces of noise only.
         with_forces(|_, i| noisy(0.0, i), "50"),
     ];
     insta::assert_snapshot!(cases.join("\n"));
@@ -234,7 +234,7 @@ fn forces_that_are_0_but_for_noise_are_untouched() {
 
 #[test]
 fn light_presses_are_no_untouched_rows() {
-    // Presses of 1 N become ones of 0.02 N, and read as such.
+    // Presses of 1 N become presses of 0.02 N, with readings to match.
     let baseline = [100.0, 200.0, 300.0, 400.0];
     let mut text = String::new();
     for row in BASE.lines() {

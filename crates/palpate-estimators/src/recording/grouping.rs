@@ -1,4 +1,4 @@
-//! Marks of decimals that may be separators of thousands: `1.003` beside `503`.
+//! Decimal marks that may be separators of thousands: `1.003` beside `503`.
 
 use super::csv_error::{CsvError, CsvProblem};
 use super::marks::Decimal;
@@ -17,13 +17,14 @@ pub(super) fn looks_grouped(number: &str) -> bool {
     })
 }
 
-/// The numbers of a file's columns, as far as their marks may separate thousands.
+/// Numbers of a file's columns with marks that may separate thousands.
 ///
-/// One number that can only have a decimal mark, such as `0.5`, decides for its column. While there is none, the marks of a column are in
-/// doubt where numbers with a mark stand beside whole ones below 1000, and all of them span no more decades as thousands than as decimals.
+/// One number that can only have a decimal mark, such as `0.5`, decides for its column. Without such a number, the marks of a column are ambiguous
+/// under two conditions: numbers with a mark stand beside whole numbers below 1000, and all of them span no more decades as thousands than as
+/// decimals.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Groupings {
-    /// Whether the decimal mark is said, so that nothing is in doubt.
+    /// Whether the decimal mark is given, so that no number is ambiguous.
     is_said: bool,
     columns: Vec<Grouping>,
 }
@@ -32,9 +33,9 @@ pub(super) struct Groupings {
 #[derive(Clone, Debug, Default)]
 struct Grouping {
     is_decided: bool,
-    /// Whole numbers without a mark, other than 0: the least and the greatest magnitude, and the text of one.
+    /// Whole numbers without a mark, other than 0: the least and the greatest magnitude, and the text of the greatest.
     whole: Option<(f64, f64, String)>,
-    /// The same of numbers that look grouped, with the place of the first.
+    /// Numbers that look grouped: the least and the greatest magnitude as decimals, and the place of the first number.
     grouped: Option<(f64, f64, Place)>,
 }
 
@@ -49,17 +50,17 @@ pub(super) struct Place {
 }
 
 impl Groupings {
-    /// Those of a file; without a doubt where its decimal mark is said.
+    /// Groupings of a file; never ambiguous if its decimal mark is given.
     pub fn new(decimal: Option<Decimal>) -> Self {
         Self { is_said: decimal.is_some(), columns: Vec::new() }
     }
 
-    /// Whether no number of a column can be in doubt any more.
+    /// True where no further number of a column can be ambiguous.
     pub fn is_decided(&self, column: usize) -> bool {
         self.is_said || self.columns.get(column).is_some_and(|column| column.is_decided)
     }
 
-    /// Takes the number `text` of a column into account.
+    /// Adds the number `text` of a column.
     pub fn insert(&mut self, column: usize, text: &str, place: impl FnOnce() -> Place) {
         if self.columns.len() <= column {
             self.columns.resize(column + 1, Grouping::default());
@@ -67,7 +68,7 @@ impl Groupings {
         let Grouping { is_decided, whole, grouped } = &mut self.columns[column];
         let digits = text.trim_start_matches(['+', '-']);
         let is_grouped = looks_grouped(text);
-        // Whoever separates thousands separates all of them.
+        // Separators of thousands are in all numbers or in none.
         *is_decided |= !is_grouped && (digits.len() > 3 || !digits.bytes().all(|byte| byte.is_ascii_digit()));
         let value = |value, digit| 10.0 * value + f64::from(digit - b'0');
         let number = digits.bytes().filter(u8::is_ascii_digit).fold(0.0, value);
@@ -87,7 +88,7 @@ impl Groupings {
         }
     }
 
-    /// The error of the first column in doubt.
+    /// The error of the first ambiguous column.
     pub fn doubt(&self, source: &str) -> Option<CsvError> {
         if self.is_said {
             return None;
@@ -95,7 +96,7 @@ impl Groupings {
         self.columns.iter().find_map(|column| column.doubt(source))
     }
 
-    /// The error of this column, where it is in doubt.
+    /// The error of this column, if it is ambiguous.
     pub fn doubt_in(&self, column: usize, source: &str) -> Option<CsvError> {
         self.columns.get(column).filter(|_| !self.is_said)?.doubt(source)
     }

@@ -1,4 +1,4 @@
-//! Names of columns, with the units that stand behind them.
+//! Names of columns and the units after them.
 
 use palpate_mechanics::units::Unit;
 
@@ -12,8 +12,8 @@ pub struct Heading<'a> {
 }
 
 impl<'a> Heading<'a> {
-    /// The parts of a heading. What stands in brackets or parentheses, or as one word behind a slash between spaces, is taken for the
-    /// unit whatever it says; what follows a bare slash, a comma or `in` only where it is a unit.
+    /// The parts of a heading. Text in brackets or parentheses, or a single word after a slash between spaces, is always the unit. Text after a
+    /// bare slash, a comma or `in` is the unit only if it is the symbol of one.
     pub fn parse(text: &'a str) -> Self {
         let text = text.trim();
         let parts = Self::enclosed(text, '[', ']').or_else(|| Self::enclosed(text, '(', ')'));
@@ -30,7 +30,7 @@ impl<'a> Heading<'a> {
         }
     }
 
-    /// The unit, where palpate knows it.
+    /// The unit, if palpate defines its symbol.
     pub fn known_unit(&self) -> Option<Unit> {
         self.unit.and_then(Unit::from_symbol)
     }

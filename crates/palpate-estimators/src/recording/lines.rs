@@ -1,4 +1,4 @@
-//! Lines of CSV as they come: the search for the heading, then one row after another.
+//! Sequential reading of lines of CSV: the search for the heading, then one row after another.
 
 use super::cells::{Cells, split};
 use super::columns::{Column, Columns, Header, PositionColumns};
@@ -9,16 +9,16 @@ use super::marks::{Decimal, Separator};
 use super::notes::{self, LineKind, Origin};
 use super::text::windows_1252;
 
-/// Lines among which a heading is sought. Preambles of loggers have 20 to 60.
+/// Greatest number of lines that are searched for a heading. Preambles of loggers have 20 to 60.
 const MOST_PREAMBLE: usize = 200;
 
-/// The way in which lines are read.
+/// Rules by which lines are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Reading {
     pub header: Header,
     pub separator: Option<Separator>,
     pub decimal: Option<Decimal>,
-    /// Whether some column is sought by its name, so that a line that has all columns must be the heading.
+    /// Whether some column is given by its name, so that a line with all columns must be the heading.
     pub has_names: bool,
     /// Least number of fields of a row.
     pub least_width: usize,
@@ -26,7 +26,7 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    /// Lines that have these columns.
+    /// Rules for lines with these columns.
     pub fn of(columns: &Columns, origin: Origin) -> Self {
         let positions = match &columns.position {
             PositionColumns::Along(x) => vec![x],
@@ -39,7 +39,7 @@ impl Reading {
     }
 }
 
-/// Lines of CSV as they come.
+/// Sequential reader of lines of CSV.
 #[derive(Debug)]
 pub(super) struct Lines<F> {
     /// Dialect of the lines so far.
@@ -57,11 +57,11 @@ pub(super) struct Lines<F> {
 /// The search for the heading.
 #[derive(Debug)]
 struct Search<F> {
-    /// Lines with a text that are not the heading.
+    /// Number of lines with a text that are not the heading.
     skipped: usize,
-    /// The last line that has all columns by their numbers, and may be the heading.
+    /// The last line that has all columns by their numbers, and may be the heading, with its line number.
     candidate: Option<(Head<F>, usize)>,
-    /// The error of the line that looks most like the heading, and how much it does.
+    /// The error of the line that looks most like the heading, with its likeness.
     refused: Option<(usize, CsvError)>,
 }
 
@@ -86,7 +86,7 @@ struct Body<F> {
 }
 
 impl<F> Lines<F> {
-    /// The lines of `source` from the first one.
+    /// A reader of the lines of `source` from the first one.
     pub fn new(source: &str, reading: Reading) -> Self {
         Self {
             dialect: Dialect::new(source, reading.decimal),
@@ -99,8 +99,8 @@ impl<F> Lines<F> {
         }
     }
 
-    /// The cells of the next line and its fields, which `find` finds in the heading; `None` for a line that is no row: the
-    /// heading and what stands above it, units, a blank line, a comment (`#`), and in files notes below the table.
+    /// The cells of the next line and the fields that `find` determined from the heading; `None` for a line that is not a row. Such lines are the
+    /// heading and lines above it, units, blank lines, comments (`#`), and in files notes below the table.
     pub fn next<'a>(
         &'a mut self,
         line: &'a [u8],
@@ -127,13 +127,13 @@ impl<F> Lines<F> {
         Ok(is_row.then_some((cells, &body.fields)))
     }
 
-    /// The error of the line that looks most like the heading, where no line was one.
+    /// The error of the line that looks most like the heading, if no line was a heading.
     pub fn unfound(&mut self) -> Option<CsvError> {
         let refused = self.search.refused.take().filter(|_| self.body.is_none());
         refused.map(|(_, error)| error)
     }
 
-    /// Dialect of the lines, or the first number in which its decimal mark may be one of thousands.
+    /// Dialect of the lines, or the error of the first column with decimal marks that may separate thousands.
     pub fn into_dialect(self) -> Result<Dialect, CsvError> {
         match self.groupings.doubt(&self.dialect.source) {
             Some(error) => Err(error),
@@ -141,7 +141,7 @@ impl<F> Lines<F> {
         }
     }
 
-    /// The fields that the heading has.
+    /// The fields of the heading, after it was read.
     pub fn fields(&self) -> Option<&F> {
         self.body.as_ref().map(|body| &body.fields)
     }
@@ -154,16 +154,16 @@ impl<F> Lines<F> {
 
 /// Progress of a [`LineParser`](super::LineParser).
 pub trait LineProgress {
-    /// Counts a line that nobody reads, so that the lines after it have their numbers.
+    /// Counts a line that is not read, so that the following lines have correct numbers.
     fn skip_line(&mut self);
 
-    /// True while no line yet has told which columns there are: an error now means that no line can be read.
+    /// True as long as no line has determined the columns. An error in this state means that no line can be read.
     fn awaits_columns(&self) -> bool;
 
     /// Dialect of the lines so far.
     fn dialect(&self) -> &Dialect;
 
-    /// The error of the line that looks most like the heading, once no more lines come and none was one.
+    /// The error of the line that looks most like the heading, for use after the last line, if no line was a heading.
     fn unfound(&mut self) -> Option<CsvError>;
 }
 
@@ -185,7 +185,7 @@ impl<F> LineProgress for Lines<F> {
     }
 }
 
-/// Role of the line in which a table is found.
+/// Role of the line at which a table is detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
     Heading,
@@ -193,7 +193,7 @@ enum Role {
 }
 
 impl<F> Search<F> {
-    /// The table that begins with this line or with the heading above it; `None` while it is sought.
+    /// The table that begins with this line or with the heading above it; `None` as long as the search continues.
     fn next(
         &mut self,
         line: usize,
@@ -243,7 +243,7 @@ impl<F> Search<F> {
 }
 
 impl<F> Head<F> {
-    /// The head that `find` finds in a line, with the one separator that lets it; `None` for a line of empty fields.
+    /// The head that `find` determines from a line, with the one separator for which it succeeds; `None` for a line of empty fields.
     fn find(
         line: usize,
         text: &str,
@@ -283,14 +283,14 @@ impl<F> Head<F> {
         }
     }
 
-    /// The table below this head, whose dialect becomes that of the lines.
+    /// The table below this head. Sets the separator and `units_in_header` of `dialect` to those of the head.
     fn accept(self, dialect: &mut Dialect) -> Body<F> {
         dialect.separator = self.dialect.separator;
         dialect.units_in_header = self.dialect.units_in_header;
         Body { fields: self.fields, heading: self.texts, units: None, words: None }
     }
 
-    /// Whether it looks like a heading where columns are sought by their numbers: words in most fields, not all the same.
+    /// True for a line that looks like a heading where columns are given by their numbers: words in most fields, not all the same.
     fn is_heading(&self) -> bool {
         let texts: Vec<&str> = self.texts.iter().map(String::as_str).collect();
         let words = notes::distinct_words(&texts);
@@ -301,14 +301,14 @@ impl<F> Head<F> {
 }
 
 impl<F> Body<F> {
-    /// Whether a line that is not blank is a row; units and notes are counted in the dialect.
+    /// True where a line that is not blank is a row. Units and notes are recorded in the dialect.
     fn is_row(
         &mut self,
         cells: &mut Cells,
         reading: &Reading,
         find: impl Fn(&mut Cells) -> Result<F, CsvError>,
     ) -> Result<bool, CsvError> {
-        // Most rows have numbers alone.
+        // Most rows contain numbers only.
         if cells.texts().all(|text| text.is_empty() || notes::begins_like_a_value(text)) {
             cells.check_width(self.heading.len())?;
             self.words.get_or_insert_default().clear();
@@ -341,7 +341,7 @@ impl<F> Body<F> {
         }
     }
 
-    /// Refuses a row of units of which one is not the unit that its column is read in.
+    /// Refuses a row of units if one is not the unit in which its column is read.
     fn check_units(
         &self,
         cells: &Cells,
@@ -360,7 +360,7 @@ impl<F> Body<F> {
     }
 }
 
-/// The separators by which the first line of a table may be meant to be cut.
+/// Candidate separators of the first line of a table.
 fn separators(text: &str, header: Header) -> Vec<Separator> {
     let width = |separator: Separator| split(text, separator).map_or(0, |fields| fields.len());
     let mut separators: Vec<Separator> =
@@ -385,13 +385,13 @@ fn separators(text: &str, header: Header) -> Vec<Separator> {
     }
 }
 
-/// Number of fields that are no values.
+/// Number of fields that are not values.
 pub(super) fn words_among(text: &str, separator: Separator) -> usize {
     let fields = split(text, separator).unwrap_or_default();
     fields.iter().filter(|field| !notes::is_value(&field.value)).count()
 }
 
-/// Whether a line has at least so many fields, and values or nothing in all.
+/// True for a line with at least `least_width` fields, all of them values or empty, and at least one a value.
 pub(super) fn is_row_of_values(text: &str, separator: Separator, least_width: usize) -> bool {
     let Ok(fields) = split(text, separator) else { return false };
     let mut texts =
@@ -399,8 +399,7 @@ pub(super) fn is_row_of_values(text: &str, separator: Separator, least_width: us
     fields.len() >= least_width && texts.peek().is_some() && texts.all(notes::is_value)
 }
 
-/// Text of a line of bytes, without its end; `None` for a blank line or a comment. `decoded` holds the text where it is not
-/// UTF-8.
+/// Text of a line of bytes, without its end; `None` for a blank line or a comment. `decoded` contains the text of a line that is not UTF-8.
 pub(super) fn written<'a>(
     bytes: &'a [u8],
     line: usize,

@@ -22,13 +22,13 @@ pub enum Separator {
 }
 
 impl Separator {
-    /// All of them.
+    /// All separators.
     pub const ALL: [Self; 5] = [Self::Comma, Self::Semicolon, Self::Tab, Self::Pipe, Self::Blanks];
 
     /// Separators that are one character each.
     pub(super) const MARKS: [Self; 4] = [Self::Comma, Self::Semicolon, Self::Tab, Self::Pipe];
 
-    /// The word for it in rigs.
+    /// The name in rigs.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Comma => "comma",
@@ -80,10 +80,10 @@ pub enum Decimal {
 }
 
 impl Decimal {
-    /// Both of them.
+    /// Both decimal marks.
     pub const ALL: [Self; 2] = [Self::Point, Self::Comma];
 
-    /// The word for it in rigs.
+    /// The name in rigs.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Point => "point",

@@ -1,4 +1,4 @@
-//! Readings paired with their contacts: what calibration makes and evaluation needs.
+//! Readings paired with their contacts: the data that calibration records and evaluation requires.
 
 mod cells;
 mod columns;
@@ -56,7 +56,7 @@ use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_numerics::{mean, random_order};
 use std::borrow::Cow;
 
-/// Degrees of freedom of a channel's noise that are taken for those of what is expected of it before: no more tell hardly anything.
+/// Degrees of freedom of a channel's noise that count as those of its prior. A noise estimate with no more degrees of freedom is unreliable.
 pub(crate) const LEAST_FREEDOM: f64 = 4.0;
 
 /// Readings with the contacts that caused them.
@@ -68,7 +68,7 @@ pub struct Recording {
     pub kinds: Vec<SensorKind>,
     /// The rows, in the order in which they were recorded.
     pub rows: Vec<Row>,
-    /// Their provenance.
+    /// Provenance of the rows.
     pub provenance: Provenance,
 }
 
@@ -77,13 +77,12 @@ pub struct Recording {
 pub struct Row {
     /// True position of the contact.
     pub position: Position,
-    /// Force in newtons, positive downward; `None` where nobody measured it, 0 where nothing touched.
+    /// Force in newtons, positive downward; `None` if it was not measured, 0 for an untouched row.
     pub force_n: Option<f64>,
-    /// Coordinates that shape the reading, are known here, and are unknown when a reading is to be located: the depth of indentation and
-    /// the temperature, say. In the SI units of their columns and in their order; empty where the recording has no such columns.
+    /// Coordinates that affect the reading, for example the depth of indentation and the temperature. They are known here and unknown when a
+    /// reading is located. In the SI units of their columns and in their order; empty where the recording has no such columns.
     pub nuisances: Vec<f64>,
-    /// Time in seconds, where the recording has one: since whenever its file counts from, or since its first row where that
-    /// has timestamps.
+    /// Time in seconds, if the recording has one: from the origin of the file's times, or since the first row for timestamps.
     pub time_s: Option<f64>,
     /// One finite value per channel, in the SI unit of its kind (or raw).
     pub reading: Vec<f64>,
@@ -95,7 +94,7 @@ impl Row {
         self.force_n.map(|force_n| Contact { position: self.position, force_n })
     }
 
-    /// Whether something touched: its force is not 0. The position of a row without contact means nothing.
+    /// True for a contact: the force is not 0. The position of a row without contact has no meaning.
     pub fn touches(&self) -> bool {
         self.force_n != Some(0.0)
     }
@@ -106,7 +105,7 @@ pub fn sha256_hex(content: &[u8]) -> String {
     Sha256::digest(content).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Provenance of a recording, so that whatever is fitted to it can say so.
+/// Provenance of a recording. Every model that is fitted to the recording can state it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// The name that the caller gave: usually a file's, or "simulation".
@@ -123,8 +122,8 @@ pub struct Provenance {
     pub repeats: Option<Repeats>,
     /// The seed of a simulation.
     pub seed: Option<u64>,
-    /// Standard deviation in each direction of the pressed place about the position of its row, in metres, where a person pressed and
-    /// said so.
+    /// Standard deviation in each direction of the pressed place about the position of its row, in metres, if a person pressed and the file states
+    /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placement_sd_m: Option<f64>,
     /// State in which the recording left a simulated bench with imperfections.
@@ -132,7 +131,7 @@ pub struct Provenance {
     pub bench: Option<BenchState>,
 }
 
-/// One way to hold positions out: the rows to fit, and the rows to judge by.
+/// One fold of held-out positions: the rows to fit and the rows to evaluate.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fold {
     /// Indices of the rows to fit.
@@ -167,7 +166,7 @@ impl Recording {
         Self { channels: layout.names(), kinds: layout.kinds(), rows, provenance }
     }
 
-    /// The same, simulated from a seed.
+    /// Sets the seed of the simulation.
     #[must_use]
     pub fn seeded(mut self, seed: u64) -> Self {
         self.provenance.seed = Some(seed);
@@ -184,7 +183,7 @@ impl Recording {
         self.times_s().unwrap_or_else(|| (0..self.rows.len()).map(|row| row as f64).collect())
     }
 
-    /// The same with the number of each row as its time where some row has none, so that parts of it keep their order.
+    /// Sets the time of each row to its number if some row has no time, so that parts of the recording keep their order.
     #[must_use]
     pub fn in_order(mut self) -> Self {
         if self.times_s().is_none() {
@@ -193,7 +192,7 @@ impl Recording {
         self
     }
 
-    /// Every position that was touched, once, sorted by x and then y.
+    /// Every touched position, once, sorted by x and then y.
     pub fn distinct_positions(&self) -> Vec<Position> {
         let touched = self.rows.iter().filter(|row| row.touches());
         let mut positions: Vec<Position> = touched.map(|row| row.position).collect();
@@ -202,7 +201,7 @@ impl Recording {
         positions
     }
 
-    /// True for presses with forces of which too few repeat a place or are untouched to tell the noise of influence functions.
+    /// True where every row has a force, but too few rows repeat a place or are untouched to estimate the noise of influence functions.
     pub fn hardly_tells_noise(&self) -> bool {
         let spare = self.rows.len().saturating_sub(self.distinct_positions().len() + 1);
         self.rows.iter().all(|row| row.force_n.is_some()) && spare as f64 <= LEAST_FREEDOM
@@ -217,8 +216,8 @@ impl Recording {
         if found >= needed { Ok(()) } else { Err(TooFewPositions { found, needed }) }
     }
 
-    /// Splits the rows into `count` folds by position: of the distinct positions, sorted by x and then y, fold k
-    /// holds out those whose index leaves k when divided by `count`, with all their rows. No fold holds out rows without contact.
+    /// Splits the rows into `count` folds by position. Fold k holds out every distinct position with index i such that i mod `count` = k, with all
+    /// rows of the position. The positions are sorted by x and then y. No fold holds out rows without contact.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, setup::Setup};
@@ -249,7 +248,7 @@ impl Recording {
         Ok(folds)
     }
 
-    /// The rows in which something touched, of the same provenance; borrowed where those are all.
+    /// The rows with a contact, with the same provenance; borrowed if all rows have one.
     pub fn touched(&self) -> Cow<'_, Self> {
         if self.rows.iter().all(Row::touches) {
             return Cow::Borrowed(self);
@@ -263,7 +262,7 @@ impl Recording {
         })
     }
 
-    /// Mean reading of the rows in which nothing touched; `None` where there are none.
+    /// Mean reading of the untouched rows; `None` without such rows.
     pub fn untouched_mean(&self) -> Option<Vec<f64>> {
         let untouched: Vec<usize> = (0..self.rows.len()).filter(|row| !self.rows[*row].touches()).collect();
         (!untouched.is_empty()).then(|| self.mean_reading(&untouched))
@@ -275,7 +274,7 @@ impl Recording {
         (0..self.channels.len()).map(channel).collect()
     }
 
-    /// Rests: consecutive rows that are untouched, by their indices.
+    /// Rests: runs of consecutive untouched rows, by their indices.
     pub fn rests(&self) -> Vec<Vec<usize>> {
         let indices: Vec<usize> = (0..self.rows.len()).collect();
         let touches = |row: &usize| self.rows[*row].touches();
@@ -283,8 +282,8 @@ impl Recording {
         runs.filter(|run| !touches(&run[0])).map(<[usize]>::to_vec).collect()
     }
 
-    /// One row of each position in which something touched, drawn at random, as presses of a position may come in the order of their depths; `None`
-    /// where those are all rows.
+    /// One row of each touched position, drawn at random, because presses of a position may be in the order of their depths; `None` if those are
+    /// all rows.
     pub fn one_row_a_position(&self, seed: u64) -> Option<Self> {
         let positions = self.distinct_positions();
         let mut drawn: Vec<Option<usize>> = vec![None; positions.len()];
@@ -300,7 +299,7 @@ impl Recording {
         (drawn.len() < self.rows.len()).then(|| self.subset(&drawn))
     }
 
-    /// The recording that consists of `rows`, indices into this one's; those beyond it are left out.
+    /// The recording of the rows with the indices `rows`; indices beyond the last row are ignored.
     pub fn subset(&self, rows: &[usize]) -> Self {
         let rows: Vec<Row> = rows.iter().filter_map(|i| self.rows.get(*i)).cloned().collect();
         let provenance = Provenance { rows: rows.len(), ..self.provenance.clone() };

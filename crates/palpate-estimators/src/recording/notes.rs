@@ -1,11 +1,11 @@
-//! Lines about a table that are no rows of it: units, totals, remarks.
+//! Lines of a table that are not rows: units, totals, remarks.
 
 use super::cells::split;
 use super::heading::Heading;
 use super::marks::Separator;
 use palpate_mechanics::units::Unit;
 
-/// Origin of lines: in a file, a line below the table may be a note of whoever wrote it; in a stream it is a reading that was lost.
+/// Origin of lines. In a file, a line below the table may be a note of its author; in a stream it is a lost reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Origin {
     File,
@@ -22,7 +22,7 @@ pub(super) enum LineKind {
     Note,
 }
 
-/// Texts for a value that is missing: a row that has one is a row.
+/// Texts for a missing value: a line that contains one is a row.
 const MISSING: [&str; 16] = [
     "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf", "infinity", "err", "error", "ol",
     "ovld", "overload", "overflow",
@@ -64,8 +64,8 @@ const OTHER_UNITS: [&str; 26] = [
     "count", "cts", "digits", "digit", "lsb", "raw", "a.u.", "au", "bit",
 ];
 
-/// Kind of a line with these fields, of which one is no value, below a heading; `words` says in which columns the last row has
-/// words, `None` before the first row.
+/// Kind of a line below a heading with these fields, at least one of them not a value. `words` marks the columns with words in the last row;
+/// `None` before the first row.
 pub(super) fn kind_of(
     texts: &[&str],
     heading: &[String],
@@ -96,7 +96,7 @@ pub(super) fn kind_of(
         (Some(_), Origin::File) if values == 0 => {
             filled.len() == 1 || texts.len() != heading.len() || distinct_words(texts) == 1
         }
-        // `Rows;69`: a torn row begins as rows do.
+        // `Rows;69` is a note: a torn row begins like a row.
         (Some(_), Origin::File) => {
             texts.len() < heading.len()
                 && filled.first().is_some_and(|i| !is_value(texts[*i]) && !had_words(*i))
@@ -105,7 +105,7 @@ pub(super) fn kind_of(
     if is_note { LineKind::Note } else { LineKind::Row }
 }
 
-/// The headings, with the units of the row below them where they have none.
+/// The headings, with units from the row below for headings without a unit.
 pub(super) fn with_units(heading: &[String], units: &[String]) -> Vec<String> {
     let bare = |unit: &str| unit.trim_matches(['[', ']', '(', ')']).trim().to_owned();
     let composed = heading.iter().enumerate().map(|(i, heading)| {
@@ -120,7 +120,7 @@ pub(super) fn with_units(heading: &[String], units: &[String]) -> Vec<String> {
     composed.collect()
 }
 
-/// How much a line looks like a heading: the number of its distinct words; 0 for a row of units.
+/// Likeness of a line to a heading: the number of its distinct words; 0 for a row of units.
 pub(super) fn heading_likeness(text: &str, separator: Separator) -> usize {
     let fields = split(text, separator).unwrap_or_default();
     let texts: Vec<&str> = fields.iter().map(|field| field.value.as_ref()).collect();
@@ -149,7 +149,7 @@ pub(super) fn begins_like_a_value(text: &str) -> bool {
     unsigned.strip_prefix(['.', ',']).unwrap_or(unsigned).starts_with(|c: char| c.is_ascii_digit())
 }
 
-/// Whether a field of a row of units says one.
+/// True for a text that may be a unit in a row of units.
 fn is_unit(text: &str) -> bool {
     let is_enclosed = |open, close| text.starts_with(open) && text.ends_with(close);
     let known = |text: &str| Unit::from_symbol(text).is_some_and(|unit| unit != Unit::NONE);

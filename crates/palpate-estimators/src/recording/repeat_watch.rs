@@ -5,7 +5,7 @@ use super::sample_hold::{RepeatCause, RepeatCounts, is_same_reading};
 /// Pairs of untouched readings between two tests.
 const PAIRS_EACH: u64 = 32;
 
-/// Watch over a stream of readings for a source that is faster than its sensors.
+/// Detector of a source that is faster than its sensors, for a stream of readings.
 ///
 /// ```
 /// use palpate_estimators::recording::RepeatWatch;
@@ -26,14 +26,14 @@ pub struct RepeatWatch {
 }
 
 impl RepeatWatch {
-    /// A watch over so many channels.
+    /// A watch over this number of channels.
     pub fn new(channels: usize) -> Self {
         Self { counts: RepeatCounts::new(channels), last: Vec::new(), tested: 0, is_sample_and_hold: false }
     }
 
-    /// Adds the next reading; true for one that repeats the reading before it under sample and hold, and measures nothing new.
+    /// Adds the next reading. True for a repeat of the reading before it under sample and hold, which contains no new measurement.
     ///
-    /// The source is judged by readings at rest, with `at_rest` true: a touch changes all channels together in any source.
+    /// Only readings at rest, with `at_rest` true, decide about the source: a touch changes all channels together in any source.
     pub fn add(&mut self, reading: &[f64], at_rest: bool) -> bool {
         if at_rest && !self.last.is_empty() && !self.is_sample_and_hold {
             self.counts.add(&self.last, reading);

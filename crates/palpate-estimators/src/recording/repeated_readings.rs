@@ -13,14 +13,14 @@ pub enum RepeatedReadings {
     /// Each run of them counts once where chance does not explain the repeats.
     #[default]
     Auto,
-    /// Each run of them counts once, whatever its cause.
+    /// Each run of them counts once, for any cause.
     Collapse,
     /// Each row counts.
     Keep,
 }
 
 impl RepeatedReadings {
-    /// True for the treatment that is meant where none is named.
+    /// True for the default treatment.
     pub fn is_auto(&self) -> bool {
         *self == Self::Auto
     }
@@ -40,10 +40,10 @@ pub struct Repeats {
 }
 
 impl Recording {
-    /// The same recording with its repeated readings treated, and named in the provenance.
+    /// Treats the repeated readings of the recording and reports them in the provenance.
     ///
-    /// The first row of a run stays. Under sample and hold and under [`RepeatedReadings::Collapse`] a run goes on through changes of the contact:
-    /// its later rows have a reading that is out of date.
+    /// The first row of a run is kept. Under sample and hold and under [`RepeatedReadings::Collapse`] a run continues through changes of the
+    /// contact: its later rows have an outdated reading.
     #[must_use]
     pub fn treat_repeated_readings(mut self, treatment: RepeatedReadings) -> Self {
         let of = self.rows.len();
@@ -69,7 +69,7 @@ impl Recording {
         self
     }
 
-    /// Number of the rows that repeat the one before them under sample and hold; `None` where chance explains them.
+    /// Number of rows that repeat the row before them under sample and hold; `None` where chance explains the repeats.
     pub(super) fn counted_repeats(&self) -> Option<u64> {
         let counts = self.repeat_counts();
         (counts.cause() == Some(RepeatCause::SampleAndHold)).then(|| counts.repeats())
@@ -91,7 +91,7 @@ impl Recording {
         }
         for c in 0..channels {
             let values = self.rows.iter().map(|row| row.reading[c]);
-            // Without a repeat there is nothing to explain.
+            // A channel without repeats needs no range.
             if self.rows.windows(2).any(|pair| pair[0].reading[c] == pair[1].reading[c]) {
                 counts.set_range(c, values);
             }

@@ -1,28 +1,28 @@
 //! Detection of readings that a logger repeats because it is faster than its sensors (sample and hold).
 //!
 //! A sample-and-hold logger repeats all channels together; a coarse converter repeats each channel by chance. Three tests over pairs of
-//! consecutive readings of one contact tell them apart, each with the false-alarm rate [`FALSE_ALARM`].
+//! consecutive readings of one contact distinguish the two, each with the false-alarm rate [`FALSE_ALARM`].
 //!
 //! 1. *Size of changes.* Rounded Gaussian noise that often changes by 3 resolution steps or more rarely repeats a value. A likelihood-ratio
-//!    test compares the counts of repeats, of changes below and of changes from 2.5 steps on with the best rounded Gaussian distribution.
-//! 2. *Coincidence of changes.* Of n pairs channel c changes in d_c, some channel in u. With independent channels
+//!    test compares three counts with the best rounded Gaussian distribution: repeats, changes below 2.5 steps, and changes from 2.5 steps on.
+//! 2. *Coincidence of changes.* Of n pairs, channel c changes in d_c, and at least one channel in u. With independent channels
 //!    P(U ≤ u) ≤ C(n, u) · Π_c C(u, d_c) / C(n, d_c), the union bound over the sets of u pairs. Fisher's method combines the stretches.
-//!    Repeats by chance follow from the pairs that change, as the unseen follow in capture–recapture with independent captures.
+//!    The pairs that change determine the repeats by chance, as captures determine the unseen in capture–recapture with independent captures.
 //! 3. *No change at all.* Noise of half a resolution step or more repeats a value with a probability of at most 0.52. Repeats that
-//!    never differ say that the noise is less; they add no information, whatever causes them.
+//!    never differ show that the noise is less; they add no information, for any cause.
 
 use palpate_numerics::{bisect, chi_squared_critical_value, chi_squared_survival, normal_cdf};
 
-/// Probability, by stated policy, that a recording of independent channels is taken for sample and hold.
+/// Probability, by stated policy, that a recording of independent channels is classified as sample and hold.
 pub const FALSE_ALARM: f64 = 1e-6;
 
-/// Changes of each channel whose sizes are kept.
+/// Greatest number of changes of each channel with stored sizes.
 const SIZES: usize = 256;
-/// Two values that differ by less than this share of their size differ by the rounding of their arithmetic only.
+/// Two values with a relative difference of at most this differ by the rounding of their arithmetic only.
 const ROUNDING: f64 = 1e-12;
-/// Changes from this many resolution steps on are large: between 2 and 3 steps.
+/// Changes above this number of resolution steps are large; the bound lies between 2 and 3 steps.
 const LARGE_STEPS: f64 = 2.5;
-/// Repeats by chance may make up this share of all repeats, by policy: with more the channels are coarse.
+/// Greatest share of repeats by chance among all repeats, by policy; with more the channels are coarse.
 const CHANCE_SHARE: f64 = 0.5;
 
 /// Cause of repeated readings.
@@ -34,7 +34,7 @@ pub enum RepeatCause {
     NoChange,
 }
 
-/// Counts of repeated values over pairs of consecutive readings, from which the cause of repeats follows.
+/// Counts of repeated values over pairs of consecutive readings, which determine the cause of the repeats.
 ///
 /// Pairs come in stretches: the readings of one contact, or of the untouched surface.
 ///
@@ -61,13 +61,13 @@ pub struct RepeatCounts {
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Changes {
     count: u64,
-    /// Pairs in which it stays at the end of its range, where it may be clipped.
+    /// Pairs in which the channel stays at an end of its range, where it may be clipped.
     clipped: u64,
     /// Least and greatest value, where they are known.
     range: Option<[f64; 2]>,
     /// Sizes of the first changes.
     sizes: Vec<f64>,
-    /// Smallest difference of two values that are not equal; 0 before the first.
+    /// Smallest difference of two unequal values; 0 before the first difference.
     step: f64,
 }
 
@@ -81,21 +81,21 @@ struct Stretch {
     changes: Vec<u64>,
 }
 
-/// Evidence of stretches that changes of channels coincide.
+/// Evidence from the stretches that changes of the channels coincide.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Coincidence {
-    /// Stretches in which something changes.
+    /// Number of stretches with a change.
     stretches: usize,
-    /// Sum of ln of their bounds of P(U ≤ u).
+    /// Sum over these stretches of ln of the bound of P(U ≤ u).
     ln_probability: f64,
-    /// Pairs in which nothing changes.
+    /// Pairs without a change.
     repeats: f64,
-    /// Pairs in which nothing changes by chance, estimated.
+    /// Estimated number of pairs without a change by chance.
     chance: f64,
 }
 
 impl RepeatCounts {
-    /// Counts of so many channels, without any pair.
+    /// Counts for this number of channels, without pairs.
     pub fn new(channels: usize) -> Self {
         Self {
             channels: vec![Changes::default(); channels],
@@ -139,7 +139,7 @@ impl RepeatCounts {
 
     /// Sets the range and the resolution step of a channel from all its values, before the first pair.
     ///
-    /// Repeats at the ends of the range are no evidence then: the channel may be clipped there.
+    /// Repeats at the ends of the range then do not count as evidence: the channel may be clipped there.
     pub fn set_range(&mut self, channel: usize, values: impl IntoIterator<Item = f64>) {
         let mut values: Vec<f64> = values.into_iter().collect();
         values.sort_by(f64::total_cmp);
@@ -156,7 +156,7 @@ impl RepeatCounts {
         self.pairs
     }
 
-    /// Number of pairs in which every channel repeats its value, some of them within their range.
+    /// Number of pairs in which every channel repeats its value, at least one channel within its range.
     pub fn repeats(&self) -> u64 {
         self.repeats
     }
@@ -173,7 +173,7 @@ impl RepeatCounts {
         }
         let varying = || (0..self.channels.len()).filter(|c| self.channels[*c].count > 0);
         if varying().next().is_none() {
-            // 0.52^(pairs · channels) < false-alarm rate; a channel without any other value says nothing.
+            // 0.52^(pairs · channels) < false-alarm rate; a channel with a single value gives no evidence.
             let live = self.channels.iter().filter(|changes| changes.step > 0.0).count();
             let most = noisy_repeat_probability().ln() * self.repeats as f64 * live as f64;
             return (most < FALSE_ALARM.ln()).then_some(RepeatCause::NoChange);
@@ -189,7 +189,7 @@ impl RepeatCounts {
     }
 }
 
-/// Probability that rounded Gaussian noise of half a step repeats a value, at most: differences of √2/2 steps.
+/// Greatest probability that rounded Gaussian noise of half a step repeats a value; differences have a standard deviation of √2/2 steps.
 fn noisy_repeat_probability() -> f64 {
     within_steps(0.5, std::f64::consts::FRAC_1_SQRT_2)
 }
@@ -221,14 +221,14 @@ impl Changes {
         }
     }
 
-    /// The test of the size of changes.
+    /// True where the size of the changes rejects rounded Gaussian noise (test 1).
     fn exceed_rounding(&self, repeats: u64) -> bool {
         if self.sizes.is_empty() || repeats == 0 {
             return false;
         }
         let large = self.sizes.iter().filter(|size| **size > LARGE_STEPS * self.step).count();
         let large_share = large as f64 / self.sizes.len() as f64;
-        // Fine noise: most changes are large.
+        // The test needs fine noise, with mostly large changes.
         if large_share <= 0.5 {
             return false;
         }
@@ -246,7 +246,7 @@ impl Changes {
         // Standard deviations of differences from 0.05 to 20,000 steps, 5 % apart.
         let best = (0..265).map(|i| ln_likelihood(rounded(0.05 * 1.05_f64.powi(i)))).fold(f64::MIN, f64::max);
         let ratio = 2.0 * (ln_likelihood(counts.map(|count| count / total)) - best);
-        // Chance, by the sizes of the changes alone.
+        // Repeats by chance, from the sizes of the changes alone.
         let share_of = |sd: f64| rounded(sd)[2] / (1.0 - rounded(sd)[0]);
         let sd = bisect((0.05, 2e4), 60, |sd| share_of(sd) < large_share);
         let same = rounded(sd)[0];
@@ -267,8 +267,8 @@ impl Stretch {
         (ln_choose(n, u) + channels.sum::<f64>()).min(0.0)
     }
 
-    /// Pairs without a change that independent channels make, from the pairs with one: u (1 − Z) / Z, where Z is the probability that
-    /// some channel changes and Π_c (1 − Z d_c / u) = 1 − Z; infinite where no two channels change together.
+    /// Expected pairs without a change for independent channels, from the u pairs with one: u (1 − Z) / Z. Z is the probability that some channel
+    /// changes, with Π_c (1 − Z d_c / u) = 1 − Z. Infinite where no two channels change together.
     fn chance_repeats(&self) -> f64 {
         let u = self.changed as f64;
         let shares: Vec<f64> = self.changes.iter().map(|d| *d as f64 / u).collect();
@@ -295,7 +295,7 @@ impl Coincidence {
         }
     }
 
-    /// Fisher's method over the stretches, and few repeats by chance.
+    /// True where Fisher's method over the stretches rejects independent channels, and few repeats are by chance.
     fn is_certain(&self) -> bool {
         self.stretches > 0
             && self.chance < CHANCE_SHARE * self.repeats

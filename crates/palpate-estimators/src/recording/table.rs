@@ -1,4 +1,4 @@
-//! A CSV file of which no column has a role yet.
+//! A CSV file before its columns have roles.
 
 use std::io::Read;
 
@@ -16,10 +16,10 @@ use palpate_mechanics::units::Unit;
 use std::cmp::Reverse;
 use std::ops::Range;
 
-/// The columns of a CSV file, and what is in them.
+/// The columns of a CSV file and their content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Whether the first line names the columns: it does unless every field of it is a number or a time.
+    /// Whether the first line names the columns. It does unless all its fields are numbers or times.
     pub header: Header,
     /// The columns, from left to right.
     pub columns: Vec<TableColumn>,
@@ -30,14 +30,14 @@ pub struct Table {
 /// One column of a [`Table`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableColumn {
-    /// Name in the header; its number, from 1, where there is no header.
+    /// Name in the header; the column's number, from 1, in a file without a header.
     pub heading: String,
-    /// Text of its rows.
+    /// Content of the rows.
     pub content: Content,
 }
 
 impl TableColumn {
-    /// The number of each row, where no row has anything else; `None` where a row has something else, or none has a number.
+    /// The number of each row, `None` for an empty field. The result is `None` where a row has other content, or no row has a number.
     pub fn numbers(&self) -> Option<Vec<Option<f64>>> {
         match &self.content {
             Content::Numbers(numbers) => Some(numbers.iter().copied().map(Some).collect()),
@@ -46,7 +46,7 @@ impl TableColumn {
         }
     }
 
-    /// Marks of the rows, true by 1, a yes or the like; `None` where a row has neither that nor a no, 0 or nothing.
+    /// Marks of the rows: true for 1, a yes or similar, false for 0, a no or an empty field. The result is `None` where a row has other content.
     pub fn marks(&self) -> Option<Vec<bool>> {
         let mark = |number: Option<f64>| match number {
             Some(1.0) => Some(true),
@@ -63,34 +63,34 @@ impl TableColumn {
 /// Content of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
-    /// Nothing in any row.
+    /// All rows are empty.
     Empty,
     /// A finite number in every row, as written.
     Numbers(Vec<f64>),
-    /// A finite number in some rows, and nothing in the others.
+    /// A finite number in some rows; the other rows are empty.
     Gaps {
         /// The number of each row.
         numbers: Vec<Option<f64>>,
-        /// The line of the first row without one.
+        /// The line of the first row without a number.
         line: usize,
     },
     /// A timestamp in every row.
     Times,
-    /// A yes, a no or nothing in every row, as marks of untouched rows are: whether it is a yes.
+    /// A yes, a no or an empty field in every row, as in a column that marks untouched rows; true for a yes.
     Marks(Vec<bool>),
     /// Anything else.
     Other {
-        /// Rows that have a number.
+        /// Number of rows with a number.
         numbers: usize,
         /// The line of the first field that is neither number nor timestamp, or of another kind than the first.
         line: usize,
-        /// That field.
+        /// Text of this field.
         text: String,
     },
 }
 
 impl Table {
-    /// Reads a file of any dialect; the separator and the decimal mark are those that are said, or those that the file tells.
+    /// Reads a file of any dialect. The file determines the separator and the decimal mark where the arguments are `None`.
     ///
     /// ```
     /// use palpate_estimators::recording::{Content, Table};
@@ -102,7 +102,7 @@ impl Table {
     /// ```
     ///
     /// # Errors
-    /// [`CsvError`], with line and column: a row of another length than the first line, an empty file, no rows, bytes that are no text,
+    /// [`CsvError`], with line and column: a row of another length than the first line, an empty file, no rows, bytes that are not text,
     /// separators that cannot be distinguished, a number that may have a decimal comma or thousands.
     pub fn read(
         source: &str,
@@ -159,10 +159,10 @@ impl Table {
     }
 }
 
-/// Lines that show the shape of a file, several times as many as a preamble has.
+/// Greatest number of lines that determine the shape of a file, several times the length of a preamble.
 const MOST_LINES: usize = 1000;
 
-/// Shape of a file: its separator, whether it has a header, and the line of its heading, or of its first row.
+/// Shape of a file: its separator, whether it has a header, and the line of its heading or of its first row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Shape {
     separator: Separator,
@@ -196,7 +196,7 @@ impl Shape {
             }
             [block, ..] => (block.separator, &texts.lines[block.lines.clone()]),
             [] => {
-                // No two lines are alike: the separator that cuts the first into most fields.
+                // No two lines are alike: choose the separator that cuts the first line into most fields.
                 let fields = |one: &Separator| split(first, *one).map_or(0, |fields| fields.len());
                 let separator =
                     separator.or(Separator::MARKS.into_iter().rev().max_by_key(fields)).unwrap_or_default();
@@ -211,7 +211,7 @@ impl Shape {
     }
 }
 
-/// Lines with a text that is no comment.
+/// Lines with a text that is not a comment.
 #[derive(Default)]
 struct Texts {
     lines: Vec<(usize, String)>,
@@ -237,12 +237,12 @@ struct Block {
     separator: Separator,
     lines: Range<usize>,
     fields: usize,
-    /// Fields of the last line that are no values.
+    /// Number of fields of the last line that are not values.
     words: usize,
 }
 
 impl Block {
-    /// The longest of a separator that cuts lines at all.
+    /// Longest block of a separator with more than one field a line; `None` without such a block.
     fn longest(lines: &[(usize, String)], separator: Separator) -> Option<Self> {
         let width = |(_, text): &(usize, String)| split(text, separator).map_or(0, |fields| fields.len());
         let widths: Vec<usize> = lines.iter().map(width).collect();
@@ -265,7 +265,7 @@ impl Block {
     }
 }
 
-/// The heading of a block of lines: that with most distinct words above the first row of values, the last of several.
+/// The heading of a block: the line with most distinct words above the first row of values; the last one of several such lines.
 fn heading(block: &[(usize, String)], separator: Separator) -> Option<&(usize, String)> {
     let is_row = |(_, text): &(usize, String)| lines::is_row_of_values(text, separator, 1);
     let above = block.iter().position(is_row).unwrap_or(1).max(1);
@@ -273,21 +273,21 @@ fn heading(block: &[(usize, String)], separator: Separator) -> Option<&(usize, S
     block[..above.min(block.len())].iter().max_by_key(likeness)
 }
 
-/// Whether a line names the columns: it does unless every field of it is a number or a time.
+/// Whether a line names the columns. It does unless all its fields are numbers or times.
 fn header_of(text: &str, separator: Separator) -> Header {
     if lines::is_row_of_values(text, separator, 1) { Header::Absent } else { Header::Present }
 }
 
-/// A column that is being read: by a dialect of its own, since a column without a role may be written in any way.
+/// A column during reading. It has its own dialect, because a column without a role may have any notation.
 struct Column {
     dialect: Dialect,
     clock: Clock,
     filled: usize,
     numbers: Vec<Option<f64>>,
     times: usize,
-    /// Marks of the rows; nothing from the first that is neither marked nor not.
+    /// Marks of the rows; `None` after a row that is neither marked nor unmarked.
     marks: Option<Vec<bool>>,
-    /// The line of the first row without anything.
+    /// The line of the first empty field.
     gap: Option<usize>,
     other: Option<(usize, String)>,
 }
@@ -307,7 +307,7 @@ impl Column {
         }
     }
 
-    /// Takes the next field; a doubt that would make its numbers a thousand times as large is the caller's to settle.
+    /// Adds the next field. The only error is an ambiguous number, which may be a thousand times as large; the caller must handle it.
     fn push(&mut self, line: usize, text: &str) -> Result<(), CsvProblem> {
         self.marks = self.marks.take().zip(is_mark(text)).map(|(mut marks, mark)| {
             marks.push(mark);

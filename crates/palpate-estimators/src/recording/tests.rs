@@ -17,7 +17,7 @@ fn channel(column: Column) -> ValueColumn {
     ValueColumn { column, unit: Unit::NONE }
 }
 
-/// Someone else's bench: position `X` in mm, two raw channels, force `F`.
+/// Columns of a foreign bench: position `X` in mm, two raw channels, force `F`.
 fn foreign() -> Columns {
     Columns {
         header: Header::Present,
@@ -89,14 +89,14 @@ fn rows_have_times_where_a_column_tells_them() {
     assert_eq!(times(&columns, "X;Pl;Pr;F;Zeit [ms]\n10;1;2;3;2,5\n").unwrap(), Some(vec![0.0025]));
 
     let missing = times(&foreign().time("Zeit"), "X,Pl,Pr,F\n10,1,2,3\n").unwrap_err().to_string();
-    assert_eq!(missing, "bench.csv:1: there is no column `Zeit`; there are `X`, `Pl`, `Pr`, `F`");
+    assert_eq!(missing, "bench.csv:1: no column is named `Zeit`; there are `X`, `Pl`, `Pr`, `F`");
     let headless = times(&foreign(), "10,1,2.5,3\n12,1,2,3\n").unwrap_err().to_string();
     assert!(headless.contains("`2.5`, `3`: numbers; where no line names the columns"), "{headless}");
     let other = times(&foreign().time("Zeit"), "X,Pl,Pr,F,Zeit\n10,1,2,3,14:03:25\n11,1,2,3,4\n");
     assert!(other.unwrap_err().to_string().starts_with("bench.csv:3:5: `4` is written in another way"));
 }
 
-/// Rows of a file that are untouched, and the remarks on it.
+/// For each row of a file whether it is untouched, and the remarks on the file.
 fn untouched(columns: &Columns, text: &str) -> Result<(Vec<bool>, String), String> {
     let recording = read_as(columns, text.as_bytes()).map_err(|error| error.to_string())?;
     let said = recording.provenance.dialects.iter().map(ToString::to_string).collect();
@@ -105,17 +105,17 @@ fn untouched(columns: &Columns, text: &str) -> Result<(Vec<bool>, String), Strin
 
 #[test]
 fn untouched_rows_are_marked_by_force_column_or_time_or_found() {
-    // By force 0, wherever the position is.
+    // By force 0, at any position.
     let text = "X,Pl,Pr,F\n10,1,2,3\n-5,1,2,0\n,1,2,0.0\n";
     let said = "1 row without a position, taken as untouched".to_owned();
     assert_eq!(untouched(&foreign(), text), Ok((vec![false, true, true], said)));
-    // Found, with or without a column of forces.
+    // By a missing position, with or without a column of forces.
     let said = "2 rows without a position, taken as untouched".to_owned();
     let expected = Ok((vec![true, false, true], said));
     assert_eq!(untouched(&foreign(), "X,Pl,Pr,F\n,1,2,\n10,1,2,3\n,1,2,0\n"), expected);
     let columns = Columns { force: None, ..foreign() };
     assert_eq!(untouched(&columns, "X,Pl,Pr\n,1,2\n10,1,2\n,1,2\n"), expected);
-    // By a column, whatever the load cell reads then.
+    // By a column, for any reading of the load cell.
     let marked = Columns { untouched: Some(named("leer")), ..foreign() };
     let text = "X,Pl,Pr,F,leer\n10,1,2,0.02,ja\n10,1,2,3,\n,1,2,,1\n10,1,2,3,0\n";
     assert_eq!(untouched(&marked, text), Ok((vec![true, false, true, false], String::new())));
@@ -220,11 +220,11 @@ fn what_no_rule_can_tell_is_refused_at_the_place() {
     let messages = cases.map(|(columns, text)| pointed(&read_as(&columns, text).unwrap_err()));
     insta::assert_snapshot!(messages.join("\n"));
 
-    // What the rig says lifts the doubt.
+    // A decimal mark in the rig removes the ambiguity.
     let said = with(Some(Separator::Comma), Some(Decimal::Comma));
     let rows = read_as(&said, b"X,Pl,Pr,F\n10,\"1,234\",2,3\n").unwrap().rows;
     assert_eq!(rows[0].reading, [1.234, 2.0]);
-    // In millimetres as the rig says, spelt otherwise; parentheses may hold anything, and so may a heading that is written out.
+    // In millimetres as in the rig, with another notation. Parentheses may contain any text, and so may a heading that the rig contains in full.
     assert!(read_as(&foreign(), b"X / mm,Pl (left),Pr [V],F (front)\n1,2,3,4\n").is_ok());
     let written_out = Columns { position: PositionColumns::Along(named("X [div]")), ..foreign() };
     assert!(read_as(&written_out, b"X [div],Pl,Pr,F\n1,2,3,4\n").is_ok());
@@ -257,7 +257,7 @@ fn columns_survive_json() {
     }
 }
 
-/// The message, then the line with a mark under what is meant.
+/// The message, then the line with a mark under the place of the error.
 fn pointed(error: &CsvError) -> String {
     let Some(place) = &error.place else { return error.to_string() };
     let before = place.text.get(..place.span.start).unwrap().chars().count();
@@ -431,7 +431,7 @@ proptest! {
         let mut bytes = Vec::new();
         write(&recording, *STRIP, "a\ntest", &mut bytes).unwrap();
         let columns = Columns::own(&recording.channels, &recording.kinds, *STRIP);
-        // Forces of all magnitudes are no load cell's.
+        // Forces of all magnitudes are unlike those of a load cell.
         let columns = Columns { force_zero_n: Some(0.0), ..columns };
         let columns = ["nuisance_1", "nuisance_2"][..nuisances].iter().fold(columns, |columns, name| columns.nuisance(*name, Unit::NONE));
         let schema = Schema { columns: &columns, layout: &layout, extent: *STRIP, known_force_n: None };
@@ -530,7 +530,7 @@ fn drift_alone_is_one_warning() {
                 let lines = recording.warning_lines();
                 assert_eq!(lines.len(), 1, "{course}, {bench}, {count}: {lines:#?}");
                 assert!(lines[0].contains("drift"), "{course}, {bench}, {count}: {lines:#?}");
-                // A bad row among them is still found.
+                // A bad row among them is still detected.
                 let mut bad = recording.clone();
                 bad.rows[count / 2 / 3 * 3].reading[0] += 30.0;
                 let lines = bad.warning_lines();

@@ -1,4 +1,4 @@
-//! Times of rows: numbers, or timestamps, which count from the first of them.
+//! Times of rows: numbers, or timestamps relative to the first one.
 
 use super::csv_error::CsvProblem;
 
@@ -8,13 +8,13 @@ pub(super) struct Clock {
     start: Option<Start>,
 }
 
-/// The first row's time, which says how all the others are written.
+/// Time of the first row, which determines the notation of all others.
 #[derive(Clone, Copy, Debug)]
 enum Start {
     Number,
     Timestamp {
         first: Timestamp,
-        /// That of the row above.
+        /// Timestamp of the row above.
         previous: Timestamp,
     },
 }
@@ -23,16 +23,16 @@ enum Start {
 const DAY_NS: i64 = 86_400_000_000_000;
 
 impl Clock {
-    /// The time in `text`, in seconds: a `number` as it is, a timestamp since the first.
+    /// The time in `text`, in seconds: the value of `number` for a number, the time since the first timestamp for a timestamp.
     ///
     /// # Errors
-    /// A text that is neither, or not what the first row has; a time of day that goes back over midnight.
+    /// A text that is neither number nor timestamp; a time in another notation than that of the first row; a time of day that passes midnight.
     pub fn read(
         &mut self,
         text: &str,
         number: impl FnOnce() -> Result<f64, CsvProblem>,
     ) -> Result<f64, CsvProblem> {
-        // Whatever has a colon is no number.
+        // A text with a colon is not a number.
         if !text.contains(':') {
             let value = number().map_err(|problem| match problem {
                 CsvProblem::NotANumber { text } => CsvProblem::NotATime { text },
@@ -60,13 +60,13 @@ impl Clock {
     }
 }
 
-/// An instant, as far as a text tells it.
+/// An instant, as far as its text determines it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Timestamp {
     kind: Kind,
-    /// Days since the first of March of the year 0; 0 of a time of day.
+    /// Days since the first of March of the year 0; 0 for a time of day.
     day: i64,
-    /// Nanoseconds since midnight, less the offset from UTC.
+    /// Nanoseconds since midnight, minus the offset from UTC.
     ns: i64,
 }
 
@@ -82,7 +82,7 @@ impl Timestamp {
     /// `14:03:25,120`, `2026-04-03T14:03:25.12+02:00`, `2026-04-03 14:03`, or `03.04.2026 14:03:25,120`; `None` for anything else.
     ///
     /// # Errors
-    /// A date with slashes, of which nobody can say what is the month.
+    /// A date with slashes, in which day and month cannot be distinguished.
     fn parse(text: &str) -> Result<Option<Self>, CsvProblem> {
         let (date, time) = match text.find(['T', ' ', ',']).filter(|at| !text[..*at].contains(':')) {
             Some(at) => (&text[..at], text[at + 1..].trim_start()),
@@ -112,12 +112,12 @@ impl Timestamp {
 
     fn seconds_since(self, first: Self) -> f64 {
         let ns = i128::from(self.day - first.day) * i128::from(DAY_NS) + i128::from(self.ns - first.ns);
-        // A division rounds once: 0.1 s is the number that 0.1 is.
+        // A single division rounds once, so that 0.1 s becomes exactly the number 0.1.
         ns as f64 / 1e9
     }
 }
 
-/// The number that consists of so many digits.
+/// The number in a text of `count` digits; `None` for any other text.
 fn digits(text: &str, count: std::ops::RangeInclusive<usize>) -> Option<i64> {
     let all = count.contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit());
     if all { text.parse().ok() } else { None }
@@ -144,13 +144,13 @@ fn day(date: &str) -> Option<i64> {
     if !(1..=last).contains(&day) {
         return None;
     }
-    // Years begin in March, so that the leap day is the last one; the months' lengths then repeat every five: 31 30 31 30 31.
+    // Years begin in March, so that the leap day is their last day. The lengths of the months then repeat every five months: 31 30 31 30 31.
     let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     let before_year = 365 * year + year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400);
     Some(before_year + (153 * month + 2) / 5 + day - 1)
 }
 
-/// Nanoseconds from midnight to `14:03`, `14:03:25` or `14:03:25,120`; digits beyond the ninth decimal are below what a clock tells.
+/// Nanoseconds from midnight to `14:03`, `14:03:25` or `14:03:25,120`. Digits beyond the ninth decimal are below the resolution of a clock.
 fn time_ns(time: &str) -> Option<i64> {
     let (whole, fraction) = match time.find(['.', ',']) {
         Some(at) => (&time[..at], Some(&time[at + 1..])),
@@ -159,7 +159,7 @@ fn time_ns(time: &str) -> Option<i64> {
     let mut parts = whole.split(':');
     let (hour, minute) = (digits(parts.next()?, 1..=2)?, digits(parts.next()?, 2..=2)?);
     let second = parts.next();
-    // A fraction of a minute is nobody's notation; the 60th second is a leap second.
+    // A fraction of a minute is not a usual notation. Second 60 is a leap second.
     let second = match second {
         Some(second) => digits(second, 2..=2)?,
         None if fraction.is_none() => 0,
@@ -179,7 +179,7 @@ fn time_ns(time: &str) -> Option<i64> {
     Some(((hour * 60 + minute) * 60 + second) * 1_000_000_000 + fraction_ns)
 }
 
-/// Nanoseconds that a clock is ahead of UTC: `Z`, `+02:00`, `+0200`, `-05`.
+/// Offset of a clock from UTC in nanoseconds, positive ahead of UTC: `Z`, `+02:00`, `+0200`, `-05`.
 fn offset_ns(offset: &str) -> Option<i64> {
     if offset == "Z" {
         return Some(0);

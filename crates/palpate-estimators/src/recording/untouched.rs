@@ -1,22 +1,22 @@
-//! Rows that are untouched, as a file or its rig marks them.
+//! Marks of untouched rows in a file or its rig.
 
 use palpate_mechanics::units::{Dimension, Quantity};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// Times from one to another, either of which may be left out, in seconds.
+/// Span of time in seconds; either end may be absent.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeSpan {
-    /// The first of them; `None` from the beginning on.
+    /// First time of the span; `None` for a span from the beginning.
     pub from_s: Option<f64>,
-    /// The last of them; `None` to the end.
+    /// Last time of the span; `None` for a span to the end.
     pub to_s: Option<f64>,
 }
 
 impl TimeSpan {
-    /// Whether a time is within it.
+    /// True for a time within the span, ends included.
     pub fn contains(&self, time_s: f64) -> bool {
         self.from_s.is_none_or(|from_s| from_s <= time_s) && self.to_s.is_none_or(|to_s| time_s <= to_s)
     }
@@ -29,7 +29,7 @@ impl fmt::Display for TimeSpan {
     }
 }
 
-/// A span of time that is not written as one.
+/// A text that is not a span of time.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{text}` is not a span of time{}; write it as in \"0 s..10 s\", \"95 s..\" or \"..2 min\"",
@@ -38,7 +38,7 @@ impl fmt::Display for TimeSpan {
 pub struct TimeSpanError {
     /// The text.
     pub text: String,
-    /// Fault of one of its ends; empty where the whole is wrong.
+    /// Reason for the error; empty for a text without `..`.
     pub because: String,
 }
 
@@ -65,7 +65,7 @@ impl FromStr for TimeSpan {
     }
 }
 
-/// Whether a field of the column that marks untouched rows marks one; `None` where it says neither yes nor no.
+/// True for a yes and false for a no or an empty field in the column that marks untouched rows; `None` for any other text.
 pub(super) fn is_mark(text: &str) -> Option<bool> {
     const YES: [&str; 7] = ["1", "true", "yes", "y", "x", "ja", "wahr"];
     const NO: [&str; 6] = ["", "0", "false", "no", "nein", "falsch"];

@@ -44,21 +44,22 @@ pub enum Warning {
         /// Rows of the recording.
         of: usize,
     },
-    /// Rows lie further from the median of their repeats than 8 standard deviations of a repeat and than 1 % of the
-    /// channel's span, after a slow drift is taken off.
+    /// Rows lie more than 8 standard deviations of a repeat, and more than 1 % of the channel's span, from the median of their repeats after
+    /// subtraction of a slow drift.
     ///
-    /// Repeats are rows with the same position and force. The standard deviation is 1.4826/√2 times the median magnitude of
-    /// the difference between one repeat and the next, equal ones aside, so that a few bad rows do not hide themselves. The drift is a polyline through
-    /// the medians of up to 20 blocks of 5 rows or more, fitted in turns with the medians of the repeats. Where the drift has a warning of its own, the
-    /// blocks have 5 rows, contacts and untouched rows may have a polyline each, and a row may be off by the change between the knots beside it.
+    /// Repeats are rows with the same position and force. The standard deviation is 1.4826/√2 times the median magnitude of the difference between
+    /// successive repeats, without equal ones. A few bad rows therefore do not mask themselves. The drift is a polyline through the medians of up
+    /// to 20 blocks of 5 rows or more. The fit alternates between the drift and the medians of the repeats. Where the drift has a warning of its
+    /// own, the blocks have 5 rows, and contacts and untouched rows may have a polyline each. A row may then deviate further by the change between
+    /// the knots beside it.
     RepeatsDisagree {
         /// The channel's name.
         channel: String,
-        /// Number of rows that lie that far out.
+        /// Number of rows beyond this limit.
         rows: usize,
-        /// Rows that have repeats.
+        /// Number of rows that have repeats.
         of: usize,
-        /// The row that lies furthest out, counted from 1 below the header.
+        /// The row furthest from the median of its repeats, counted from 1 below the header.
         worst_row: usize,
         /// Distance from the median of its repeats, without the drift.
         deviation: Quantity,
@@ -67,19 +68,19 @@ pub enum Warning {
     },
     /// The later of two repeats is mostly on the same side of the earlier one.
     ///
-    /// The sign test of Cox and Stuart (1955), pooled over the positions: each repeat of the first half is paired with one of
-    /// the second half; D is the number of pairs that rise less those that fall. It is a drift when |D| is at least half of
-    /// the pairs and at least 4·√pairs. Repeats that follow one another at once do not show a slow drift.
+    /// The test is the sign test of Cox and Stuart (1955), pooled over the positions. Each repeat of the first half is paired with one of the
+    /// second half; D is the number of rising pairs minus the number of falling pairs. A drift is reported where |D| is at least half of the pairs
+    /// and at least 4·√pairs. Repeats in immediate succession do not show a slow drift.
     Drift {
         /// The channel's name.
         channel: String,
-        /// Rows in which it shows.
+        /// Rows in which the drift shows.
         rows: DriftRows,
         /// Median change from the earlier to the later repeat.
         change: Quantity,
         /// Pairs that changed in that direction.
         agreeing: usize,
-        /// All the pairs.
+        /// Number of all pairs.
         pairs: usize,
     },
     /// No force is positive, although the rows have forces.
@@ -89,9 +90,9 @@ pub enum Warning {
     },
     /// Some forces are negative and others positive.
     NegativeForces {
-        /// Rows of a negative force.
+        /// Number of rows with a negative force.
         rows: usize,
-        /// Rows in which something touches.
+        /// Number of rows with a contact.
         of: usize,
         /// The least force, in newtons.
         least_n: f64,
@@ -105,20 +106,21 @@ pub enum DriftRows {
     Contacts,
     /// Untouched rows.
     Untouched,
-    /// Both together, neither alone.
+    /// Both together, where neither shows the drift alone.
     All,
 }
 
-/// Channels that a warning names, at most; it counts the others.
+/// Greatest number of channels that a warning names; the others are counted.
 const NAMED_CHANNELS: usize = 4;
 const SATURATED_SHARE: f64 = 0.1;
 const SATURATED_POSITIONS: usize = 3;
 const FAR_OUT_DEVIATIONS: f64 = 8.0;
 const FAR_OUT_SPAN: f64 = 0.01;
-/// Blocks of rows whose medians tell the course of a drift, at most, and rows in each, at least.
+/// Greatest number of blocks of rows with medians that determine a drift, and least number of rows in each block.
 const MOST_BLOCKS: usize = 20;
 const LEAST_BLOCK: usize = 5;
-/// Turns of fitting the drift and the medians of the repeats; a linear drift over repeats in random order has settled to 1 % in 10.
+/// Iterations of the alternating fit of the drift and the medians of the repeats. With 10 iterations, a linear drift over repeats in random order
+/// settles to 1 %.
 const DRIFT_TURNS: usize = 10;
 const DRIFT_SHARE: f64 = 0.5;
 const DRIFT_DEVIATIONS: f64 = 4.0;
@@ -165,7 +167,7 @@ impl Recording {
         left_out.into_iter().chain(slow).collect()
     }
 
-    /// The warning of forces of which some or all have the wrong sign.
+    /// The warning of forces if some or all of them have the wrong sign.
     fn force_warning(&self) -> Option<Warning> {
         let forces_n: Option<Vec<f64>> = self.rows.iter().map(|row| row.force_n).collect();
         let forces_n = forces_n.filter(|forces_n| !forces_n.is_empty())?;
@@ -202,7 +204,7 @@ struct Channel<'a> {
 }
 
 impl<'a> Channel<'a> {
-    /// `None` where some row has no value for it, or there are no rows.
+    /// `None` if a row lacks a value of the channel, or without rows.
     fn new(recording: &'a Recording, index: usize) -> Option<Self> {
         let values: Option<Vec<f64>> =
             recording.rows.iter().map(|row| row.reading.get(index).copied()).collect();
@@ -230,9 +232,10 @@ impl<'a> Channel<'a> {
         much.then(|| Warning::Saturated { channel: self.name(), at: self.quantity(extreme), rows, of })
     }
 
-    /// Rows far off their repeats, beside a drift that has a warning of its own.
+    /// Warning of rows far from their repeats; `drift` is the channel's warning of a drift, if there is one.
     ///
-    /// That drift need not be slow: its blocks have few rows. Contacts drift with the untouched rows or by themselves, whichever explains more rows.
+    /// A drift with a warning need not be slow: its blocks have few rows. Contacts and untouched rows share one drift or have one each, whichever
+    /// explains more rows.
     fn repeats_disagree(&self, repeats: &[Vec<usize>], drift: Option<&Warning>) -> Option<Warning> {
         if drift.is_none() {
             let driftless = self.without_drift(repeats, MOST_BLOCKS);
@@ -250,10 +253,10 @@ impl<'a> Channel<'a> {
         far_off.into_iter().min_by_key(|warning| warning.as_ref().map_or(0, Warning::extent)).flatten()
     }
 
-    /// Rows whose values are far off the median of their repeats.
+    /// Warning of rows with values far from the median of their repeats.
     fn far_off(&self, driftless: &Driftless, repeats: &[Vec<usize>]) -> Option<Warning> {
         let Driftless { values, steps: drift_steps } = driftless;
-        // Equal repeats of a slow or coarse channel do not tell the scatter.
+        // Equal repeats of a slow or coarse channel do not show the scatter.
         let pairs = repeats.iter().flat_map(|rows| rows.windows(2));
         let pairs = pairs.filter(|pair| self.values[pair[1]] != self.values[pair[0]]);
         let steps = pairs.map(|pair| (values[pair[1]] - values[pair[0]]).abs()).collect();
@@ -282,7 +285,7 @@ impl<'a> Channel<'a> {
         })
     }
 
-    /// The values less the course of a drift over as many blocks of rows at most, which is fitted in turns with the medians of the repeats.
+    /// The values minus a drift over at most `most_blocks` blocks of rows. The fit alternates between the drift and the medians of the repeats.
     fn without_drift(&self, repeats: &[Vec<usize>], most_blocks: usize) -> Driftless {
         let mut rows: Vec<usize> = repeats.iter().flatten().copied().collect();
         rows.sort_unstable();
@@ -311,7 +314,7 @@ impl<'a> Channel<'a> {
         driftless
     }
 
-    /// The drift of contacts, else of untouched rows, else of both together.
+    /// Warning of a drift of contacts, else of untouched rows, else of both together.
     fn drift(&self, repeats: &[Vec<usize>]) -> Option<Warning> {
         let rows = &self.recording.rows;
         let is_of = |group: &Vec<usize>, kind: DriftRows| match kind {
@@ -361,10 +364,10 @@ impl<'a> Channel<'a> {
     }
 }
 
-/// Values of a channel less the course of a drift.
+/// Values of a channel minus a drift.
 struct Driftless {
     values: Vec<f64>,
-    /// Change of the course between the knots beside each row: a curved drift is off the polyline by less.
+    /// Change of the drift between the knots beside each row; a curved drift deviates from the polyline by less.
     steps: Vec<f64>,
 }
 
@@ -373,7 +376,7 @@ fn median_of(values: &[f64], rows: &[usize]) -> Option<f64> {
     median(rows.iter().map(|i| values[*i]).collect())
 }
 
-/// Height at `at` of the polyline through two or more knots, whose outer pieces go on beyond its ends, and height of the step between the knots beside it.
+/// Height at `at` of the polyline through two or more knots, extrapolated beyond its ends, and height of the step between the knots beside `at`.
 fn on_polyline(knots: &[(f64, f64)], at: f64) -> (f64, f64) {
     let piece = knots.partition_point(|(x, _)| *x < at).clamp(1, knots.len() - 1);
     let ((x0, y0), (x1, y1)) = (knots[piece - 1], knots[piece]);
@@ -406,9 +409,9 @@ impl Warning {
     }
 }
 
-/// One line for warnings of one kind: that of the most rows, and the other channels by name.
+/// One line for warnings of one kind: the warning with the most rows, then the names of the other channels.
 fn group_line(group: &[&Warning]) -> String {
-    // Of several alike the first.
+    // The first of several with the same extent.
     let Some(worst) = group.iter().rev().max_by_key(|warning| warning.extent()) else { return String::new() };
     let others = group.iter().filter_map(|warning| warning.channel());
     let others: Vec<&str> = others.filter(|channel| Some(*channel) != worst.channel()).collect();
@@ -489,7 +492,7 @@ impl fmt::Display for Warning {
                 )
             }
             Self::NoPositiveForce { least_n: 0.0 } => f.write_str(
-                "the force is 0 in every row, so nothing touches: name another column as `force`, or none where no force was measured",
+                "the force is 0 in every row, so every row is untouched: name another column as `force`, or none where no force was measured",
             ),
             Self::NoPositiveForce { least_n } => write!(
                 f,

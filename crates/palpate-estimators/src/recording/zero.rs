@@ -1,4 +1,4 @@
-//! Readings less the untouched reading before them.
+//! Readings minus the preceding untouched reading.
 
 use super::Recording;
 use serde::{Deserialize, Serialize};
@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Zero {
-    /// Readings stay as recorded, and calibration finds one offset a channel.
+    /// Readings stay as recorded, and calibration estimates one offset per channel.
     #[default]
     None,
-    /// The latest untouched reading before each row is the zero: for soft surfaces, which do not come back to one offset.
+    /// The latest untouched reading before each row is the zero: for soft surfaces, which do not return to one offset.
     Last,
 }
 
@@ -27,10 +27,11 @@ impl Zero {
 pub struct NoUntouchedRow;
 
 impl Recording {
-    /// The recording with each reading less the latest untouched reading before it. Rows before the first untouched row are less that one. Rows follow
-    /// each other by their times, or in their order where some have none.
+    /// The recording with each reading minus the latest untouched reading before it. From rows before the first untouched row, that row is
+    /// subtracted. Rows are ordered by time, or as recorded if some row has no time.
     ///
-    /// An untouched row is less the untouched row before it, so that untouched rows scatter as those of a tare by the latest reading do.
+    /// From an untouched row, the preceding untouched row is subtracted. Untouched rows then scatter like those after a tare with the latest
+    /// reading.
     ///
     /// # Errors
     /// [`NoUntouchedRow`] where no row is untouched.

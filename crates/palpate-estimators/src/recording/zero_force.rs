@@ -1,8 +1,8 @@
-//! Forces that are 0 but for the noise of the load cell.
+//! Recognition of forces that are 0 except for the noise of the load cell.
 //!
-//! A load cell never reads exactly 0. Rows in which nothing touches then have small forces of either sign, and their readings are those of
-//! no contact. Both are needed to take such rows as untouched: a gap between small and large forces, and readings that the small
-//! forces do not explain.
+//! A load cell never reads exactly 0. Rows without contact then have small forces of either sign, and their readings are those of the untouched
+//! surface. Such rows count as untouched under two conditions: a gap separates small from large forces, and the small forces do not explain the
+//! readings.
 
 use super::Row;
 use palpate_mechanics::contact::Position;
@@ -11,25 +11,25 @@ use palpate_numerics::{chi_squared_critical_value, mean, normal_quantile};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Greatest probability that noise reaches over the gap, and that its standard deviation is underestimated.
+/// Greatest probability that noise exceeds the gap, and greatest probability that its standard deviation is underestimated.
 const LEVEL: f64 = 0.01;
-/// Greatest standard error at which the share of the small forces that the channels confirm is known well enough to tell 0 from 1.
+/// Greatest standard error at which the confirmed share of the small forces distinguishes 0 from 1.
 const MOST_UNSURE: f64 = 0.25;
 
-/// Rows whose force is 0 but for noise.
+/// Rows with a force that is 0 except for noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ZeroForce {
-    /// Greatest force, either way, that is taken as 0, in newtons.
+    /// Greatest magnitude of a force that counts as 0, in newtons.
     pub zero_n: f64,
     /// Number of rows.
     pub rows: usize,
-    /// Least of their forces, in newtons.
+    /// Least force of these rows, in newtons.
     pub low_n: f64,
-    /// Greatest of their forces, in newtons.
+    /// Greatest force of these rows, in newtons.
     pub high_n: f64,
 }
 
-// No force is NaN: fields that are no finite number are refused.
+// No force is NaN: a field that is not a finite number is refused.
 impl Eq for ZeroForce {}
 
 impl fmt::Display for ZeroForce {
@@ -46,15 +46,15 @@ impl fmt::Display for ZeroForce {
     }
 }
 
-/// A row whose force may be 0 but for noise.
+/// A row with a force that may be 0 except for noise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample<'a> {
     pub row: &'a Row,
-    /// Whether the row has a position; without one it is no press.
+    /// Whether the row has a position; a row without one is not a press.
     pub has_position: bool,
 }
 
-/// The rows that are untouched but for the noise of their forces, if there are any.
+/// The rows that are untouched except for the noise of their forces, if there are any.
 pub(super) fn recognise(samples: &[Sample]) -> Option<ZeroForce> {
     let force = |sample: &Sample| sample.row.force_n.filter(|force_n| *force_n != 0.0);
     let mut forces_n: Vec<f64> = samples.iter().filter_map(force).map(f64::abs).collect();
@@ -71,16 +71,16 @@ pub(super) fn recognise(samples: &[Sample]) -> Option<ZeroForce> {
     Some(ZeroForce { zero_n, rows: small.len(), low_n, high_n })
 }
 
-/// A force within the widest gap of sorted magnitudes, of which those below are the noise of 0 and those above are not.
+/// A force within the widest gap of sorted magnitudes. Forces below the gap are the noise of 0; forces above it are not.
 ///
 /// Noise of k values with root mean square s reaches z·s·√(k/χ²), with z the normal quantile for all values at once and χ² the
-/// lower quantile for k degrees of freedom. The gap must lie beyond.
+/// lower quantile for k degrees of freedom. The upper end of the gap must lie beyond this value.
 fn gap(forces_n: &[f64]) -> Option<f64> {
     let quantile = normal_quantile(1.0 - LEVEL / (2.0 * forces_n.len() as f64));
     let mut squares = 0.0;
     let gaps = forces_n.windows(2).enumerate().filter_map(|(i, pair)| {
         squares += pair[0] * pair[0];
-        // A gap is at least as wide as what is below it.
+        // A gap is at least as wide as the magnitudes below it.
         if pair[1] < 2.0 * pair[0] {
             return None;
         }
@@ -99,11 +99,11 @@ fn round_within(low: f64, high: f64) -> f64 {
     steps.into_iter().find(|step| (middle..high).contains(step)).unwrap_or(middle)
 }
 
-/// Whether nothing touches in the rows of small forces.
+/// True where the rows of small forces are untouched.
 ///
-/// Were the forces those of presses, each reading would lie off the mean reading of these rows by force times influence, which the
-/// presses nearest to its place show. The least-squares share of that in the readings is 1 for presses and 0 for noise. Where the channels
-/// are too insensitive to tell, some force must have the sign that no press has.
+/// If the forces were those of presses, each reading would differ from the mean reading of these rows by force times influence. The presses
+/// nearest to its place give the influence. The least-squares share of this product in the readings is 1 for presses and 0 for noise. Where the
+/// channels are too insensitive to decide, at least one force must have the sign that no press has.
 fn are_untouched(small: &[Sample], samples: &[Sample], zero_n: f64) -> bool {
     let placed: Vec<Sample> = small.iter().filter(|sample| sample.has_position).copied().collect();
     if placed.is_empty() {
@@ -115,7 +115,7 @@ fn are_untouched(small: &[Sample], samples: &[Sample], zero_n: f64) -> bool {
     }
 }
 
-/// Whether some small force has the sign that no press has.
+/// True where a small force has the sign that no press has.
 fn signs_are_mixed(placed: &[Sample], samples: &[Sample], zero_n: f64) -> bool {
     let presses_n =
         || samples.iter().filter_map(|sample| sample.row.force_n).filter(|force_n| force_n.abs() > zero_n);
@@ -124,7 +124,7 @@ fn signs_are_mixed(placed: &[Sample], samples: &[Sample], zero_n: f64) -> bool {
         || (presses_n().all(|force_n| force_n < 0.0) && small_n().any(|force_n| force_n > 0.0))
 }
 
-/// Share of the rows' forces that their readings confirm, with its standard error; `None` where no channel or press tells.
+/// Share of the rows' forces that their readings confirm, with its standard error; `None` where no channel or press determines it.
 fn confirmed_share(placed: &[Sample], samples: &[Sample], zero_n: f64) -> Option<(f64, f64)> {
     let channels = placed.first()?.row.reading.len();
     let baseline: Vec<f64> =
@@ -140,7 +140,7 @@ fn confirmed_share(placed: &[Sample], samples: &[Sample], zero_n: f64) -> Option
             .collect();
         let pressed = pressed?;
         let middle = mean(pressed.iter().copied());
-        // A channel without noise shows that nothing changes.
+        // A channel without noise is constant and has no weight.
         if variance > 0.0 {
             explained += off
                 .iter()
@@ -153,7 +153,7 @@ fn confirmed_share(placed: &[Sample], samples: &[Sample], zero_n: f64) -> Option
     (squares > 0.0).then(|| (explained / squares, squares.sqrt().recip()))
 }
 
-/// Change of the readings per newton, by the positions of presses in the order of x.
+/// Change of the readings per newton at the positions of the presses, sorted by x.
 struct Influences(Vec<(Position, Vec<f64>)>);
 
 impl Influences {
@@ -174,7 +174,7 @@ impl Influences {
         Self(presses.chunk_by(same).map(influence).collect())
     }
 
-    /// Those of the press nearest to a position.
+    /// Change per newton at the press nearest to a position; `None` without presses.
     fn nearest(&self, position: Position) -> Option<&[f64]> {
         let after = self.0.partition_point(|(at, _)| at.x_m < position.x_m);
         let mut best: Option<(f64, &[f64])> = None;

@@ -1,7 +1,7 @@
 //! Comparison of a recording with its setup: units, orientation, order of the channels, noise.
 //!
-//! A wrong unit or a mirrored surface leaves a recording that every estimator can be fitted to. The checks here compare what the recording and
-//! the rig both say. Each mismatch is one line with the key of the rig that mends it.
+//! Every estimator can be fitted to a recording with a wrong unit or of a mirrored surface. The checks here compare the information that both
+//! recording and rig contain. Each mismatch is one line with the key of the rig that corrects it.
 
 mod model;
 mod noise;
@@ -15,11 +15,11 @@ use palpate_numerics::median;
 
 /// Probability, by stated policy, that a check of a recording that fits its setup warns.
 const FALSE_ALARM: f64 = 1e-3;
-/// Positions that cover less than this share of the surface, by policy, in a unit by which they cover half of it or more.
+/// Positions that cover less than this share of the surface are reported, by policy, if they cover half of it or more in another unit.
 const LITTLE_COVERED: f64 = 1.0 / 8.0;
-/// Positions that cover less than this share of the surface are named whatever their unit, by policy.
+/// Positions that cover less than this share of the surface are reported for any unit, by policy.
 const HARDLY_COVERED: f64 = 1.0 / 50.0;
-/// Forces and gains that differ by less than this factor are no other unit, by policy: rigs name stiffness and forces as roughly.
+/// Forces and gains that differ by less than this factor do not indicate another unit, by policy. Stiffness and forces in rigs are as inaccurate.
 const ROUGHLY: f64 = 3.0;
 /// A unit explains a factor up to this remainder, by policy.
 const UNIT_REMAINDER: f64 = 1.5;
@@ -35,12 +35,12 @@ pub enum Mismatch {
         covered_m: f64,
         /// Length of the surface along the axis.
         of_m: f64,
-        /// Unit by which they cover half of it or more.
+        /// Unit in which they cover half of it or more.
         unit: Option<Unit>,
     },
     /// The forces are not those of the setup.
     Forces {
-        /// Median of the recorded forces, or the greatest, as `setup` says.
+        /// Median of the recorded forces for [`ForceKey::Known`], the greatest one for [`ForceKey::Greatest`].
         recorded_n: f64,
         /// Force of the setup.
         setup_n: f64,
@@ -53,7 +53,7 @@ pub enum Mismatch {
     Coordinates(Coordinates),
     /// The readings fit the model better with another order of the channels.
     ChannelOrder {
-        /// Each channel with the one whose place in the rig it fits.
+        /// Each channel with the channel of the rig that its readings fit.
         pairs: Vec<(String, String)>,
     },
     /// Channels are opposite in sign to the model.
@@ -78,9 +78,9 @@ pub enum Mismatch {
     Noise {
         /// Names of the channels.
         channels: Vec<String>,
-        /// Of all channels.
+        /// Number of channels in the comparison.
         of: usize,
-        /// Standard deviation of the repeats of the channel that is furthest off.
+        /// Standard deviation of the repeats of the channel with the greatest deviation.
         measured: Quantity,
         /// Standard deviation of a reading of this channel in the setup.
         setup: Quantity,
@@ -105,7 +105,7 @@ pub enum ForceKey {
     Greatest,
 }
 
-/// Coordinates of contacts other than those recorded, of which the readings are.
+/// Coordinates of contacts that fit the readings better than the recorded coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinates {
     /// x → length − x.
@@ -120,14 +120,14 @@ pub enum Coordinates {
     Unit(Unit),
 }
 
-/// Unit of force of load cells and scales, also of those that weigh.
+/// Unit of force of load cells and scales, including units of weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceUnit {
     /// Name.
     pub name: &'static str,
-    /// Newtons of one of it.
+    /// The unit in newtons.
     pub newtons: f64,
-    /// True where `force_unit` reads it.
+    /// True for a unit that `force_unit` accepts.
     pub is_read: bool,
 }
 
@@ -144,7 +144,7 @@ const FORCE_UNITS: [ForceUnit; 6] = [
 
 /// Contradictions between a recording and its setup, each once; empty where they fit.
 ///
-/// The model of the surface is compared where solving it takes a second at most by its estimate.
+/// The model of the surface is compared only if the estimated time of its solution is at most a second.
 ///
 /// ```
 /// use palpate_estimators::recording_check::{Coordinates, Mismatch, check_recording};
@@ -188,7 +188,7 @@ fn coverage(setup: &Setup, recording: &Recording) -> Vec<Mismatch> {
             let (least_m, most_m) =
                 values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), m| (low.min(m), high.max(m)));
             let covered_m = most_m - least_m;
-            // One place tells no unit.
+            // A single place does not determine a unit.
             if covered_m.is_nan() || covered_m <= 0.0 || covered_m >= LITTLE_COVERED * of_m {
                 return None;
             }
@@ -211,7 +211,7 @@ fn forces(setup: &Setup, recording: &Recording) -> Option<Mismatch> {
         let recorded_n = median(forces_n)?;
         let factor = recorded_n / setup_n;
         let unit = ForceUnit::explaining(factor, file_unit_n);
-        // A factor of 2 is another force.
+        // A factor of 2 indicates another force.
         let is_other = factor.ln().abs() >= 2f64.ln();
         return is_other.then_some(Mismatch::Forces { recorded_n, setup_n, key: ForceKey::Known, unit });
     }
@@ -228,15 +228,15 @@ fn force_unit_n(setup: &Setup) -> f64 {
 }
 
 impl ForceUnit {
-    /// The unit whose numbers, read in a unit of `read_n` newtons, make forces this factor too great; `None` for factors
-    /// near 1, and for those that no unit makes.
+    /// The unit that explains forces this factor too great: numbers in the unit, read in a unit of `read_n` newtons. `None` for factors near 1,
+    /// and for factors that no unit explains.
     fn explaining(factor: f64, read_n: f64) -> Option<Self> {
         let remainder = |unit: &Self| (factor * unit.newtons / read_n).ln().abs();
         let best = FORCE_UNITS.into_iter().min_by(|a, b| remainder(a).total_cmp(&remainder(b)))?;
         (factor.ln().abs() >= ROUGHLY.ln() && remainder(&best) <= UNIT_REMAINDER.ln()).then_some(best)
     }
 
-    /// The largest unit by which forces that exceed a bound this many times lie between a tenth of it and all of it.
+    /// The largest unit in which forces that exceed a bound by this factor lie between a tenth of the bound and the bound.
     fn below(factor: f64, read_n: f64) -> Option<Self> {
         let share = |unit: &Self| factor * unit.newtons / read_n;
         let is_off = factor >= ROUGHLY;

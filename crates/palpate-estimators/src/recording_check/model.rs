@@ -1,8 +1,8 @@
 //! Readings against the model of the surface: coordinates, order, sign and gain of the channels.
 //!
-//! Each channel is regressed on its modelled reading, with an offset and a gain of its own, so that the comparison needs no unit. The share of
-//! variance u that stays unexplained compares two explanations by the likelihood ratio (u₀/u₁)^(n/2), averaged over the channels
-//! in the logarithm as errors of the model are common to them.
+//! Each channel is regressed on its modelled reading, with an offset and a gain of its own, so that the comparison needs no unit. The unexplained
+//! share of variance u compares two explanations by the likelihood ratio (u₀/u₁)^(n/2). The logarithm of this ratio is averaged over the channels,
+//! because errors of the model are common to them.
 
 use super::{Coordinates, Mismatch, ROUGHLY, UNIT_REMAINDER, force_unit_n};
 use crate::recording::Recording;
@@ -15,13 +15,13 @@ use palpate_mechanics::surface::{Extent, Solving};
 use palpate_mechanics::units::{Dimension, Unit};
 use palpate_numerics::{mean, median};
 
-/// Likelihood ratio from which on another explanation is named, by policy.
+/// Likelihood ratio from which on another explanation is reported, by policy.
 const DECISIVE: f64 = 1e6;
 /// An explanation leaves at most this share of the variance unexplained.
 const UNEXPLAINED: f64 = 0.1;
 /// Shares below this are the rounding of the arithmetic.
 const LEAST_UNEXPLAINED: f64 = 1e-12;
-/// Seconds of solving the surface up to which the model is compared.
+/// Greatest time to solve the surface, in seconds, for a comparison with the model.
 const SECONDS: f64 = 1.0;
 
 /// Mismatches of a recording and the model; empty for a surface without a model, and for one that takes long to solve.
@@ -68,7 +68,7 @@ struct ChannelFit {
 }
 
 impl MeanReadings {
-    /// `None` for fewer contacts than decide anything: an offset and a gain are estimated of each channel.
+    /// `None` for too few contacts: an offset and a gain are estimated for each channel.
     fn new(setup: &Setup, recording: &Recording) -> Option<Self> {
         let force_n = |i: usize| recording.rows[i].force_n.or(setup.force_n());
         let touched: Vec<usize> =
@@ -245,7 +245,7 @@ fn gains(setup: &Setup, fits: &[ChannelFit]) -> Vec<Mismatch> {
     found
 }
 
-/// The unit whose numbers, read in the channel's, make readings this factor too great.
+/// The unit that explains readings this factor too great: numbers in the unit, read in the channel's unit.
 fn reading_unit(setup: &Setup, channel: usize, kind: SensorKind, factor: f64) -> Option<Unit> {
     let read = setup.recording_columns().channels.get(channel)?.unit;
     let remainder = |unit: &Unit| (factor * unit.factor() / read.factor()).ln().abs();

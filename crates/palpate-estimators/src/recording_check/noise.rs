@@ -6,10 +6,10 @@ use crate::setup::Setup;
 use palpate_mechanics::units::Quantity;
 use palpate_numerics::{chi_squared_survival, mean_and_variance};
 
-/// Ratio of standard deviations from which on a difference is named.
+/// Ratio of standard deviations from which on a difference is reported.
 const DIFFERENCE: f64 = 2.0;
 
-/// Channels whose repeats scatter at least twice or at most half as much as their noise, beyond chance by a χ² test.
+/// Channels with repeats that scatter at least twice or at most half as much as their noise, beyond chance by a χ² test.
 pub fn compare(setup: &Setup, recording: &Recording) -> Vec<Mismatch> {
     let sensors = setup.layout().sensors();
     let repeats = recording.repeats();

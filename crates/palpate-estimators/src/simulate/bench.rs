@@ -10,7 +10,7 @@ use crate::setup::Setup;
 use palpate_mechanics::contact::{Contact, Extent, Position};
 use palpate_numerics::watch::Watch;
 
-/// A simulated bench that is read again and again: gains, offsets and places of its sensors are drawn once, noise for each reading.
+/// A simulated bench for repeated readings: gains, offsets and places of its sensors are drawn once, noise for each reading.
 ///
 /// ```
 /// use palpate_estimators::{setup::Setup, simulate::SimulatedBench};
@@ -35,23 +35,23 @@ pub struct SimulatedBench<'a> {
     seed: u64,
 }
 
-/// Positions along each side at which the range of a channel is sought.
+/// Positions along each side at which the range of a channel is searched.
 const RANGE_POSITIONS: u32 = 20;
 
 impl<'a> SimulatedBench<'a> {
-    /// The bench of a setup as a seed has it, with the imperfections of the setup.
+    /// The bench of a setup as drawn by a seed, with the imperfections of the setup.
     ///
     /// # Errors
     /// [`SimulateError::NoModel`] for a measured surface, [`SimulateError::Surface`] where the surface's equations are not solved,
-    /// [`SimulateError::NoForce`] for imperfections without a force by which ranges are taken.
+    /// [`SimulateError::NoForce`] for imperfections without a force for the channels' ranges.
     pub fn new(setup: &'a Setup, seed: u64) -> Result<Self, SimulateError> {
         Self::new_watched(setup, seed, Watch::NONE)
     }
 
-    /// The same, watched while the surface is solved.
+    /// The bench of a setup as drawn by a seed, with the imperfections of the setup, watched while the surface is solved.
     ///
     /// # Errors
-    /// Those of [`SimulatedBench::new`], and [`SimulateError::Cancelled`].
+    /// As for [`SimulatedBench::new`], and [`SimulateError::Cancelled`].
     pub fn new_watched(setup: &'a Setup, seed: u64, watch: Watch) -> Result<Self, SimulateError> {
         let bench = Self::perfect_watched(setup, seed, watch)?;
         let Some(imperfections) = setup.imperfections() else { return Ok(bench) };
@@ -59,10 +59,10 @@ impl<'a> SimulatedBench<'a> {
         Ok(bench.with_imperfections(*imperfections, force_n))
     }
 
-    /// The bench with the faults of its channels alone, whatever the imperfections of the setup.
+    /// The bench with only the faults of its channels, without the imperfections of the setup.
     ///
     /// # Errors
-    /// Those of [`SimulatedBench::new_watched`], but for the force.
+    /// As for [`SimulatedBench::new_watched`], except for the force.
     pub fn perfect_watched(setup: &'a Setup, seed: u64, watch: Watch) -> Result<Self, SimulateError> {
         let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
         surface.check_solution_watched(watch)?;
@@ -71,7 +71,7 @@ impl<'a> SimulatedBench<'a> {
         Ok(Self { extent: setup.surface().extent(), sensors, channels, range_force_n: 0.0, seed })
     }
 
-    /// The same with these imperfections, at rest at time 0. Ranges of channels are taken under their force, or else under this one, in newtons.
+    /// This bench with these imperfections, at rest at time 0. Ranges of channels are for their force, or else for `range_force_n`, in newtons.
     #[must_use]
     pub fn with_imperfections(mut self, imperfections: Imperfections, range_force_n: f64) -> Self {
         let untouched = self.clean(&[]);
@@ -82,7 +82,7 @@ impl<'a> SimulatedBench<'a> {
         self
     }
 
-    /// The same with another step of every channel's converter, in its SI unit.
+    /// This bench with another step of every channel's converter, in its SI unit.
     ///
     /// # Errors
     /// [`SimulateError::Layout`] for a step that is less than 0 or not finite.
@@ -92,17 +92,17 @@ impl<'a> SimulatedBench<'a> {
         Ok(self)
     }
 
-    /// The same bench as an earlier recording left it; the seed draws noise and random walks from there on.
+    /// This bench in the final state of an earlier recording; the seed draws noise and random walks from there on.
     #[must_use]
     pub fn resumed(mut self, state: &BenchState, seed: u64) -> Self {
-        // A stream that no bench of this seed has begun with.
+        // A stream different from the initial one of any bench with this seed.
         self.channels.rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         self.channels.rng.long_jump();
         self.channels.imperfect = self.channels.imperfect.map(|channels| channels.resumed(state));
         self
     }
 
-    /// Faultless reading under contacts on the surface, in the SI unit of each sensor: the sum of what each contact alone makes, and 0 under none.
+    /// Faultless reading under contacts on the surface, in the SI unit of each sensor: the sum over the contacts, and 0 without any.
     pub fn clean(&self, contacts: &[Contact]) -> Vec<f64> {
         let mut sum = vec![0.0; self.channels.layout.len()];
         for contact in contacts {
@@ -119,21 +119,21 @@ impl<'a> SimulatedBench<'a> {
         self.clean(&points.collect::<Vec<_>>())
     }
 
-    /// Lets a step of time pass under constant contacts, whose faultless reading this is, and gives the reading at its end as the imperfections
-    /// change it, without noise.
+    /// Advances time by a step under constant contacts with the faultless reading `clean`. Returns the reading at the end of the step with the
+    /// imperfections, without noise.
     pub fn advance(&mut self, clean: &[f64], step_s: f64) -> Vec<f64> {
         self.channels.advance(clean, step_s)
     }
 
-    /// A reading of the faulty channels, with fresh noise, of what faultless ones read.
+    /// A reading of the faulty channels for the faultless reading `clean`, with fresh noise.
     pub fn measure(&mut self, clean: &[f64]) -> Vec<f64> {
         self.channels.measure(clean)
     }
 
-    /// The channels of a bench, with the imperfections of the setup; ranges are taken under their force, or else under this one, in newtons.
+    /// The channels of a bench, with the imperfections of the setup; ranges are for their force, or else for `force_n`, in newtons.
     ///
     /// # Errors
-    /// Those of [`SimulatedBench::perfect_watched`] where the setup has imperfections.
+    /// As for [`SimulatedBench::perfect_watched`] where the setup has imperfections.
     pub(super) fn channels_watched(
         setup: &'a Setup,
         force_n: f64,
@@ -155,7 +155,7 @@ impl<'a> SimulatedBench<'a> {
         self.channels.imperfect.as_ref().map(ImperfectChannels::time_s)
     }
 
-    /// State of the imperfections, from which [`SimulatedBench::resumed`] goes on; `None` without imperfections.
+    /// State of the imperfections, for [`SimulatedBench::resumed`]; `None` without imperfections.
     pub fn state(&self) -> Option<BenchState> {
         let channels = self.channels.imperfect.as_ref()?;
         Some(BenchState {

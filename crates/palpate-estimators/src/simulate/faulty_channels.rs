@@ -17,15 +17,15 @@ pub(super) struct FaultyChannels {
 }
 
 impl FaultyChannels {
-    /// The layout with the sensors at the places that they have, and the channels without imperfections.
+    /// The layout with the sensors at their drawn places, and the channels without imperfections.
     pub fn draw(setup: &Setup, seed: u64) -> (Layout, Self) {
         let (placed, errors, rng) = draw_faults(setup, seed);
         let noise = StandardNoise::new(None);
         (placed, Self { layout: setup.layout().clone(), errors, rng, noise, imperfect: None })
     }
 
-    /// Lets a step of time pass under constant contacts, whose faultless reading this is, and gives the reading at its end as the imperfections
-    /// change it, without noise.
+    /// Advances time by a step under constant contacts with the faultless reading `clean`. Returns the reading at the end of the step with the
+    /// imperfections, without noise.
     pub fn advance(&mut self, clean: &[f64], step_s: f64) -> Vec<f64> {
         match &mut self.imperfect {
             Some(channels) => channels.advance(clean, step_s),

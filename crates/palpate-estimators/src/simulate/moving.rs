@@ -11,17 +11,17 @@ use palpate_mechanics::surface::modal::{ModalBeam, ModalResponse};
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 
-/// Modes of the beam that swing; the others follow the contact at once. The tenth is a hundred times as fast as the first.
+/// Modes of the beam that swing; the others follow the contact without delay. The tenth is a hundred times as fast as the first.
 const MODES: usize = 10;
 
-/// Contacts that move over a surface: one or two, and what swings under them.
+/// Contacts that move over a surface: one or two, and the beam that swings under them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovingContacts {
     /// The contact, or the first of two.
     pub first: MovingContact,
     /// The other one.
     pub second: Option<MovingContact>,
-    /// The beam with its inertia and damping; nothing for a plate, which is in balance at every reading.
+    /// The beam with its inertia and damping; `None` for a plate, which is in balance at every reading.
     pub beam: Option<ModalBeam>,
     /// Readings a second, in hertz; greater than 0.
     pub rate_hz: f64,
@@ -32,7 +32,7 @@ pub struct MovingContacts {
 pub struct MovingContact {
     /// Motion.
     pub motion: Motion,
-    /// Its force in newtons, where that is not the one of the rig's presses.
+    /// Force of the contact in newtons; `None` for the force of the rig's presses.
     pub force_n: Option<f64>,
 }
 
@@ -42,14 +42,14 @@ impl MovingContacts {
         self.moving().map(|contact| contact.motion.duration_s()).fold(0.0, f64::max)
     }
 
-    /// The contacts at `time_s`; `force_n` is the force, in newtons, of those that have none of their own.
+    /// The contacts at `time_s`; `force_n` is the force, in newtons, of those without one of their own.
     pub fn contacts_at(&self, time_s: f64, force_n: f64) -> Vec<Contact> {
         let at =
             |contact: MovingContact| contact.motion.contact_at(time_s, contact.force_n.unwrap_or(force_n));
         self.moving().map(at).collect()
     }
 
-    /// The same contacts, the first at another speed between its turns.
+    /// These contacts, the first at another speed between its turns.
     ///
     /// # Errors
     /// [`OutOfRange`] for a speed that is not greater than 0 and finite.
@@ -78,7 +78,7 @@ impl MovingContacts {
 /// the recording, noise for each reading. While a contact is lifted its force is 0, and its position is where it comes down
 /// again. Imperfections act in the course of the motion.
 ///
-/// The same seed gives the same recording.
+/// Equal seeds give equal recordings.
 ///
 /// # Errors
 /// [`SimulateError`] when the bench has no force or no model.
@@ -90,10 +90,10 @@ pub fn simulate_moving(
     simulate_moving_watched(setup, moving, seed, Watch::NONE)
 }
 
-/// The same, watched.
+/// Moves contacts over the simulated surface as by [`simulate_moving`], watched.
 ///
 /// # Errors
-/// Those of [`simulate_moving`], and [`SimulateError::Cancelled`].
+/// As for [`simulate_moving`], and [`SimulateError::Cancelled`].
 pub fn simulate_moving_watched(
     setup: &Setup,
     moving: &MovingContacts,
@@ -148,7 +148,7 @@ enum Under<'a> {
 }
 
 impl Under<'_> {
-    /// Faultless reading of the sensors under `contacts`, up to which a beam that swings has been advanced.
+    /// Faultless reading of the sensors under `contacts`; a beam that swings has been advanced to them.
     fn reading(&self, layout: &Layout, contacts: &[Contact]) -> Vec<f64> {
         match self {
             Self::Swings(response) => {
@@ -164,7 +164,7 @@ impl Under<'_> {
     }
 }
 
-/// Moves the contacts from one instant to another along their paths, however far apart readings are.
+/// Moves the contacts from one instant to another along their paths, for any time between readings.
 fn advance(
     response: &mut ModalResponse,
     moving: &MovingContacts,

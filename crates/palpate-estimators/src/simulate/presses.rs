@@ -23,16 +23,16 @@ pub(crate) struct PressedBench<'a> {
     setup: &'a Setup,
     imperfections: Imperfections,
     bench: SimulatedBench<'a>,
-    /// Stream of the places of presses, beside that of the noise.
+    /// Random stream of the places of presses, separate from that of the noise.
     places: Xoshiro256PlusPlus,
     seed: u64,
 }
 
-/// Tells the stream of places from those of noise, walks, finger and lost frames, which have the same seed.
+/// Distinguishes the stream of places from those of noise, walks, finger and lost frames, which have the same seed.
 const PLACES: u64 = 0x91_ACE5;
 
 impl Press {
-    /// Presses of contacts that are listed as often as they are read: equal contacts in a row are one press.
+    /// Presses from contacts that are listed as often as they are read: equal contacts in a row are one press.
     pub fn from_rows(contacts: &[Contact]) -> Vec<Self> {
         let equal = contacts.chunk_by(|one, next| one == next);
         equal.filter_map(|rows| Some(Self { contact: *rows.first()?, rows: rows.len() })).collect()
@@ -40,8 +40,8 @@ impl Press {
 }
 
 impl<'a> PressedBench<'a> {
-    /// The bench of a setup as a seed has it, at rest. Where neither imperfections nor setup have a force, ranges of channels are taken under
-    /// the largest of these presses.
+    /// The bench of a setup as drawn by a seed, at rest. Where neither imperfections nor setup have a force, ranges of channels are for the largest
+    /// of these presses.
     pub fn new(setup: &'a Setup, presses: &[Press], seed: u64, watch: Watch) -> Result<Self, SimulateError> {
         let imperfections = setup.imperfections().copied().unwrap_or_default();
         let largest_n = presses.iter().map(|press| press.contact.force_n.abs()).reduce(f64::max);
@@ -63,7 +63,7 @@ impl<'a> PressedBench<'a> {
         Ok(Self { setup, imperfections, bench, places, seed })
     }
 
-    /// The same bench as an earlier recording left it.
+    /// The bench in the final state of an earlier recording.
     pub fn resumed(
         setup: &'a Setup,
         state: &BenchState,
@@ -74,13 +74,14 @@ impl<'a> PressedBench<'a> {
         Ok(Self { bench: pressed.bench.resumed(state, seed), seed, ..pressed })
     }
 
-    /// Lets the pause between calibration and use pass.
+    /// Waits for the pause between calibration and use.
     pub fn pause(&mut self) {
         let untouched = self.bench.clean(&[]);
         self.bench.advance(&untouched, self.imperfections.schedule.pause_s);
     }
 
-    /// Records presses, each beside its place by this standard deviation, and the untouched surface before, between and after them.
+    /// Records presses, each displaced from its place with this standard deviation, and the untouched surface before the presses,
+    /// between them and after them.
     pub fn record(
         &mut self,
         presses: &[Press],
@@ -106,7 +107,7 @@ impl<'a> PressedBench<'a> {
         Ok(recording)
     }
 
-    /// The untouched surface before a press at this position.
+    /// Records the untouched surface before a press at this position.
     fn rest(&mut self, next: Position, rows: &mut Vec<Row>) {
         let schedule = self.imperfections.schedule;
         let count = schedule.untouched_rows as usize;
@@ -116,7 +117,7 @@ impl<'a> PressedBench<'a> {
         self.record_window(no_contact, &untouched, (schedule.rest_s - recorded_s).max(0.0), count, rows);
     }
 
-    /// Lets time pass under a contact with this faultless reading, and records `count` rows after that.
+    /// Waits under a contact with this faultless reading, and records `count` rows after that.
     fn record_window(
         &mut self,
         contact: Contact,

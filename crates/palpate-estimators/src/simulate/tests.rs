@@ -178,7 +178,7 @@ fn imperfect_recordings_have_untouched_rows_and_times_by_their_schedule() {
         times_s.iter().zip(expected_s).all(|(time_s, expected_s)| (time_s - expected_s).abs() < 1e-9),
         "{times_s:?}"
     );
-    // An imperfection of size 0 leaves the readings as they are.
+    // An imperfection of size 0 does not change the readings.
     let clean = paper(0.0, 2).simulate(1).rows;
     let pressed: Vec<&Row> = rows.iter().filter(|row| row.touches()).collect();
     assert!(
@@ -214,7 +214,7 @@ fn presses_beside_their_places_are_recorded_at_the_asked_ones() {
     assert_eq!(recording.provenance.placement_sd_m, Some(2e-3));
     let asked = paper(0.0, 2).simulate(1);
     assert_eq!(recording.distinct_positions(), asked.distinct_positions());
-    // Sensor 4 reads by the slope of its influence more or less where the finger is beside its place; two rows of one press alike.
+    // Sensor 4 reads more or less, by the slope of its influence, where the press is beside its place; two rows of one press are alike.
     let pressed: Vec<&Row> = recording.rows.iter().filter(|row| row.touches()).collect();
     let beside_m: Vec<f64> = pressed
         .iter()
@@ -263,7 +263,7 @@ fn calibration_and_use_are_one_bench_that_goes_on() {
     let [end_s, start_s] =
         [split.training.rows.last(), split.judged.rows.first()].map(|row| row.unwrap().time_s.unwrap());
     assert!((start_s - end_s - 606.0).abs() < 1e-9, "{start_s} {end_s}");
-    // Evaluating a locator goes on as well: with other walks, but from the same offsets.
+    // An evaluation of a locator continues from the same offsets too, with other walks.
     let contacts = [Contact { position: Position::along(0.1), force_n: 3.0 }];
     let used =
         simulate_use_watched(&example.setup, &split.training.provenance, &contacts, 9, Watch::NONE).unwrap();

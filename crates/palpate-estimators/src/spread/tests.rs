@@ -27,13 +27,13 @@ fn bells([x, y, force]: [f64; 3]) -> Vec<f64> {
 const LINE: About = About { at: [0.4, 0.3, 2.0], ends: [(0.0, 1.0), (0.3, 0.3), (0.0, f64::INFINITY)] };
 const PLANE: About = About { at: [0.4, 0.3, 2.0], ends: [(0.0, 1.0), (0.0, 1.0), (0.0, f64::INFINITY)] };
 
-/// The change of what a contact of `PLANE` reads by an unknown.
+/// Derivative of the reading of the contact `PLANE` by an unknown.
 fn tangent(k: usize) -> Vec<f64> {
     let moved = |by: f64| bells(std::array::from_fn(|i| PLANE.at[i] + if i == k { by } else { 0.0 }));
     moved(1e-6).iter().zip(moved(-1e-6)).map(|(a, b)| (a - b) / 2e-6).collect()
 }
 
-/// The rest of a vector across the tangents by these unknowns.
+/// The part of a vector across the tangents by these unknowns.
 fn residual(of: Vec<f64>, unknowns: &[usize]) -> Vec<f64> {
     let mut basis = Vec::new();
     unknowns.iter().for_each(|k| push_rest(&mut basis, tangent(*k), 0.0));
@@ -92,7 +92,7 @@ fn all_that_two_contacts_close_by_leave_is_along_the_directions() {
 
 #[test]
 fn directions_that_channels_do_not_tell_are_none() {
-    // Two channels are taken up by place and force, and a force of 0 reads nothing wherever it is.
+    // Place and force use up two channels, and a force of 0 reads 0 at any place.
     let two = SpreadDirections::about(LINE, |at| bells(at)[..2].to_vec());
     assert!(two.score(&[1e3, -1e3]) == 0.0 && two.on_line().is_none());
     let nothing = About { at: [0.4, 0.3, 0.0], ..PLANE };
@@ -108,7 +108,7 @@ fn bounds_are_the_quantiles_of_the_score() {
     assert!((palpate_numerics::chi_squared_survival(spread_bound(2), 3) - SPREAD_RATE).abs() < 1e-9);
 }
 
-/// Contacts of unknown force on a surface, their readings of 5 µm noise, and a locator that learnt from presses.
+/// Contacts of unknown force on a surface, with readings of 5 µm noise, and a locator that was fitted to presses.
 struct Told {
     physics: Setup,
     locator: Locator,
@@ -146,7 +146,7 @@ fn line_setup() -> Setup {
     Setup::new(beam()).sensors(Deflection.evenly(8).noise(um(5.0))).unwrap()
 }
 
-/// The same presses of several forces, as channels of no kind.
+/// Presses of several forces, as raw channels without a model.
 fn without_model() -> (Setup, Recording) {
     let setup = line_setup();
     let extent = setup.surface().extent();
@@ -163,7 +163,7 @@ fn without_model() -> (Setup, Recording) {
     (raw, presses)
 }
 
-/// Forces are those of all contacts together: of two, half each.
+/// Forces are the sum over all contacts: each of two contacts has half.
 #[test]
 fn two_contacts_of_unknown_force_are_told_and_one_is_not() {
     let forces_n = [3.0, 6.0, 12.0];
@@ -172,7 +172,7 @@ fn two_contacts_of_unknown_force_are_told_and_one_is_not() {
     let (raw, raw_presses) = without_model();
     let influence = || Estimator::Influence(Influence::default());
     let closed_form = Estimator::ClosedForm(ClosedForm::default());
-    // Told by χ² alone: 50, 50, 38 and 11 %; by any test that doubts one of 200 readings of one contact: 71 and 23 %.
+    // χ² alone detects 50, 50, 38 and 11 %; any test that rejects one of 200 readings of one contact detects 71 and 23 %.
     let fitted = [
         (influence().fit_without_interval_check(FitTask::new(&line_setup(), &presses)).unwrap(), 60.0),
         (closed_form.fit_without_interval_check(FitTask::new(&line_setup(), &presses)).unwrap(), 60.0),

@@ -1,4 +1,4 @@
-//! The rule measured: how often noise alone is not `no_contact`, and how often a contact of the model is `outside_model`.
+//! Measured rates of the rule: how often noise alone is not `no_contact`, and how often a contact of the model is `outside_model`.
 
 use super::*;
 use crate::closed_form::ClosedForm;
@@ -24,14 +24,14 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 #[test]
 fn the_bound_is_the_quantile_of_chi_squared() {
-    // Of two degrees of freedom the distribution is exponential: P(χ² > b) = e^(−b/2).
+    // For two degrees of freedom the distribution is exponential: P(χ² > b) = e^(−b/2).
     assert!((misfit_bound(2) + 2.0 * OUTSIDE_MODEL_RATE.ln()).abs() < 1e-6);
     assert_eq!(misfit_bound(0), misfit_bound(1));
 }
 
 #[test]
 fn learnt_bounds_see_every_place_of_a_recording_that_repeats_itself() {
-    // 800 presses at twenty places in turn, at one of which readings are 30 off what is learnt.
+    // 800 presses at twenty places in turn. At one place the readings are off by 30.
     let off_at_one = |i: usize| if i % 20 == 7 { 30.0 } else { 1.0 };
     let rows = (0..800).map(|i| Row {
         position: Position::along(0.01 * (i % 20) as f64),
@@ -44,18 +44,18 @@ fn learnt_bounds_see_every_place_of_a_recording_that_repeats_itself() {
     assert_eq!(learnt_bounds([10.0, 100.0], &recording, |reading| [reading[0]; 2]), [60.0, 100.0]);
 }
 
-/// An estimator that knows its noise, on a bench.
+/// An estimator with known noise, on a bench.
 struct Case {
     name: &'static str,
     bench: Example,
     estimator: Estimator,
     /// Readings of noise alone, and as many of contacts.
     readings: usize,
-    /// The least and the most rate at which contacts may be `outside_model`: those of the tests that there are, together.
+    /// The least and the greatest rate at which contacts may be `outside_model`, for all tests together.
     outside: (f64, f64),
 }
 
-/// Presses at a place: so many that noise and influence functions are known as well as a layout tells them.
+/// Presses at a place: so many that the learnt noise and influence functions are as good as those of the layout.
 const REPEATS: usize = 1000;
 
 fn influence() -> Estimator {
@@ -81,14 +81,14 @@ fn cases() -> [Case; 4] {
     ]
 }
 
-/// Readings of a case that the rule got wrong.
+/// Numbers of readings of a case with a wrong status.
 #[derive(Clone, Copy, Debug, Default)]
 struct FalseAlarms {
-    /// Of noise alone: those longer than its bound.
+    /// Readings of noise alone, beyond its bound.
     beyond_noise: usize,
-    /// Of noise alone: those within its bound, that a contact explains by more than it costs.
+    /// Readings of noise alone, within its bound, that a contact explains by more than its cost.
     like_contact: usize,
-    /// Of contacts anywhere: those that are `outside_model`.
+    /// Readings of contacts anywhere that are `outside_model`.
     outside_model: usize,
 }
 
@@ -129,8 +129,8 @@ fn whitened(setup: &Setup, reading: &[f64]) -> Array1<f64> {
         .collect()
 }
 
-/// Least and most of `count` readings that are false alarms at a rate, each missed by a rule of that rate once in 10,000 times: the
-/// quantiles of the binomial distribution.
+/// Least and greatest number of false alarms among `count` readings at a rate. A rule of that rate misses each of them once in 10,000
+/// times: they are quantiles of the binomial distribution.
 fn binomial_bounds(count: usize, rate: f64) -> (usize, usize) {
     const MISSED: f64 = 1e-4;
     let n = count as f64;
@@ -149,16 +149,16 @@ fn binomial_bounds(count: usize, rate: f64) -> (usize, usize) {
     (least, count)
 }
 
-/// Bound on the chance that a contact explains noise by more than `cost`: that whitened noise has a component greater than u = √cost
-/// along the whitened readings of some contact, all scaled to unit length. Its expected Euler characteristic (Adler and
-/// Taylor, Random Fields and Geometry, 2007, section 12.4) is Φ(−u) + (L₁/2π + L₂·u/(2π)^(3/2))·e^(−u²/2), with half the
-/// circumference L₁ and the area L₂ of these readings; on a line L₁ is their length, and L₂ 0.
+/// Bound on the probability that a contact explains noise by more than `cost`: that whitened noise has a component greater than u = √cost
+/// along the whitened readings of some contact, all scaled to unit length. Its expected Euler characteristic (Adler and Taylor, Random
+/// Fields and Geometry, 2007, section 12.4) is Φ(−u) + (L₁/2π + L₂·u/(2π)^(3/2))·e^(−u²/2), with half the circumference L₁ and the area L₂
+/// of these readings. On a line L₁ is their length, and L₂ is 0.
 fn chance_of_contact(setup: &Setup, cost: f64) -> f64 {
     const SIDE: usize = 60;
     let clean = CleanSensors::new(setup.surface().model().unwrap(), setup.layout());
     let extent = setup.surface().extent();
     let rows = if extent.width_m().is_some() { SIDE } else { 1 };
-    // The direction of no reading is not a number, and adds nothing to lengths below.
+    // The direction of a zero reading is not a number, and adds 0 to the lengths below.
     let direction = |column: usize, row: usize| {
         let share = |i: usize| (i as f64 + 0.5) / SIDE as f64;
         let y_m = extent.width_m().map_or(0.0, |width_m| share(row) * width_m);
@@ -187,11 +187,11 @@ fn chance_of_contact(setup: &Setup, cost: f64) -> f64 {
     normal_cdf(-u) + (half / TAU + area * u / TAU.powf(1.5)) * (-0.5 * cost).exp()
 }
 
-/// Measures a case with its force known or not, and says what it found as a row of the table.
+/// Measures a case with known or unknown force, and returns the result as a row of the table.
 fn check(case: &Case, force_n: Option<f64>) -> String {
     let setup = case.bench.setup.clone().with_force(force_n).unwrap();
     let coordinates = 1 + usize::from(setup.surface().extent().width_m().is_some());
-    // A plane has more places, and a contact on it costs more.
+    // A plane has more places, so a contact on it has a greater cost.
     let cost = contact_cost(unknowns(coordinates, force_n), setup.layout().len(), LINE_PLACES);
     let chance = chance_of_contact(&setup, detection_cost(cost, FalseAlarmRate::DEFAULT));
     let FalseAlarms { beyond_noise, like_contact, outside_model } = false_alarms(case, &setup);
@@ -237,7 +237,7 @@ fn false_alarms_are_as_rare_as_the_rule_says() {
     println!("|---|---|---|---|---|---|---|\n{}", rows.join("\n"));
 }
 
-/// The beam's presses as a recording of raw channels, a seventh of them of no force.
+/// The beam's presses as a recording of raw channels. A seventh of the rows are untouched.
 fn force_linear_locator() -> Fitted<ForceLinearLocator> {
     let bench = paper(5e-6, 100);
     let mut recording = bench.simulate(0);
@@ -274,7 +274,7 @@ fn a_force_linear_surface_has_the_rate_that_is_set() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
         let is_alarm = |reading: &usize| {
             let noise = measure(layout, &silence, &errors, &mut rng);
-            // Where a contact would be is looked for in a few readings alone.
+            // The position of a contact is searched in a few readings only.
             let is_noise = locator.method.is_noise(&noise);
             assert!(
                 *reading >= LOCATED
@@ -284,7 +284,7 @@ fn a_force_linear_surface_has_the_rate_that_is_set() {
         };
         let alarms = (0..readings).filter(is_alarm).count();
         println!("force-linear at {share}: {alarms} of {readings}");
-        // The bounds are wider by what calibration leaves open of noise and offsets, and contacts are asked at the nodes of a grid alone.
+        // The bounds are wider by the posterior variance of noise and offsets, and contacts are evaluated at the nodes of a grid only.
         let (least, _) = binomial_bounds(readings, 0.8 * share);
         let (_, most) = binomial_bounds(readings, 1.1 * share);
         assert!((least..=most).contains(&alarms), "{share}: {alarms} not in {least}..={most}");
@@ -358,13 +358,14 @@ fn as_many_readings_as_unknowns_can_be_outside_the_model() {
         let outside = (0.0, OUTSIDE_MODEL_RATE);
         let case = Case { name: "two sensors", bench: bench.clone(), estimator, readings: 20_000, outside };
         let FalseAlarms { outside_model, .. } = false_alarms(&case, &setup);
-        // Most contacts have a place and a force that explain them to the last bit.
+        // A place and a force explain most contacts to the last bit.
         let (_, most) = binomial_bounds(case.readings, case.outside.1);
         assert!(outside_model <= most, "{}: {outside_model}", locator.kind());
     }
 }
 
-/// Contacts of a bench whose force is not known, anywhere, and those among them that are told and whose interval is the surface.
+/// Counts contacts of unknown force anywhere on a bench: those that are `located` or `ambiguous`, and those among them with the whole
+/// surface as interval.
 fn left_open(locator: &Locator, bench: &Example, force_n: f64, contacts: usize) -> [usize; 2] {
     let (layout, extent) = (bench.setup.layout(), bench.setup.surface().extent());
     let clean = CleanSensors::new(bench.setup.surface().model().unwrap(), layout);
@@ -412,7 +413,7 @@ fn nothing_is_located_whose_interval_is_the_surface() {
                 let [told, open] = left_open(&locator, &bench, force_n, CONTACTS);
                 let percent = 100.0 * open as f64 / told as f64;
                 println!("| {name}, {kind} | {force_n} N | {told} of {CONTACTS} | {percent:.2} % |");
-                // There are some, beside ends and edges, and they are few.
+                // There are a few such contacts, near ends and edges.
                 assert!(open > 0 && percent < 3.0, "{name}, {kind}, {force_n} N: {open} of {told}");
             }
         }
@@ -431,7 +432,7 @@ fn an_interval_of_a_whole_side_alone_tells_the_other_coordinate() {
     assert_eq!(of(whole_x, whole_y, Status::Located), Status::Ambiguous);
     assert_eq!(of(whole_x, (0.05, 0.195), Status::Located), Status::Located);
     assert_eq!(of((0.02, 0.3), whole_y, Status::Located), Status::Located);
-    // What lies beyond the surface is none of it.
+    // Parts of an interval beyond the surface do not count.
     assert_eq!(of(whole_x, (-0.1, 0.1), Status::Located), Status::Located);
     for status in [Status::NoContact, Status::OutsideModel, Status::OutsideSurface] {
         assert_eq!(of(whole_x, whole_y, status), status);

@@ -1,8 +1,8 @@
-//! The state of a surface and its contacts, what a step of time does to it, and its Gaussian under several motions, which mix.
+//! The state of a surface and its contacts, its transition over a step of time, and its Gaussians under several motions, which mix.
 //!
 //! The state of a line with C contacts is (u, u̇) and then (x, v, v̇, W) of each contact: N = 2 + 4·C numbers. u = m·ω²·q
-//! is the force of the surface's first mode, whose share of the contacts' force is p = Σ W·φ(x) with φ its shape:
-//! ü + 2ζω·u̇ + ω²·u = ω²·p. A surface in balance has u = 0 without variance, and its likelihood does not look at it.
+//! is the force of the surface's first mode. The contacts' force on this mode is p = Σ W·φ(x), φ its shape:
+//! ü + 2ζω·u̇ + ω²·u = ω²·p. A surface in balance has u = 0 without variance, and its likelihood does not depend on it.
 
 use super::TrackerConfig;
 use super::gaussian::{Gaussian, Transition};
@@ -42,17 +42,17 @@ pub(super) struct Bank<const N: usize, const M: usize> {
 }
 
 impl<const N: usize, const M: usize> Bank<N, M> {
-    /// The same Gaussian for every choice of motions, with equal shares.
+    /// A bank with one Gaussian for every choice of motions, with equal shares.
     pub fn uniform(belief: Gaussian<N>) -> Self {
         Self { shares: [1.0 / M as f64; M], members: [belief; M] }
     }
 
-    /// All of it as one Gaussian.
+    /// The bank as one Gaussian.
     pub fn mixed(&self) -> Gaussian<N> {
         Gaussian::mixed(self.shares.iter().copied().zip(self.members))
     }
 
-    /// After a step and before its reading.
+    /// The bank after a step and before its reading.
     pub fn predicted(&self, dynamics: &impl Dynamics<N, M>) -> Self {
         let mut shares = [0.0; M];
         let members = std::array::from_fn(|to| {
@@ -66,8 +66,8 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         Self { shares, members }
     }
 
-    /// After a reading; and the logarithm of how probable it was. The misfit is expanded about `start`, or else the mean,
-    /// and again about where that leads if it leads farther than the reading itself can tell.
+    /// Bank after a reading, and the log probability of the reading. The misfit is expanded about `start`, or else the mean, and
+    /// again about the updated mean, if it has moved by more than a part of the reading's own standard deviation.
     pub fn updated<const K: usize>(
         &self,
         observed: &ObservedEntries<K>,
@@ -92,9 +92,9 @@ impl<const N: usize, const M: usize> Bank<N, M> {
 
     /// Belief before a step, given the belief `later` after it and its reading.
     ///
-    /// Later readings have the likelihood of the state before, whatever motion it was under, L_j = N_j(x | all)/N_j(x | so far), where
+    /// Given the state before the step, the likelihood of later readings is L_j = N_j(x | all)/N_j(x | so far) for any motion before it. Here
     /// N_j, of motion j in the step, is from Rauch, Tung and Striebel's recursion on the mixture that motion j began with. Each
-    /// member is moved and weighed by L_j as by a reading, so that a variance never grows.
+    /// member is updated and weighted by L_j as by a reading, so that a variance never grows.
     pub fn smoothed(&self, dynamics: &impl Dynamics<N, M>, later: &Self) -> Self {
         let mut weights = [[0.0; M]; M];
         let mut before = [[Gaussian::default(); M]; M];
@@ -128,7 +128,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         Self { shares, members }
     }
 
-    /// Without contact `k`: the bank of those that stay.
+    /// The bank of the remaining contacts, without contact `k`.
     pub fn without_contact<const N2: usize, const M2: usize>(&self, k: usize) -> Bank<N2, M2> {
         let below = MOTIONS.pow(k as u32);
         let stay = |i: usize| if i < contact(k) { i } else { i + OF_CONTACT };
@@ -152,7 +152,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         Bank { shares, members }
     }
 
-    /// With one contact more, the last; the surface then swings as `joined` makes of it.
+    /// The bank with one contact more, the last; `joined` gives the surface's swing under it.
     pub fn with_contact<const N2: usize, const M2: usize>(
         &self,
         joined: impl Fn(&Gaussian<N>) -> Gaussian<N2>,
@@ -163,7 +163,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         }
     }
 
-    /// Mean of the entries that a reading observes, held to their bounds.
+    /// Mean of the entries that a reading observes, clamped to their bounds.
     fn observed_mean<const K: usize>(&self, observed: &ObservedEntries<K>) -> [f64; K] {
         let mut mean = [0.0; K];
         for (share, member) in self.shares.iter().zip(&self.members) {
@@ -174,7 +174,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         std::array::from_fn(|k| observed.held(k, mean[k]))
     }
 
-    /// `None` where the reading is too improbable for numbers.
+    /// `None` where the probability of the reading underflows.
     fn updated_about<const K: usize>(
         &self,
         observed: &ObservedEntries<K>,
@@ -183,8 +183,8 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     ) -> Option<(Self, f64)> {
         let results: [(Gaussian<N>, f64); M] = self.members.map(|member| {
             let (after, evidence) = member.updated(fit, about, &observed.entries);
-            // A normal distribution that is cut off at bounds has the evidence of the whole one, times its share within the bounds after the reading
-            // over that before.
+            // A normal distribution truncated at bounds has the evidence of the whole one, times its share within the bounds after the reading over
+            // that before.
             let shares = observed.log_share_of_forces(&after) - observed.log_share_of_forces(&member);
             (after, evidence + shares)
         });
@@ -195,7 +195,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         (best.is_finite() && sum > 0.0).then(|| (after, best + sum.ln()))
     }
 
-    /// With the observed entries held to their bounds.
+    /// The bank with the observed entries clamped to their bounds.
     fn held<const K: usize>(mut self, observed: &ObservedEntries<K>) -> Self {
         for member in &mut self.members {
             for (k, entry) in observed.entries.into_iter().enumerate() {
@@ -206,7 +206,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     }
 }
 
-/// The greatest evidence, and each share by its evidence over that.
+/// The greatest evidence, and each share multiplied by its evidence over the greatest.
 fn reweighted<const N: usize, const M: usize>(
     shares: &[f64; M],
     results: &[(Gaussian<N>, f64); M],
@@ -216,7 +216,7 @@ fn reweighted<const N: usize, const M: usize>(
 }
 
 impl<const K: usize> ObservedEntries<K> {
-    /// ln of the share of a belief whose forces are within their bounds, one by one.
+    /// ln of the share of a belief within the bounds of its forces, each force by itself.
     fn log_share_of_forces<const N: usize>(&self, belief: &Gaussian<N>) -> f64 {
         let of_entry = |(k, entry): (usize, usize)| {
             let (least, most) = self.bounds[k];
@@ -236,10 +236,10 @@ impl<const K: usize> ObservedEntries<K> {
     }
 }
 
-/// Force of the first mode, and how fast it changes.
+/// Force of the first mode, and its rate of change.
 pub(super) const U: usize = 0;
 pub(super) const U_RATE: usize = 1;
-/// Position, speed, acceleration and force, from where a contact's numbers begin.
+/// Position, speed, acceleration and force, counted from a contact's first entry.
 pub(super) const X: usize = 0;
 pub(super) const V: usize = 1;
 pub(super) const A: usize = 2;
@@ -279,7 +279,7 @@ pub(super) fn observed_on_line<const K: usize>(length_m: f64, greatest_n: f64) -
     }
 }
 
-/// The motion of contact `k` in member `member` of a bank, whose number has a digit to the base 3 for each contact.
+/// The motion of contact `k` in member `member` of a bank: digit k of the member's number to the base 3.
 const fn motion_of(member: usize, k: usize) -> usize {
     member / MOTIONS.pow(k as u32) % MOTIONS
 }
@@ -289,7 +289,7 @@ const fn motion_of(member: usize, k: usize) -> usize {
 pub(super) struct Step {
     duration_s: f64,
     motions: [Motion; MOTIONS],
-    /// The probability that a motion lasts through the step; the others share the rest.
+    /// The probability that a motion lasts through the step; the other motions share the rest.
     lasts: f64,
     /// Variance that an unknown force gains, over its square.
     drift: f64,
@@ -304,7 +304,7 @@ struct FreeSwing {
 }
 
 impl Step {
-    /// A step; forces drift where they are not known.
+    /// A step; forces drift where they are unknown.
     pub fn new(config: &TrackerConfig, duration_s: f64, forces_known: bool) -> Self {
         let motion = |sd: f64| Motion::new(duration_s, config.acceleration_s, sd);
         Self {
@@ -332,7 +332,7 @@ impl Step {
         (0..contacts).map(passes).product()
     }
 
-    /// The motion that a member's digit says.
+    /// The motion for a digit of a member's number.
     pub fn motion(&self, number: usize) -> &Motion {
         &self.motions[number]
     }
@@ -351,7 +351,7 @@ pub(super) struct LineDynamics<'a> {
 }
 
 impl<'a> LineDynamics<'a> {
-    /// A step on a line; nothing on a plane.
+    /// A step on a line; `None` on a plane.
     pub fn new(step: &'a Step, geometry: Geometry<'a>) -> Option<Self> {
         match geometry {
             Geometry::Line(likelihood) => Some(Self { step, likelihood }),
@@ -380,7 +380,7 @@ impl<const N: usize, const M: usize> Dynamics<N, M> for LineDynamics<'_> {
 }
 
 impl LineDynamics<'_> {
-    /// The first mode swings under the force that it has halfway: (u − p, u̇) swings freely.
+    /// The first mode swings under its force halfway through the step: (u − p, u̇) swings freely.
     fn swing<const N: usize>(&self, swing: &FreeSwing, belief: &Gaussian<N>, transition: &mut Transition<N>) {
         let half_s = 0.5 * self.step.duration_s;
         let ([[uu, us], [su, ss]], mean) = (swing.free, &belief.mean);
@@ -411,8 +411,8 @@ impl LineDynamics<'_> {
     }
 }
 
-/// Standard deviation of the first mode's force that white noise sustains, as a share of the contacts' force: nothing presses as
-/// evenly as its model.
+/// Standard deviation of the first mode's force that white noise sustains, as a share of the contacts' force: real presses are less
+/// even than the model.
 const EXCITATION: f64 = 1e-4;
 
 /// Transition of position, speed and acceleration: F and Q.
@@ -423,7 +423,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// Writes into `change` what it does to the position, speed and acceleration that begin at entry `at` of a state.
+    /// Writes into `change` the transition of the position, speed and acceleration that begin at entry `at` of a state.
     pub fn move_along<const N: usize>(
         &self,
         at: usize,
@@ -439,7 +439,7 @@ impl Motion {
         }
     }
 
-    /// A contact whose acceleration has standard deviation `sd` and a correlation that falls by e in `lasts_s` (R. Singer,
+    /// A contact with an acceleration of standard deviation `sd`, and a correlation that falls by e in `lasts_s` (R. Singer,
     /// IEEE Trans. Aerosp. Electron. Syst. 6, 1970).
     fn new(duration_s: f64, lasts_s: f64, sd: f64) -> Self {
         let (t, u) = (duration_s, duration_s / lasts_s);
@@ -452,7 +452,7 @@ impl Motion {
             noise[j][i] = noise[i][j];
         };
         if u < 0.05 {
-            // What the closed form comes to while it would lose its digits.
+            // The series of the closed form, where that would lose digits.
             set(X, X, u.powi(5) / 10.0);
             set(X, V, u.powi(4) / 4.0);
             set(X, A, u.powi(3) / 3.0);
@@ -472,8 +472,8 @@ impl Motion {
     }
 }
 
-/// Numbers of the state of a contact on a plane: (x, v_x, v̇_x, y, v_y, v̇_y, W). Motions along and across have the same law and do not
-/// know of each other; the plane is in balance at every reading.
+/// Numbers of the state of a contact on a plane: (x, v_x, v̇_x, y, v_y, v̇_y, W). Motions along and across have the same law and are
+/// independent; the plane is in balance at every reading.
 pub(super) const PLANE_NUMBERS: usize = 7;
 /// First entries of position, speed and acceleration along, of those across, and the entry of the force.
 pub(super) const ALONG: usize = 0;
@@ -524,7 +524,7 @@ mod tests {
             mean: [0.2, 0.5, 1.0],
             covariance: [[4e-6, 1e-6, 1e-5], [1e-6, 1e-2, 1e-3], [1e-5, 1e-3, 4.0]],
         };
-        // On both sides of where the closed form is replaced by its first terms.
+        // On both sides of the switch from the closed form to its first terms.
         for duration_s in [0.2, 9e-3] {
             let moved = |belief: &Gaussian<3>, share: f64| {
                 let Motion { forward, noise } = Motion::new(share * duration_s, 0.1, 2.0);

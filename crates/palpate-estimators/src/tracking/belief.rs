@@ -21,7 +21,7 @@ pub(super) enum Belief {
     OnPlane(Box<Bank<PLANE_NUMBERS, 3>>),
 }
 
-/// A reading, and what the surface says about it.
+/// A reading with the likelihood of the surface.
 #[derive(Clone, Copy)]
 pub(super) struct Observation<'a> {
     pub likelihood: &'a dyn Likelihood,
@@ -30,8 +30,7 @@ pub(super) struct Observation<'a> {
     pub swings: bool,
 }
 
-/// One contact of a belief: mean and variances of position, speed and force, and then of position and speed across, which
-/// are zeros on a line.
+/// One contact of a belief: mean and variances of position, speed and force, and then of position and speed across, which are 0 on a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Moments {
     pub mean: [f64; 5],
@@ -41,12 +40,12 @@ pub(super) struct Moments {
 }
 
 impl Belief {
-    /// A surface at rest that nothing touches.
+    /// An untouched surface at rest.
     pub fn nothing() -> Self {
         Self::Nothing(Bank::uniform(Gaussian::default()))
     }
 
-    /// Becomes the mixture with another belief that nothing touches, whose share is `share`.
+    /// Becomes the mixture with another belief without contact; `share` is the share of the other.
     pub fn absorb(&mut self, other: &Self, share: f64) {
         if let (Self::Nothing(own), Self::Nothing(other)) = (self, other) {
             let parts = [(1.0 - share, own.mixed()), (share, other.mixed())];
@@ -62,19 +61,19 @@ impl Belief {
         }
     }
 
-    /// After a step and before its reading.
+    /// The belief after a step and before its reading.
     pub fn predicted(&self, step: &Step, geometry: Geometry) -> Self {
         match (self, LineDynamics::new(step, geometry)) {
             (Self::Nothing(bank), Some(line)) => Self::Nothing(bank.predicted(&line)),
             (Self::One(bank), Some(line)) => Self::One(bank.predicted(&line)),
             (Self::Two(bank), Some(line)) => Self::Two(Box::new(bank.predicted(&line))),
             (Self::OnPlane(bank), _) => Self::OnPlane(Box::new(bank.predicted(&PlaneDynamics(step)))),
-            // A plane in balance that nothing touches stays as it is.
+            // An untouched plane in balance stays as it is.
             (belief, None) => belief.clone(),
         }
     }
 
-    /// After a reading, and the logarithm of how probable it was; `None` where that is too little for numbers.
+    /// The belief after a reading, and the log probability of the reading; `None` where that probability underflows.
     pub fn updated(&self, observation: Observation) -> Option<(Self, f64)> {
         match (self, observation.likelihood.geometry()) {
             (Self::Nothing(bank), _) => {
@@ -104,7 +103,7 @@ impl Belief {
                 let updated = bank.updated(&observation.entries_on_plane(), expand, None);
                 updated.map(|(bank, evidence)| (Self::OnPlane(Box::new(bank)), evidence))
             }
-            // Contacts of a line are not believed in on a plane, nor the other way round.
+            // A belief of a line does not suit a plane, nor the other way round.
             (Self::One(_) | Self::Two(_), Geometry::Plane(_)) | (Self::OnPlane(_), Geometry::Line(_)) => None,
         }
     }
@@ -154,7 +153,7 @@ impl Moments {
         Contact { position: Position { x_m, y_m }, force_n }
     }
 
-    /// Whether two are of one contact: closer than their own doubt in place, speed and force.
+    /// Whether two are of one contact: within two standard deviations of their difference in place, speed and force.
     pub fn is_same_contact(&self, other: &Self) -> bool {
         const CLOSE: f64 = 2.0;
         (0..self.mean.len()).all(|i| {

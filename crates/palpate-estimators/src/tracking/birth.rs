@@ -1,4 +1,4 @@
-//! Contacts that a reading can have come from.
+//! Contacts that may have come with a reading.
 //!
 //! A new contact has a wide prior about the places that explain the reading by itself, with any usual speed, on a surface that
 //! hardly swings. The reading then gives its probability and its posterior.
@@ -20,15 +20,14 @@ use palpate_numerics::NORMAL_95;
 use palpate_numerics::small::{principal_direction, principal_variances};
 use std::f64::consts::PI;
 
-/// A valley of a reading's misfit that is wider than this share of the length is born in parts no wider, since its force
-/// changes along it.
+/// A valley of a reading's misfit that is wider than this share of the length is divided into parts no wider, since the force changes along it.
 const WIDEST: f64 = 1.0 / 40.0;
 /// The most parts of a valley.
 const MOST_PARTS: f64 = 16.0;
-/// The first mode's force is this share, as a standard deviation, off its balance under a contact that has just come.
+/// Standard deviation of the first mode's force about its balance under a new contact, as a share of the contact's force.
 const IMBALANCE: f64 = 0.02;
 
-/// Birth model: the contacts that can have come with one reading; `L` is the likelihood of a line or of a plane.
+/// Birth model: the contacts that may have come with one reading; `L` is the likelihood of a line or of a plane.
 pub(super) struct BirthModel<'a, L: ?Sized> {
     pub likelihood: &'a L,
     pub observation: Observation<'a>,
@@ -45,19 +44,19 @@ struct BirthComponent {
     /// Covariance of the place in m²: xx, xy, yy; on a line xx alone.
     covariance_m2: [f64; 3],
     variance_n2: f64,
-    /// Prior probability: the share of all places that it stands for, and the density of its force over that of a normal distribution about it.
+    /// Prior probability: its share of all places, times the density of its force over that of a normal distribution about it.
     prior: f64,
 }
 
 impl<L: ?Sized> BirthModel<'_, L> {
-    /// The single contacts that the reading alone shows, one in each valley of its misfit.
+    /// The single contacts that explain the reading by itself, one in each valley of its misfit.
     fn modes(&self) -> impl Iterator<Item = &ContactEstimate> {
         let modes = self.single.modes.as_slice().iter().map(|mode| &mode.contact);
         let touched = self.single.status != Status::NoContact;
         std::iter::once(&self.single.contact).chain(modes).filter(move |_| touched)
     }
 
-    /// A contact with this force, or the known one; `None` where that does not press.
+    /// A contact with this force, or the known one; `None` for a force that does not press.
     fn component(
         &self,
         position: Position,
@@ -82,21 +81,21 @@ impl<L: ?Sized> BirthModel<'_, L> {
         Some(BirthComponent { contact, covariance_m2, variance_n2, prior: density * prior })
     }
 
-    /// A contact whose position has the variance of one anywhere on the surface, l²/12.
+    /// A contact with the variance of a uniform distribution over the surface, l²/12.
     fn uniform_component(&self, contact: &ContactEstimate) -> Option<BirthComponent> {
         let [xx, yy] = sides_m(self.observation.likelihood.extent()).map(|side_m| side_m.powi(2) / 12.0);
         self.component(contact.position, contact.force_n?, [xx, 0.0, yy], 1.0)
     }
 }
 
-/// The force that fits a place, from a fit of one near it; its number is the third.
+/// The force that fits a place, from a fit of one near it; the force is the third unknown.
 fn better_force_n(fit: &ContactFit<3>, near_n: f64) -> f64 {
     let information = fit.information[2][2];
     if information > 0.0 { (near_n + fit.score[2] / information).max(0.0) } else { near_n }
 }
 
 impl BirthModel<'_, dyn LineLikelihood + '_> {
-    /// The contacts that touch a surface on which there was nothing; each with the logarithm of how probable the reading is.
+    /// The contacts that may touch a surface without contacts; each with the log probability of the reading.
     pub fn first_contacts(&self) -> Vec<(f64, Belief)> {
         if self.single.status == Status::NoContact {
             return Vec::new();
@@ -121,7 +120,7 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         Some((evidence, Belief::Two(Box::new(bank))))
     }
 
-    /// One contact, with the reading; what it does next is not known from that, so its motions are as one.
+    /// One contact, updated by the reading; a single motion, as the reading does not determine how it moves on.
     fn one_contact(&self, component: BirthComponent) -> Option<(f64, Belief)> {
         let Contact { position, force_n } = component.contact;
         let born: Bank<6, 1> = Bank::uniform(self.augmented(&Gaussian::<2>::default(), component));
@@ -131,7 +130,7 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         Some((evidence + component.prior.ln(), Belief::One(Bank::uniform(bank.members[0]))))
     }
 
-    /// Two contacts that come at once, with the reading.
+    /// Two contacts that come at once, updated by the reading.
     fn two_contacts(&self, first: BirthComponent, second: BirthComponent) -> Option<(f64, Belief)> {
         let one: Gaussian<6> = self.augmented(&Gaussian::<2>::default(), first);
         let born: Bank<10, 1> = Bank::uniform(self.augmented(&one, second));
@@ -139,7 +138,7 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         Some((evidence, Belief::Two(Box::new(Bank::uniform(bank.members[0])))))
     }
 
-    /// A bank of two contacts with the reading, which is expanded first about where the two are by themselves.
+    /// A bank of two contacts after the reading, with the misfit expanded first about their separate estimates.
     fn updated_pair<const M: usize>(
         &self,
         born: &Bank<10, M>,
@@ -152,7 +151,7 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         born.updated(&self.observation.entries_on_line(), expand, Some(start))
     }
 
-    /// A belief whose state is augmented by a contact, under which the first mode is nearly in balance: u grows by W·φ(x) and its unrest.
+    /// A belief with its state augmented by a contact. The first mode is nearly in balance under it: u grows by W·φ(x) and its unrest.
     fn augmented<const N: usize, const N2: usize>(
         &self,
         belief: &Gaussian<N>,
@@ -202,7 +201,7 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         contact.force_n * self.likelihood.first_mode(contact.position.x_m)[0]
     }
 
-    /// The two contacts that the reading by itself shows, from left to right.
+    /// The two contacts of the single reading's estimate, from left to right.
     fn pair(&self) -> Option<(BirthComponent, BirthComponent)> {
         let first = self.uniform_component(&self.single.contact)?;
         let second = self.uniform_component(self.single.further.as_slice().first()?)?;
@@ -233,10 +232,10 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
     }
 }
 
-/// A contact in each valley of the reading's misfit, held possible as on a line. A long valley is born in
-/// parts along its longer axis; across it the reading tells where.
+/// A contact in each valley of the reading's misfit, with a uniform prior as on a line. A long valley is divided into
+/// parts along its longer axis; across it the reading determines the place.
 impl BirthModel<'_, dyn PlaneLikelihood + '_> {
-    /// The contacts that touch a surface on which there was nothing; each with the logarithm of how probable the reading is.
+    /// The contacts that may touch a surface without contacts; each with the log probability of the reading.
     pub fn first_contacts(&self) -> Vec<(f64, Belief)> {
         self.modes()
             .flat_map(|contact| self.mode_components(contact))
@@ -244,7 +243,7 @@ impl BirthModel<'_, dyn PlaneLikelihood + '_> {
             .collect()
     }
 
-    /// A contact with the reading; what it does next is not known from that, so its motions are as one.
+    /// A contact, updated by the reading; a single motion, as the reading does not determine how it moves on.
     fn one_contact(&self, component: BirthComponent) -> Option<(f64, Belief)> {
         let Contact { position: Position { x_m, y_m }, force_n } = component.contact;
         let mut belief = Gaussian::<PLANE_NUMBERS>::default();

@@ -1,4 +1,4 @@
-//! A Gaussian in the state of a surface and its contacts, moved by time and by readings.
+//! A Gaussian in the state of a surface and its contacts, updated by time and by readings.
 //!
 //! Symbols: m mean and P covariance of the state; s the unknowns of a [`ContactFit`], which are entries of the state; g and A pull
 //! and information of the fit.
@@ -6,7 +6,7 @@
 use crate::likelihood::ContactFit;
 use palpate_numerics::small::{Ldl, Matrix, dot};
 
-/// A belief about N numbers.
+/// Mean and covariance of N numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Gaussian<const N: usize> {
     pub mean: [f64; N],
@@ -25,7 +25,7 @@ pub(super) struct Transition<const N: usize> {
 }
 
 impl<const N: usize> Transition<N> {
-    /// The transition that leaves a belief as it is.
+    /// The transition that does not change a Gaussian.
     pub fn identity(belief: &Gaussian<N>) -> Self {
         let mut transition = Self { mean: belief.mean, forward: [[0.0; N]; N], noise: [[0.0; N]; N] };
         (0..N).for_each(|i| transition.forward[i][i] = 1.0);
@@ -51,7 +51,7 @@ impl<const N: usize> Default for Gaussian<N> {
 }
 
 impl<const N: usize> Gaussian<N> {
-    /// After a step of time.
+    /// The Gaussian after a step of time.
     pub fn predicted(&self, transition: &Transition<N>) -> Self {
         let carried = transition.carried(&self.covariance);
         let mut covariance = transition.noise;
@@ -63,11 +63,11 @@ impl<const N: usize> Gaussian<N> {
         Self { mean: transition.mean, covariance }
     }
 
-    /// After a reading whose misfit in the entries `entries` is expanded about `about`; and the logarithm of how probable the
-    /// reading was.
+    /// Belief after a reading, with the misfit in the entries `entries` expanded about `about`; and the log probability of the
+    /// reading.
     ///
-    /// P⁺ = P − Y·G⁻¹·Yᵀ with Y = P_s·R, A = R·Rᵀ and G = 1 + Rᵀ·P_ss·R; m⁺ = m + P⁺_s·(g − A·δ), δ the distance of what
-    /// is believed from `about`; the evidence is −½·(ln det G + χ² less what the move explains).
+    /// P⁺ = P − Y·G⁻¹·Yᵀ with Y = P_s·R, A = R·Rᵀ and G = 1 + Rᵀ·P_ss·R; m⁺ = m + P⁺_s·(g − A·δ), δ the distance of the
+    /// mean from `about`. The log evidence is −½·(ln det G + χ² less the reduction by the move).
     pub fn updated<const K: usize>(
         &self,
         fit: &ContactFit<K>,
@@ -120,7 +120,7 @@ impl<const N: usize> Gaussian<N> {
     }
 
     /// Belief before a step, given the belief `later` after it (Rauch, Tung and Striebel 1965):
-    /// m + C·(m′ − m⁻) and P + C·(P′ − P⁻)·Cᵀ with C = P·Fᵀ·(P⁻)⁻¹, where what is known exactly is held.
+    /// m + C·(m′ − m⁻) and P + C·(P′ − P⁻)·Cᵀ with C = P·Fᵀ·(P⁻)⁻¹, where an entry that is known exactly keeps its value.
     pub fn smoothed(&self, transition: &Transition<N>, later: &Self) -> Self {
         let expected = self.predicted(transition);
         let carried = transition.carried(&self.covariance);
@@ -142,9 +142,8 @@ impl<const N: usize> Gaussian<N> {
         before
     }
 
-    /// Information beyond another belief that it was updated from, as the fit of the readings that made the difference, and about
-    /// where that is expanded: their precision is P⁻¹ less the other's, and at m they pull with the other's P⁻¹·(m − m₀).
-    /// What has no variance has no precision either.
+    /// Information beyond another Gaussian that this one was updated from, as the fit of the readings between, and the point about which it is
+    /// expanded. The precision is P⁻¹ less the other's; at m the pull is the other's P⁻¹·(m − m₀). A number without variance has no precision.
     pub fn information_beyond(&self, other: &Self) -> (ContactFit<N>, [f64; N]) {
         let [own, before] = [self, other].map(|belief| Ldl::semidefinite(&belief.covariance).inverse());
         let moved: [f64; N] = std::array::from_fn(|i| self.mean[i] - other.mean[i]);
@@ -158,7 +157,7 @@ impl<const N: usize> Gaussian<N> {
 mod tests {
     use super::*;
 
-    /// In place, speed and force.
+    /// Place, speed and force.
     const BELIEF: Gaussian<3> = Gaussian {
         mean: [0.2, 0.5, 3.0],
         covariance: [[4e-6, 1e-6, 1e-4], [1e-6, 1e-2, 2e-4], [1e-4, 2e-4, 0.04]],

@@ -1,26 +1,26 @@
 //! Moving contacts: a Bayesian filter over position, speed and force, and a smoother over the whole recording.
 //!
-//! The hidden state is how many contacts touch, where, how fast and how hard each does, and how the surface swings. A belief
-//! about it is a few hypotheses, each with a weight: no contact, one or two, which came at some time and have moved since. A
+//! The hidden state is how many contacts touch, where, how fast and how hard each does, and how the surface swings. The belief
+//! is a few weighted hypotheses: no contact, one or two, which came at some time and have moved since. A
 //! hypothesis is a bank of Gaussians in the joint state of surface and contacts, one for each choice of a few motions from
 //! steady to brisk, which mix as motions change (interacting multiple models: H. Blom and Y. Bar-Shalom, IEEE Trans. Autom.
-//! Control 33, 1988). A reading moves them by its likelihood, expanded about the places that they expect (an iterated
-//! extended Kalman filter), and weighs them by how well they explain it. Hypotheses are born where the reading by itself could
-//! have come from, so a mirror image or a wide valley is several of them (a Gaussian sum: D. Alspach and H. Sorenson, same
-//! Trans. 17, 1972); a second contact is born beside the one that is followed; and each contact of a hypothesis may let go,
-//! which makes another hypothesis. Those that readings contradict fade and are dropped.
+//! Control 33, 1988). A reading updates them by its likelihood, expanded about their predicted places (an iterated
+//! extended Kalman filter), and weights them by how well they explain it. Hypotheses are born at every place that explains the
+//! reading by itself, so a mirror image or a wide valley becomes several of them (a Gaussian sum: D. Alspach and H. Sorenson, same
+//! Trans. 17, 1972). A second contact is born beside the one that is tracked. Each contact of a hypothesis may let go,
+//! which makes another hypothesis. Hypotheses that readings contradict lose weight and are dropped.
 //!
-//! A surface that swings has two numbers of its own in the state, the force of its first mode and how fast that changes:
-//! they drive nothing but the readings, are driven by the contacts, and outlast them.
+//! A surface that swings adds two numbers to the state, the force of its first mode and its rate of change. The contacts
+//! drive them; they affect only the readings, and outlast the contacts.
 //!
-//! A grid of positions and speeds that resolves what a track reaches would have some 10⁵ cells; within a valley of the
-//! likelihood a Gaussian says the same to good approximation, as soon as a contact has been seen for some readings.
+//! A grid of positions and speeds that resolves a track would have some 10⁵ cells. Within a valley of the
+//! likelihood a Gaussian is a good approximation, as soon as a contact has lasted for some readings.
 //!
-//! On a plane there is one contact, whose motions along and across are alike and independent, and the surface
-//! is taken to be in balance; the rest is the same.
+//! On a plane there is one contact. Its motions along and across are alike and independent, and the surface
+//! is modelled in balance; the rest is as on a line.
 //!
-//! The smoother goes back over a hypothesis with what came later, by the recursion of H. Rauch, F. Tung and C. Striebel (AIAA
-//! Journal 3, 1965) for each motion.
+//! The smoother updates a hypothesis backwards in time with the later readings, by the recursion of H. Rauch, F. Tung and C. Striebel (AIAA Journal
+//! 3, 1965) for each motion.
 
 mod bank;
 mod belief;
@@ -54,15 +54,15 @@ pub struct TrackerConfig {
     pub speed_sd_m_per_s: f64,
     /// Drift of an unknown force in a second, as a share of it.
     pub force_drift: f64,
-    /// Rate, a second, at which a contact comes while the surface is untouched, and goes while something does.
+    /// Rate, a second, at which a contact comes on an untouched surface, and at which one goes.
     pub changes_per_s: f64,
     /// Rate, a second, at which a contact goes and is at once somewhere else.
     pub jumps_per_s: f64,
-    /// First mode of the surface, where that is known; else it is taken to be in balance.
+    /// First mode of the surface, where it is known; else the surface is assumed to be in balance.
     pub swing: Option<Swing>,
-    /// Drift of the channels; where none is stated, one is followed if the untouched rows of the calibration show it.
+    /// Drift of the channels; `None` tracks a drift only if the untouched rows of the calibration show one.
     pub drift: Option<Drift>,
-    /// Creep of the surface, where that is known; else there is none.
+    /// Creep of the surface; `None` without creep.
     pub creep: Option<Creep>,
 }
 
@@ -93,7 +93,7 @@ impl Default for TrackerConfig {
     }
 }
 
-/// Below this share of the probability, one hypothesis does not speak for all.
+/// Least share of the probability from which on one hypothesis gives the result alone.
 const SURE: f64 = 0.98;
 
 /// State of all contacts at one reading.
@@ -101,15 +101,15 @@ const SURE: f64 = 0.98;
 pub struct Track {
     /// Time of the reading, in seconds.
     pub time_s: f64,
-    /// The probabilities that nothing touches, that one contact does, and that two do.
+    /// The probabilities of no contact, one contact and two.
     pub numbers: [f64; 3],
-    /// The contacts, as many as is most probable. Each keeps its place in the list while it is followed.
+    /// The contacts, as many as is most probable. Each keeps its place in the list while it is tracked.
     pub contacts: Vec<Tracked>,
     /// Estimate from this reading only.
     pub single: Estimate,
 }
 
-/// A contact that is followed.
+/// A contact that is tracked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracked {
     /// Position along the surface, in metres.
@@ -118,14 +118,14 @@ pub struct Tracked {
     pub speed_m_per_s: f64,
     /// Force, in newtons.
     pub force_n: f64,
-    /// Standard deviations of the three, those of position and force with what calibration leaves.
+    /// Standard deviations of the three; those of position and force include the calibration's uncertainty.
     pub sd: [f64; 3],
     /// The 95 % interval of the position, in metres.
     pub x_95_m: (f64, f64),
-    /// The 95 % interval of the force in newtons, where calibration leaves more of it open than the readings do: beside an end force and place
-    /// trade off, so that the logarithm of the force is told, not the force; `None` where that is normal.
+    /// The 95 % interval of the force in newtons, where the calibration's variance of the force exceeds that of the readings. Beside an end force
+    /// and place trade off, so that the logarithm of the force is normal. `None` where the force itself is normal.
     pub force_95_n: Option<(f64, f64)>,
-    /// Position and speed across a plane; nothing on a line.
+    /// Position and speed across a plane; `None` on a line.
     pub across: Option<Across>,
 }
 
@@ -136,7 +136,7 @@ pub struct Across {
     pub y_m: f64,
     /// Speed across, in m/s.
     pub speed_m_per_s: f64,
-    /// Standard deviations of the two, the position's with what calibration leaves.
+    /// Standard deviations of the two; the position's includes the calibration's uncertainty.
     pub sd: [f64; 2],
     /// The 95 % interval of y, in metres.
     pub y_95_m: (f64, f64),
@@ -144,28 +144,28 @@ pub struct Across {
     pub covariance_m2: f64,
 }
 
-/// A reading that cannot be followed.
+/// A reading that cannot be tracked.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TrackError {
-    /// Time does not go on.
+    /// The time is not later than that of the reading before.
     #[error("the reading is of {time_s} s; it must be later than the one before, of {before_s} s")]
     Time {
         /// Time, in seconds.
         time_s: f64,
-        /// The time of the one before.
+        /// Time of the reading before, in seconds.
         before_s: f64,
     },
 }
 
 impl Track {
-    /// The probability that something touches.
+    /// The probability of at least one contact.
     pub fn touching(&self) -> f64 {
         (self.numbers[1] + self.numbers[2]).clamp(0.0, 1.0)
     }
 }
 
 impl Tracked {
-    /// As the estimate of a reading has it; how the force varies with the place is not told.
+    /// The contact as the estimate of a single reading, with a covariance of 0 between position and force.
     pub fn estimate(&self) -> ContactEstimate {
         let [sd_m, _, sd_n] = self.sd;
         let (y_m, y_95_m, xy, yy) = self.across.map_or((0.0, (0.0, 0.0), 0.0, 0.0), |across| {
@@ -261,13 +261,13 @@ impl Tracked {
         }
     }
 
-    /// Adds variances of the place, xx, xy and yy, and of the force, on a surface of this extent under contacts of no more than a greatest force.
+    /// Adds variances of the place, xx, xy and yy, and of the force, on a surface of this extent, with contacts up to a greatest force.
     fn widen(&mut self, [xx, xy, yy, force]: [f64; 4], extent: Extent, greatest_n: f64) {
         let wider = |at_m: f64, (low_m, high_m): (f64, f64), variance: f64, side_m: f64| {
             let half = |own_m: f64| (own_m * own_m + NORMAL_95 * NORMAL_95 * variance).sqrt();
             clamped_interval((at_m - half(at_m - low_m), at_m + half(high_m - at_m)), side_m)
         };
-        // Nothing is known less than of a uniform distribution.
+        // At most the standard deviation of a uniform distribution.
         let at_most = |variance: f64, side: f64| variance.sqrt().min(side / 12f64.sqrt());
         self.x_95_m = wider(self.x_m, self.x_95_m, xx, extent.length_m());
         self.sd[0] = at_most(self.sd[0].powi(2) + xx, extent.length_m());
@@ -281,8 +281,8 @@ impl Tracked {
     }
 }
 
-/// The 95 % interval of a force whose logarithm is normal where it trades off against the place, or that ends at the greatest force; `None` of a force that is
-/// normal.
+/// The 95 % interval of a force that trades off against the place, so that its logarithm is normal, or that ends at the greatest force; `None`
+/// for a normal force.
 fn force_interval_n(force_n: f64, sd_n: f64, trades_off: bool, greatest_n: f64) -> Option<(f64, f64)> {
     let most_n = greatest_n.max(force_n);
     if trades_off && force_n > 0.0 {
@@ -293,7 +293,7 @@ fn force_interval_n(force_n: f64, sd_n: f64, trades_off: bool, greatest_n: f64) 
     (high_n > most_n).then_some((low_n, most_n))
 }
 
-/// The most probable contact of a plane, with the covariance about it of all that are held possible.
+/// The most probable contact of a plane, with the covariance about it of all hypotheses.
 fn spread(best: &Moments, beliefs: &[(f64, Vec<Moments>)], sum: f64) -> Moments {
     let mut spread = Moments { variance: [0.0; 5], covariance_m2: 0.0, ..*best };
     for (weight, one) in beliefs.iter().filter_map(|(weight, contacts)| Some((weight, contacts.first()?))) {

@@ -5,19 +5,20 @@
 //!
 //!   y = s + c·z + d + n,  s = h(θ),  τ·ż = s − z,  ḋ = v + w·ξ,  v̇ = −v/τ_v + r·√(2/τ_v)·η
 //!
-//! with ξ and η white. A fresh press reads s, which is what calibration learns; one that is held grows by c·s, and the remainder of it fades when it
-//! has been let go (the standard linear solid: W. N. Findley and others, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976, chapter 5).
+//! with ξ and η white. A fresh press reads s, which is what calibration learns. Under a constant press the reading grows by c·s, and the remainder
+//! fades after the release (the standard linear solid: W. N. Findley and others, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976,
+//! chapter 5).
 //!
 //! **Creep** needs no contact: between two readings, a = 1 − exp(−T/τ) apart, z goes a of its way to s, so y less drift gives
-//! s = (y − c·(1 − a)·z)/(1 + c·a), channel by channel, and s is what is followed.
+//! s = (y − c·(1 − a)·z)/(1 + c·a), channel by channel, and s is what is tracked.
 //!
-//! **Drift** follows from what contacts do not explain. Where contacts touch, a drift along ∂h/∂θ cannot be distinguished from their motion: each block's θ is taken for
-//! unknown altogether, so that only the part across tells of d (a flat prior of θ, as in the consider filter of S. F. Schmidt, Application of
-//! State-Space Methods to Navigation Problems, 1966). The part along is carried on by v, and its doubt is the contacts' doubt: the covariance
-//! of d, brought to θ by least squares, is added to theirs, as it does not average out.
+//! **Drift** follows from what contacts do not explain. Where contacts touch, a drift along ∂h/∂θ cannot be distinguished from their motion. So
+//! each block's θ is treated as unknown, and only the part across determines d (a flat prior of θ, as in the consider filter of S. F. Schmidt,
+//! Application of State-Space Methods to Navigation Problems, 1966). The part along is predicted by v, and its uncertainty is added to that of the
+//! contacts: the covariance of d, projected on θ by least squares, is added to theirs, as it does not average out.
 //!
-//! The size of the drift is learnt: nine filters, of three walks w and three rates r, run beside one another and are weighed by how probable they
-//! find the untouched readings (D. T. Magill, IEEE Trans. Autom. Control 10, 1965).
+//! The size of the drift is learnt: nine filters, of three walks w and three rates r, run beside one another, weighted by their likelihoods of the
+//! untouched readings (D. T. Magill, IEEE Trans. Autom. Control 10, 1965).
 
 use super::Tracked;
 use crate::likelihood::{Likelihood, Linearisation};
@@ -27,19 +28,19 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::small::{Ldl, Matrix, dot, form};
 use palpate_numerics::{Cholesky, push_rest};
 
-/// Drift that a tracker reckons with, in standard deviations of each channel's noise.
+/// Drift of the offsets in the tracker's model, in standard deviations of each channel's noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// Random walks that are held possible, by their standard deviation after a second.
+    /// Candidate random walks, by their standard deviation after a second.
     pub walks_per_root_s: [f64; 3],
-    /// Rates that are held possible, by their standard deviation, a second.
+    /// Candidate rates, by their standard deviation, a second.
     pub rates_per_s: [f64; 3],
     /// Correlation time of the rate, in seconds.
     pub rate_s: f64,
 }
 
 impl Drift {
-    /// The drift whose greatest walk is at least this many standard deviations of the noise after a second.
+    /// The drift with a greatest walk of at least this many standard deviations of the noise after a second.
     pub(super) fn up_to(walk_per_root_s: f64) -> Self {
         let mut drift = Self::default();
         let [.., greatest] = &mut drift.walks_per_root_s;
@@ -49,7 +50,7 @@ impl Drift {
 }
 
 impl Default for Drift {
-    /// From none to a tenth of the noise a second, which keeps its course for some minutes.
+    /// Walks and rates of up to a tenth of the noise in a second; rates are correlated over some minutes.
     fn default() -> Self {
         Self { walks_per_root_s: [1e-3, 0.01, 0.1], rates_per_s: [0.0, 0.01, 0.1], rate_s: 300.0 }
     }
@@ -58,7 +59,7 @@ impl Default for Drift {
 /// Creep of a soft surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Creep {
-    /// Growth of a reading that is held for long, as a share of that of a fresh press: 0 to 1.
+    /// Growth of a reading under a constant press, as a share of that of a fresh press: 0 to 1.
     pub share: f64,
     /// Time in which all but an e-th of it has come, in seconds; greater than 0.
     pub time_s: f64,
@@ -66,17 +67,17 @@ pub struct Creep {
 
 /// Time of the readings that are one observation of the drift, in seconds.
 const BLOCK_S: f64 = 0.2;
-/// Longest time that a drift is held to go on unseen, in seconds: a longer silence makes it no more uncertain.
+/// Longest time that a drift grows without observations, in seconds; a longer silence makes it no more uncertain.
 const UNSEEN_S: f64 = 600.0;
 /// Variance along the contacts' unknowns, over that of the noise: flat.
 const FLAT: f64 = 1e8;
 /// Share of a derivative that has to lie across the others for it to count.
 const PARALLEL: f64 = 1e-9;
-/// Blocks over which the calibration's error of a contact is the same, so that they tell no more than one does.
+/// Blocks over which the calibration's error of a contact is the same, so that together they determine no more than one does.
 const ALIKE: f64 = 300.0;
 /// Share of a filter's evidence that is kept from block to block: some minutes.
 const KEPT: f64 = 0.999;
-/// Least probability of the number of contacts for a reading to tell of the drift.
+/// Least probability of the number of contacts for a reading to update the drift.
 const SURE: f64 = 0.95;
 
 /// State of drift and creep.
@@ -96,7 +97,7 @@ struct Block {
     count: f64,
     start_s: f64,
     times_s: f64,
-    /// Sum of the offsets that they show.
+    /// Sum of the offsets of these readings.
     offsets: Vec<f64>,
     /// Sums of x, y and force of each contact.
     contacts: Vec<[f64; 3]>,
@@ -125,7 +126,7 @@ struct Model {
 }
 
 impl SlowState {
-    /// The state of a tracker that has seen nothing; `channels` of a reading.
+    /// The state before the first reading; `channels` is the number of channels.
     pub fn new(
         likelihood: &dyn Likelihood,
         channels: usize,
@@ -144,7 +145,7 @@ impl SlowState {
         let follow = |shown: &UntouchedDrift| {
             Drift::up_to(in_noise(&shown.walk_per_root_s).into_iter().fold(0.0, f64::max))
         };
-        // As of an offset that is anywhere in the range with the same probability.
+        // Standard deviation of an offset that is uniform over the range.
         let within = |shown: &UntouchedDrift| {
             in_noise(&shown.range).iter().map(|range| range / 12f64.sqrt()).collect()
         };
@@ -158,7 +159,7 @@ impl SlowState {
         }
     }
 
-    /// Takes drift and creep off a reading of `time_s`, `duration_s` after the one before: off its whitened values and off itself.
+    /// Subtracts drift and creep from a reading at `time_s`, `duration_s` after the one before: from its whitened values and from itself.
     pub fn take_off(
         &mut self,
         time_s: f64,
@@ -173,7 +174,7 @@ impl SlowState {
                 *value -= drift.offset_at(i, time_s);
             }
             if let Some((Creep { share, time_s }, states)) = &mut self.creep {
-                // Before the first reading nothing touched for long, as far as is known.
+                // The surface counts as untouched for a long time before the first reading.
                 let way = duration_s.map_or(0.0, |duration_s| -(-duration_s / *time_s).exp_m1());
                 let state = &mut states[i];
                 *value = (*value - *share * (1.0 - way) * *state) / (1.0 + *share * way);
@@ -184,7 +185,7 @@ impl SlowState {
         }
     }
 
-    /// Learns from a reading that was taken off, under these contacts; `probability` is that of their number.
+    /// Updates the drift by a reading less drift and creep, under these contacts; `probability` is that of their number.
     pub fn learn(
         &mut self,
         likelihood: &dyn Likelihood,
@@ -212,19 +213,19 @@ impl SlowState {
         );
     }
 
-    /// Covariance of the drift, in the noise's; `None` where it is not followed.
+    /// Covariance of the drift, in units of the noise; `None` where the drift is not tracked.
     pub fn drift_covariance(&self) -> Option<&Array2<f64>> {
         self.drift.as_ref().map(|drift| &drift.covariance)
     }
 
-    /// The baseline that readings are brought to has moved by so much in each channel.
+    /// Adapts to a baseline of the readings that has moved by `by` in each channel.
     pub fn move_baseline(&mut self, by: &[f64]) {
         let Some(drift) = &mut self.drift else { return };
         let moved: Vec<f64> = self.noise.iter().map(|(channel, noise)| by[*channel] / noise).collect();
         let is_new = moved.iter().any(|moved| moved.abs() > 1.0);
         if is_new {
             self.block = Block::default();
-            // Another baseline, which its readings' noise is in.
+            // A new baseline, with the noise of its readings.
             *drift = DriftFilter::new(drift.config, &vec![1.0; self.noise.len()]);
             self.creep.iter_mut().for_each(|(_, states)| states.fill(0.0));
         } else {
@@ -286,7 +287,7 @@ impl Block {
 }
 
 impl DriftFilter {
-    /// A filter of offsets that are, at first, within so many standard deviations of the noise, and at least one.
+    /// A filter of offsets with these initial standard deviations, in units of the noise, and at least 1.
     fn new(config: Drift, offset_sd: &[f64]) -> Self {
         let channels = offset_sd.len();
         let variance = |i: usize| offset_sd[i].powi(2).max(1.0);
@@ -312,7 +313,7 @@ impl DriftFilter {
         self.offset[i] + since_s * self.rate[i]
     }
 
-    /// Takes the mean of a block of readings for an observation of d, but along the contacts' unknowns.
+    /// Uses the mean of a block of readings as an observation of d, except along the contacts' unknowns.
     fn observe(&mut self, likelihood: &dyn Likelihood, block: &Block) {
         let mean = |sum: f64| sum / block.count;
         let time_s = mean(block.times_s);
@@ -377,7 +378,7 @@ impl DriftFilter {
     }
 }
 
-/// Adds the uncertainty that a drift of this covariance leaves to that of the contacts.
+/// Adds the uncertainty by a drift of this covariance to that of the contacts.
 pub(super) fn widen(covariance: &Array2<f64>, likelihood: &dyn Likelihood, tracked: &mut [Tracked]) {
     let contacts: Vec<Contact> = tracked.iter().map(contact_of).collect();
     let greatest_n = likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1);
@@ -417,7 +418,7 @@ fn covariance_of_contacts(covariance: &Array2<f64>, at: &Linearisation) -> Matri
 }
 
 impl Model {
-    /// Lets time pass.
+    /// Predicts the state after a time.
     fn predict(&mut self, duration_s: f64, rate_s: f64) {
         let channels = self.mean.len() / 2;
         let (d, v) = (s![..channels], s![channels..]);
@@ -439,7 +440,7 @@ impl Model {
         self.covariance.slice_mut(dv).assign(&moved);
         self.covariance.slice_mut(vd).assign(&moved.t());
         self.covariance.slice_mut(vv).mapv_inplace(|rates| stays * stays * rates);
-        // The rate's unrest in the step, as if it came evenly.
+        // The rate's process noise in the step, as if it were spread evenly.
         let unrest = self.rate * self.rate * (1.0 - stays * stays);
         for i in 0..channels {
             let at = channels + i;
@@ -451,7 +452,8 @@ impl Model {
         }
     }
 
-    /// Takes an observation of d with its noise; the logarithm of how probable it was. `None` where it is too far off to be one, and nothing is learnt.
+    /// Updates d by an observation with its noise; returns the log probability of the observation. `None`, without an update, for one that is too far
+    /// off.
     fn update(&mut self, shown: &Array1<f64>, noise: &Array2<f64>) -> Option<f64> {
         let channels = shown.len();
         let off = shown - &self.mean.slice(s![..channels]);
@@ -565,7 +567,7 @@ mod tests {
         }
     }
 
-    /// Readings that are whitened already, on a surface that nothing touches.
+    /// Readings that are whitened already, on an untouched surface.
     struct Nothing(usize);
 
     impl Likelihood for Nothing {

@@ -54,7 +54,7 @@ pub(super) fn timed_readings(rig: &Example, motion: Motion, force_n: f64, seed: 
     (0..(motion.duration_s() * RATE_HZ) as usize).map(at).collect()
 }
 
-/// Number of readings that a tracker takes for a contact where there is none, or the other way round.
+/// Number of readings with a wrong detection: a contact where there is none, or the other way round.
 pub(super) fn wrongly_touching(likelihood: impl Likelihood + 'static, readings: &[Timed]) -> usize {
     let mut tracker = Tracker::new(Arc::new(likelihood), TrackerConfig::default());
     let mut wrong = 0;
@@ -71,8 +71,8 @@ fn readings(rig: &Example, motion: Motion, seed: u64) -> Vec<Timed> {
     timed_readings(rig, motion, 3.0, seed)
 }
 
-/// Asserts that the mean error of the readings, one by one, is `filter` times that of the filter and `smoother` times that of the
-/// smoother at least, and that the filter's 95 % regions hold the contact about as often as they say.
+/// Asserts that the mean error of single readings is at least `filter` times that of the filter and `smoother` times that of the smoother, and that
+/// the filter's 95 % regions contain the contact about that often.
 pub(super) fn assert_closer_than_readings(
     likelihood: impl Likelihood + 'static,
     readings: &[Timed],
@@ -130,7 +130,7 @@ fn a_contact_that_lets_go_is_lost_and_found_again() {
     let motion = along_the_beam().with_speed(1.0).unwrap().with_passes(2).unwrap();
     let motion = motion.with_lifts(0.2, 0.02).unwrap();
     let wrong = wrongly_touching(likelihood(&rig, None), &readings(&rig, motion, 3));
-    // Only while the force is too small to be told from noise.
+    // Only while the force is too small to be distinguished from noise.
     assert!(wrong <= 15, "{wrong}");
 }
 
@@ -282,7 +282,7 @@ pub(super) fn assert_numbers_after_absurd_readings<const C: usize>(
     }
 }
 
-/// The derivatives of a linearisation against differences, and its reading against the noise-free one of the fits: no misfit is left.
+/// The derivatives of a linearisation against differences, and its reading against the noise-free one of the fits: the misfit is 0.
 pub(super) fn assert_linearised(likelihood: &dyn Likelihood, contact: Contact) {
     let at = likelihood.linearised(&[contact]);
     let forces = if likelihood.known_force_n().is_some() { 0.0 } else { 1.0 };
@@ -314,7 +314,7 @@ fn linearisations_are_those_of_differences() {
     }
 }
 
-/// A baseline that moves is taken off the drift, and the contacts that are followed stay.
+/// A move of the baseline is subtracted from the drift, and the tracked contacts stay.
 #[test]
 fn a_baseline_that_moves_moves_no_contact() {
     let rig = rig();
@@ -339,7 +339,7 @@ fn a_baseline_that_moves_moves_no_contact() {
     }
 }
 
-/// Force and place of a contact that is held beside an end trade off by what calibration leaves of them, however many readings there are.
+/// Beside an end, force and place of a constant contact trade off. They stay within the uncertainty of calibration, for any number of readings.
 #[test]
 fn the_force_of_a_held_contact_is_within_what_calibration_leaves() {
     let mut rig = crate::fixtures::paper(5e-6, 10);
@@ -385,7 +385,7 @@ fn contacts_end_within_the_residue_of_untouched_rows() {
     const EACH: usize = 30;
     let rig = rig();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
-    // An untouched row after each press, whose residue is many times the noise.
+    // An untouched row after each press, with a residue that is many times the noise.
     let mut recording = rig.simulate(1);
     let presses = std::mem::take(&mut recording.rows);
     for (i, press) in presses.into_iter().enumerate() {
@@ -429,7 +429,7 @@ fn contacts_end_within_the_residue_of_untouched_rows() {
     assert!(by_noise > all / 4, "{by_noise} of {all}");
 }
 
-/// What a locator adds to its intervals by its held-out presses, the filter and the smoother add too.
+/// The check of the held-out presses widens the intervals of the filter and the smoother as it widens those of the locator.
 #[test]
 fn the_check_of_the_locators_intervals_widens_tracks() {
     let rig = rig();

@@ -1,4 +1,4 @@
-//! The filter: each reading as it comes.
+//! The filter: it updates the hypotheses reading by reading.
 
 use super::bank::Step;
 use super::belief::{Belief, Moments, Observation};
@@ -12,18 +12,18 @@ use palpate_core::{Estimate, Status};
 use palpate_numerics::watch::{Cancelled, Watch};
 use std::sync::Arc;
 
-/// The most hypotheses that are held possible at once.
+/// The most hypotheses at once.
 const MOST_HYPOTHESES: usize = 12;
-/// Logarithm of how many times less probable than the best a hypothesis is that is dropped.
+/// Hypotheses that are less probable than the best by more than this, in logarithms, are dropped.
 const MOST_LOG_RATIO: f64 = 16.0;
-/// The most contacts that are followed at once.
+/// The most contacts that are tracked at once.
 const MOST_CONTACTS: usize = 2;
 
-/// A contact that moves a reading by less than this, in squares of the noise's standard deviation over all channels, is as
-/// likely as not to be gone with the next one: it could be anything anywhere.
+/// A contact that moves a reading by less than this is as likely as not to be gone with the next one: any light contact anywhere would explain the
+/// readings as well. In squares of the noise's standard deviation, over all channels.
 const UNSEEN: f64 = 9.0;
 
-/// Follows contacts through readings in time: up to two on a line, one on a plane.
+/// Tracks contacts through readings in time: up to two on a line, one on a plane.
 ///
 /// ```
 /// use palpate_estimators::estimator::{Tracker, TrackerConfig};
@@ -51,26 +51,26 @@ pub struct Tracker {
     time_s: Option<f64>,
     next_id: u64,
     whitened: Vec<f64>,
-    /// Drift and creep, where they are followed; made with the first reading.
+    /// Drift and creep, where they are tracked; made with the first reading.
     slow: Option<SlowState>,
 }
 
 /// Hypothesis: a surface with some contacts that came at some time and have moved since.
 #[derive(Clone, Debug, PartialEq)]
 struct Hypothesis {
-    /// Tells it from every other one.
+    /// Unique number of the hypothesis.
     id: u64,
     /// ln of its probability.
     weight: f64,
     belief: Belief,
-    /// Whether the readings hardly show the first contact, or the second.
+    /// Whether the readings hardly determine the first contact, or the second.
     unseen: [bool; MOST_CONTACTS],
 }
 
 /// Logarithms of the probabilities with which contacts have just come.
 #[derive(Clone, Copy, Debug)]
 struct LogBirthProbabilities {
-    /// One, where nothing was or something else is no more.
+    /// One contact, on an untouched surface or after another one let go.
     one: f64,
     /// Two, likewise.
     two: f64,
@@ -79,7 +79,7 @@ struct LogBirthProbabilities {
 }
 
 impl Tracker {
-    /// A tracker that has seen nothing.
+    /// A tracker before its first reading.
     pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
         Self {
             force_prior: likelihood.force_range().map(ForcePrior::from),
@@ -96,7 +96,7 @@ impl Tracker {
     /// Takes the next reading: one finite value a channel, at `time_s` seconds.
     ///
     /// # Errors
-    /// [`TrackError`] when the time is not later than before; the reading is then as if it had not been.
+    /// [`TrackError`] when the time is not later than before; such a reading has no effect.
     pub fn follow(&mut self, time_s: f64, reading: &[f64]) -> Result<Track, TrackError> {
         let duration_s = match self.time_s {
             Some(before_s) if time_s > before_s => Some(time_s - before_s),
@@ -114,7 +114,7 @@ impl Tracker {
         let mut single = likelihood.single_estimate(&reading);
         let log_births = self.predict(duration_s);
         if is_residue {
-            // The likelihood knows noise alone: it would explain the residue by a light contact, which never ends.
+            // The likelihood models noise alone: it would explain the residue by a light contact, which never ends.
             single = Estimate::of_contact(single.contact, Status::NoContact);
             self.end_contacts();
         }
@@ -130,7 +130,7 @@ impl Tracker {
         let mut track = self.track(time_s, single, moments);
         if let Some(slow) = &mut self.slow {
             let probability = track.numbers[track.contacts.len()];
-            // What swings is no drift.
+            // A surface that swings does not drift.
             if self.config.swing.is_none() || track.contacts.is_empty() {
                 slow.learn(&*likelihood, &whitened, &track.contacts, probability);
             }
@@ -144,15 +144,15 @@ impl Tracker {
         Ok(track)
     }
 
-    /// Says that readings are brought to a baseline that has moved by so much in each channel, as by a tare: what has drifted since is counted from there. A
-    /// baseline that has moved by more than the noise is another one, from which all begins anew.
+    /// Adapts to a baseline of the readings that has moved by `by` in each channel, as by a tare; drift is counted from the new baseline. After a move
+    /// by more than the noise, drift and creep are estimated anew.
     pub fn move_baseline(&mut self, by: &[f64]) {
         if let Some(slow) = self.slow(by.len()) {
             slow.move_baseline(by);
         }
     }
 
-    /// Drift and creep, where they are followed.
+    /// Drift and creep, where they are tracked.
     fn slow(&mut self, channels: usize) -> Option<&mut SlowState> {
         let TrackerConfig { drift, creep, .. } = self.config;
         let drifts = drift.is_some() || self.likelihood.untouched_drift().is_some();
@@ -170,9 +170,9 @@ impl Tracker {
         self.likelihood.most_contacts().min(MOST_CONTACTS)
     }
 
-    /// Moves every hypothesis, and lets contacts come and go.
+    /// Predicts every hypothesis; contacts may come and go.
     fn predict(&mut self, duration_s: Option<f64>) -> LogBirthProbabilities {
-        // Before the first reading, any number of contacts is as probable.
+        // Before the first reading, all numbers of contacts are equally probable.
         let Some(duration_s) = duration_s else {
             let each = -((1 + self.most_contacts()) as f64).ln();
             let belief = Belief::nothing();
@@ -206,7 +206,7 @@ impl Tracker {
         }
     }
 
-    /// Keeps the hypothesis alone that nothing touches.
+    /// Keeps only the hypothesis without contact.
     fn end_contacts(&mut self) {
         self.hypotheses.retain(|hypothesis| hypothesis.belief.contacts() == 0);
         if self.hypotheses.is_empty() {
@@ -214,7 +214,7 @@ impl Tracker {
         }
     }
 
-    /// Adds the beliefs that remain when contacts let go. There is one hypothesis of nothing, which stands for all.
+    /// Adds the beliefs that remain when contacts let go. All beliefs without contact are merged into one hypothesis.
     fn add_remaining(&mut self, left: Vec<(f64, Belief)>) {
         for (weight, belief) in left {
             let same = self.hypotheses.iter_mut().find(|hypothesis| hypothesis.belief.contacts() == 0);
@@ -279,13 +279,13 @@ impl Tracker {
         }
     }
 
-    /// Makes the weights probabilities again, drops what is improbable, and lets the more probable of two that are one
-    /// stand for both; the moments of what is left.
+    /// Normalises the weights to probabilities, drops improbable hypotheses, and merges two that are the same into the more probable one. Returns the
+    /// moments of the remaining ones.
     fn prune(&mut self) -> Vec<Vec<Moments>> {
         self.hypotheses.sort_by(|a, b| b.weight.total_cmp(&a.weight));
         let best = self.hypotheses.first().map_or(f64::NEG_INFINITY, |first| first.weight);
         if best == f64::NEG_INFINITY {
-            // A reading that nothing explains at all tells nothing: begin again.
+            // A reading that no hypothesis explains has no information: restart.
             self.hypotheses.clear();
             self.add(0.0, Belief::nothing());
             return vec![Vec::new()];
@@ -293,7 +293,7 @@ impl Tracker {
         let mut kept: Vec<Hypothesis> = Vec::with_capacity(MOST_HYPOTHESES);
         let mut moments: Vec<Vec<Moments>> = Vec::with_capacity(MOST_HYPOTHESES);
         for mut hypothesis in self.hypotheses.drain(..) {
-            // That nothing touches stays possible, as a start for what comes.
+            // The hypothesis without contact stays, as a start for later contacts.
             let nothing = hypothesis.belief.contacts() == 0;
             let probable = hypothesis.weight > best - MOST_LOG_RATIO;
             if !nothing && (!probable || kept.len() >= MOST_HYPOTHESES) {
@@ -338,24 +338,24 @@ impl Tracker {
     }
 }
 
-/// Whether two sets of contacts are the same, in either order; so are two beliefs that nothing touches.
+/// Whether two sets of contacts are the same, in either order; two empty sets are the same.
 fn are_same_contacts(a: &[Moments], b: &[Moments]) -> bool {
     let same = |b: &mut dyn Iterator<Item = &Moments>| a.iter().zip(b).all(|(a, b)| a.is_same_contact(b));
     a.len() == b.len() && (same(&mut b.iter()) || same(&mut b.iter().rev()))
 }
 
-/// A [`Tracker`] that remembers, so that it can go back.
+/// A [`Tracker`] with the history that smoothing needs.
 pub struct SmoothTracker {
     tracker: Tracker,
     tracks: Vec<Track>,
     /// The hypotheses with contacts at each reading, by their ids.
     past: Vec<Vec<(u64, Belief)>>,
-    /// Covariance of the drift after each reading; empty where none is followed.
+    /// Covariance of the drift after each reading; empty where no drift is tracked.
     drift_covariances: Vec<Array2<f64>>,
 }
 
 impl SmoothTracker {
-    /// A tracker that has seen nothing.
+    /// A smoother before its first reading.
     pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
         Self {
             tracker: Tracker::new(likelihood, config),
@@ -373,7 +373,7 @@ impl SmoothTracker {
         let track = self.tracker.follow(time_s, reading)?;
         let lasts = |id: u64| self.tracker.hypotheses.iter().any(|hypothesis| hypothesis.id == id);
         if let Some(before) = self.past.last_mut() {
-            // Nobody goes back to what neither lasted nor was shown.
+            // Smoothing needs only hypotheses that lasted or were reported.
             let shown = before.first().map(|(id, _)| *id);
             before.retain(|(id, _)| shown == Some(*id) || lasts(*id));
         }
@@ -381,7 +381,7 @@ impl SmoothTracker {
             self.tracker.hypotheses.iter().filter(|hypothesis| hypothesis.belief.contacts() > 0);
         let mut remembered: Vec<_> =
             with_contacts.map(|hypothesis| (hypothesis.id, hypothesis.belief.clone())).collect();
-        // The one that is shown comes first.
+        // The reported one comes first.
         remembered.sort_by_key(|(_, belief)| belief.contacts() != track.contacts.len());
         self.past.push(remembered);
         self.drift_covariances
@@ -395,16 +395,15 @@ impl SmoothTracker {
         &self.tracks
     }
 
-    /// Smoothed tracks, one a reading. The number of contacts stays what the filter found; of
-    /// the hypotheses it held, the one that lasted is gone back over.
+    /// Smoothed tracks, one a reading. The number of contacts stays that of the filter; among its hypotheses, the one that lasted is smoothed.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch stopped it.
     pub fn smoothed(&self, watch: Watch) -> Result<Vec<Track>, Cancelled> {
-        /// Readings between two looks at the watch.
+        /// Readings between two checks of the watch.
         const EACH: usize = 16;
         let mut smoothed = self.tracks.clone();
-        // The contacts at the reading after, as all readings show them.
+        // The contacts at the next reading, given all readings.
         let mut later: Option<(u64, Belief)> = None;
         for k in (0..smoothed.len()).rev() {
             if k % EACH == 0 {

@@ -15,8 +15,8 @@ pub(super) struct HeavyTails {
 impl HeavyTails {
     /// The most likely distribution of deviations with weights; `None` where a normal distribution explains them at the 5 % level, by the likelihood ratio.
     pub fn of_deviations(deviations: &[(f64, f64)]) -> Option<Self> {
-        /// Degrees of freedom that are tried, in powers of √2 of the least: with fewer than 2 there is no variance, and beyond 40 hardly a difference from a
-        /// normal distribution.
+        /// Degrees of freedom of the search, in powers of √2 of the least. With 2 or fewer the variance is not finite, and beyond 40 the
+        /// distribution hardly differs from a normal one.
         const LEAST: f64 = 2.5;
         const POWERS: i32 = 8;
         let total: f64 = deviations.iter().map(|(_, weight)| weight).sum();
@@ -43,8 +43,8 @@ impl HeavyTails {
         deviations.iter().map(of_one).sum()
     }
 
-    /// Bound of Σ d²/2 over some channels, at a rate of false alarms. d is the difference of two deviations of variance 1, of which such noise is at most the
-    /// given share.
+    /// Bound of Σ d²/2 over some channels, at a rate of false alarms. d is the difference of two deviations of variance 1, and such noise
+    /// makes up at most the given share of this variance.
     ///
     /// The sum of heavy-tailed variables is large where one of them is (Foss, Korshunov and Zachary, *An Introduction to Heavy-Tailed and Subexponential Distributions*,
     /// 2013): one of the two deviations of one channel exceeds x, and the other channels have their mean.

@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 const CHANNELS: usize = 6;
 
-/// Presses with an untouched row after each, whose residue has one part of its own and one that all channels share.
+/// Presses with an untouched row after each. The residue has a part for each channel, and a part that all channels share.
 fn recording(rng: &mut Xoshiro256PlusPlus, rests: usize, [own, shared]: [f64; 2], drift: f64) -> Recording {
     let mut rows = Vec::new();
     for i in 0..rests {
@@ -93,7 +93,7 @@ fn noise_explains_the_rests_of_19_recordings_in_20_and_no_residue() {
         };
         (0..400).filter(is_noise).count()
     };
-    // 380 expected of noise, and a little fewer where its square is not quite normal.
+    // 380 are expected for noise, and a little fewer as its square is not quite normal.
     let (noise, residue) = (explained(0.0), explained(1.0));
     assert!((362..=395).contains(&noise) && residue < 20, "{noise} {residue}");
 }
@@ -151,7 +151,7 @@ fn methods_without_a_rule_of_no_contact_have_one_by_untouched_rows() {
     };
     let places_m = (0..12).map(|i| LENGTH_M * (f64::from(i) + 0.5) / 12.0);
     let places_m_of_repeats = places_m.clone().flat_map(|x_m| [(x_m, 2.0), (x_m, 2.0)]);
-    // Untouched between the presses, and untouched before them all.
+    // Untouched rows between the presses, and untouched rows at the start.
     let between: Vec<Row> =
         places_m.clone().flat_map(|x_m| [(x_m, 2.0), (x_m, 0.0)]).map(|(x_m, f)| row(x_m, f)).collect();
     let asked = std::iter::repeat_n((0.1, 0.0), 20).chain(places_m.map(|x_m| (x_m, 2.0)));
@@ -206,6 +206,6 @@ fn heavy_tails_of_repeated_presses_bound_the_rests() {
         beyond += (0..ASKED).filter(|_| !scatter.contains(&asked())).count();
     }
     let found = beyond as f64 / (RECORDINGS * ASKED) as f64;
-    // The tail that far out follows from 720 values: its rate is right within a factor of five. By the variance alone it is 1.7 %.
+    // The far tail is estimated from 720 values: its rate is right within a factor of five. By the variance alone it is 1.7 %.
     assert!((0.2 * RATE..5.0 * RATE).contains(&found) && are_noise <= 4, "{found}, {are_noise}");
 }

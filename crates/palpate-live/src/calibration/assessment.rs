@@ -21,17 +21,17 @@ pub struct HeldOut {
     pub mean_m: f64,
 }
 
-/// Gain of more presses.
+/// Expected gain of more presses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gain {
-    /// By how much endlessly many presses would lower the expected error, in %.
+    /// Reduction of the expected error by an unlimited number of presses, in %.
     pub percent: f64,
-    /// Gain in % below which more presses are not worth it.
+    /// Gain in % below which more presses are not worthwhile.
     pub stop_percent: f64,
 }
 
 impl Gain {
-    /// True where more presses are not worth it.
+    /// True if more presses are not worthwhile.
     pub fn is_enough(&self) -> bool {
         self.percent < self.stop_percent
     }
@@ -40,21 +40,21 @@ impl Gain {
 /// Assessment of a calibration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Assessment {
-    /// Errors at positions held out; `None` where they are too few, or a fold cannot be fitted.
+    /// Errors at held-out positions; `None` if there are too few positions, or a fold cannot be fitted.
     pub held_out: Option<HeldOut>,
-    /// Error of each press at its position held out, in metres, in the recording's order; empty where they are not known.
+    /// Error of each press at its held-out position, in metres, in the order of the recording; empty if the errors are unknown.
     pub errors_m: Vec<Option<f64>>,
-    /// Gain of more presses; `None` where it is not known.
+    /// Gain of more presses; `None` if it is unknown.
     pub gain: Option<Gain>,
-    /// Reasons why something is not known.
+    /// Reasons why a result is missing.
     pub remarks: Vec<String>,
 }
 
 impl Assessment {
-    /// The assessment of a recording of a rig, which fits its estimator anew for every fold.
+    /// The assessment of a recording of a rig, with a new fit of the estimator for every fold.
     ///
     /// # Errors
-    /// [`Cancelled`] when the watch stopped it.
+    /// [`Cancelled`] if the watch stopped it.
     pub fn new(rig: &Rig, recording: &Recording, seed: u64, watch: Watch) -> Result<Self, Cancelled> {
         let mut own = Self::default();
         if recording.distinct_positions().len() >= FOLDS {
@@ -85,7 +85,7 @@ impl Assessment {
     }
 }
 
-/// Errors of a cross-validation in the order of the presses: its answers are in the order of its folds.
+/// Errors of a cross-validation in the order of the presses. The results of the evaluation are in the order of its folds.
 fn errors_by_press(recording: &Recording, evaluation: &Evaluation) -> Vec<Option<f64>> {
     let presses = recording.rows.iter().scan(0, |presses, row| {
         let press = row.touches().then_some(*presses);

@@ -2,13 +2,14 @@
 
 use super::stretch::{LONGEST_SPAN, REST_SPAN, Stretch, mean};
 
-/// Deviation of one reading that noise does not explain, in standard deviations: Gaussian noise reaches it once in 10¹⁴ values.
+/// Deviation of one reading above which it does not count as noise, in standard deviations: Gaussian noise reaches it once in 10¹⁴ values.
 pub const NOISE_LIMIT_SD: f64 = 8.0;
-/// Difference of the means of two halves of a stretch at rest, in standard deviations of that difference.
+/// Largest difference between the means of two halves of a stretch at rest, in standard deviations of that difference.
 const REST_SD: f64 = 3.5;
-/// Largest ratio of the variance about a line to that of successive differences: a logger that repeats every value 25 times has it. Above it, the surface moves.
+/// Largest ratio of the variance about a line to the variance of successive differences. A logger that repeats every value 25 times reaches it;
+/// above it, the surface moves.
 const LARGEST_CORRELATION: f64 = 25.0;
-/// Decimals that are tried for the resolution of a channel.
+/// Largest number of decimals that is tried for the resolution of a channel.
 const MOST_DECIMALS: i32 = 9;
 
 /// Noise and drift of a channel.
@@ -31,7 +32,8 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// The baseline of a stretch at rest, or one that drifts steadily for [`LONGEST_SPAN`]; `None` while the stretch is too short or the surface moves.
+    /// The baseline of a stretch at rest, or of one with a steady drift over [`LONGEST_SPAN`]; `None` while the stretch is too short or the surface
+    /// moves.
     pub fn learn(stretch: &Stretch) -> Option<Self> {
         let readings = stretch.for_noise()?;
         let span_s = -readings.first()?.0;
@@ -87,9 +89,9 @@ impl Baseline {
         a.iter().zip(b).zip(&self.noise).map(|((a, b), noise)| a * b / noise.sd.powi(2)).sum()
     }
 
-    /// True where the means of both halves of readings agree within the noise, the drift and `allowed` standard deviations of the noise.
+    /// True if the means of both halves of the readings agree within the noise, the drift and `allowed` standard deviations of the noise.
     ///
-    /// A change below the noise of one reading is always allowed, as single readings are recorded.
+    /// A change below the noise of one reading is always allowed, because single readings are recorded.
     pub fn is_at_rest(&self, readings: &[&[f64]], allowed: f64) -> bool {
         let (first, second) = readings.split_at(readings.len() / 2);
         let sd_of_difference = (1.0 / first.len() as f64 + 1.0 / second.len() as f64).sqrt();
@@ -97,7 +99,7 @@ impl Baseline {
         let (first, second) = (mean(first), mean(second));
         first.iter().zip(&second).zip(&self.noise).all(|((first, second), noise)| {
             let by_noise = REST_SD * sd_of_difference * noise.correlation.sqrt();
-            // Twice the drift that was learnt, as a drift changes slowly.
+            // Twice the learnt drift, because a drift changes slowly.
             let by_drift = 2.0 * noise.drift_per_s.abs() * half_s;
             (first - second).abs() <= (by_noise.max(1.0) + allowed) * noise.sd + by_drift
         })
@@ -113,7 +115,7 @@ impl Baseline {
 }
 
 impl Noise {
-    /// Noise of a channel from readings with their seconds; `None` where the channel moves.
+    /// Noise of a channel from readings with their seconds; `None` if the channel moves.
     ///
     /// The variance of independent readings is half the mean square of successive differences, which a slow drift leaves unchanged (von Neumann 1941).
     /// Filtered or repeated values have smaller differences than their scatter about a line: the ratio of both is the correlation.
@@ -133,7 +135,7 @@ impl Noise {
         let drift_per_s = if along > 0.0 { across / along } else { 0.0 };
         let residuals = values.iter().map(|(at_s, value)| value - mean - drift_per_s * (at_s - mean_s));
         let about_line = residuals.map(|residual| residual * residual).sum::<f64>() / (n - 2.0).max(1.0);
-        // A channel that has not moved yet may do so by any step of its converter.
+        // A channel that has been constant may still change by a step of its converter.
         let least_sd = (0.5 * resolution(&values)).max(1e-9 * mean.abs()).max(f64::MIN_POSITIVE.sqrt());
         let least = least_sd * least_sd;
         let correlation = about_line.max(least) / of_differences.max(least);
@@ -145,7 +147,7 @@ impl Noise {
     }
 }
 
-/// Decimal step of which all values are multiples, such as 1 for raw counts; 0 where there is none.
+/// Decimal step that divides all values, such as 1 for raw counts; 0 without such a step.
 fn resolution(values: &[(f64, f64)]) -> f64 {
     let is_multiple = |value: f64, scale: f64| {
         let scaled = value * scale;

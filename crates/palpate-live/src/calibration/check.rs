@@ -1,4 +1,4 @@
-//! Check of a locator at fresh places, which its calibration has not pressed.
+//! Check of a locator at fresh places, which were not pressed in the calibration.
 
 use super::plan::{Ruler, Weights};
 use super::press::Press;
@@ -11,16 +11,16 @@ use palpate_mechanics::surface::Extent;
 use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 
-/// Fresh places of a check.
+/// Number of fresh places of a check.
 pub const CHECK_PLACES: usize = 5;
 
-/// Presses of a check: at places between those of the calibration, with its weights in turn, or to `depths_m` in turn where a machine presses. None
-/// where the calibration has one place.
+/// Presses of a check, at places between those of the calibration. They use the weights of the calibration in turn, or `depths_m` in turn if a
+/// machine presses. Empty if the calibration has only one place.
 pub fn check_presses(rig: &Rig, rows: &[Row], weights: Weights, depths_m: &[f64]) -> Vec<Press> {
     let extent = rig.setup.surface().extent();
     let calibrated: Vec<Position> = rows.iter().filter(|row| row.touches()).map(|row| row.position).collect();
     let first_n = weights.first_n(rig);
-    // Presses of several depths have several forces.
+    // Presses to different depths have different forces.
     let by_depth = depths_m.iter().map(|depth_m| (first_n.filter(|_| depths_m.len() == 1), Some(*depth_m)));
     let by_weight = [first_n, weights.second_n.or(first_n)].map(|force_n| (force_n, None));
     let strengths: Vec<_> = if depths_m.is_empty() { by_weight.to_vec() } else { by_depth.collect() };
@@ -28,11 +28,12 @@ pub fn check_presses(rig: &Rig, rows: &[Row], weights: Weights, depths_m: &[f64]
     places.map(|(position, (force_n, depth_m))| Press { position, force_n, depth_m }).collect()
 }
 
-/// Places far from those of a calibration, one in each of [`CHECK_PLACES`] equal stretches of its longer side.
+/// Places far from those of a calibration: one in each of [`CHECK_PLACES`] equal segments of its longer side.
 fn fresh_places(calibrated: &[Position], extent: Extent) -> Vec<Position> {
-    /// Candidates along a stretch and across.
+    /// Number of candidates along a segment, and across it.
     const CANDIDATES: usize = 40;
-    /// Share of the largest distance to a calibrated place that is far enough: among such candidates, the places of the check keep apart.
+    /// Share of the largest distance to a calibrated place that counts as far. Among the far candidates, the places of the check are chosen far
+    /// apart.
     const FAR: f64 = 0.9;
     let Some((low, high)) = bounds(calibrated) else { return Vec::new() };
     let ruler = Ruler::among(calibrated, extent);
@@ -64,7 +65,7 @@ fn fresh_places(calibrated: &[Position], extent: Extent) -> Vec<Position> {
     chosen
 }
 
-/// Opposite corners of the rectangle of some places; none where it is a point.
+/// Opposite corners of the bounding rectangle of some places; `None` for a point.
 fn bounds(places: &[Position]) -> Option<(Position, Position)> {
     let extreme = |pick: fn(f64, f64) -> f64, start: f64| Position {
         x_m: places.iter().map(|at| at.x_m).fold(start, pick),
@@ -78,7 +79,7 @@ fn nearest_m(at: Position, places: &[Position]) -> f64 {
     places.iter().map(|place| at.distance_m(*place)).fold(f64::INFINITY, f64::min)
 }
 
-/// File of the presses of a check, beside the file of presses: `presses-check.csv`, or with the first number that is free.
+/// File of the presses of a check, beside the file of presses: `presses-check.csv`, or with the first free number.
 pub fn check_path(presses: &Path) -> PathBuf {
     let stem = presses.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let suffix =
@@ -97,13 +98,13 @@ pub fn check_path(presses: &Path) -> PathBuf {
 /// A checked place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CheckedPlace {
-    /// Place that was asked for.
+    /// Requested place.
     pub position: Position,
-    /// Place that the locator gave.
+    /// Estimate of the locator.
     pub estimate: Position,
-    /// Distance of both, in metres.
+    /// Distance between both, in metres.
     pub error_m: f64,
-    /// True where the 95 % region covers the place; `None` of a locator without regions.
+    /// True if the 95 % region covers the place; `None` for a locator without regions.
     pub covered: Option<bool>,
 }
 
@@ -116,15 +117,15 @@ pub struct Check {
     pub median_m: f64,
     /// Mean error, in metres.
     pub mean_m: f64,
-    /// Places that the 95 % regions cover; `None` of a locator without regions.
+    /// Number of places that the 95 % regions cover; `None` for a locator without regions.
     pub covered: Option<usize>,
 }
 
 impl Check {
-    /// Locates the presses of a check, each tared by the untouched rows on both sides of it; `None` without a press.
+    /// Locates the presses of a check, each tared with the untouched rows before and after it; `None` without a press.
     ///
     /// # Errors
-    /// [`ReadingError`] where the channels are not those of the locator.
+    /// [`ReadingError`] if the channels differ from those of the locator.
     pub fn new(locator: &Locator, recording: &Recording) -> Result<Option<Self>, ReadingError> {
         let evaluation = Evaluation::new(locator, &tared(locator, recording))?;
         let Some(summary) = evaluation.summary(None) else { return Ok(None) };
@@ -144,7 +145,7 @@ impl Check {
     }
 }
 
-/// The readings with the offsets that the locator has learnt, as the tare of a session gives them.
+/// The readings with the offsets of the locator's calibration, as the tare of a session provides them.
 fn tared(locator: &Locator, recording: &Recording) -> Recording {
     let mut tared = recording.clone();
     let Some(learnt) = &locator.untouched else { return tared };
@@ -225,7 +226,7 @@ mod tests {
         let check = Check::new(&locator, &recording).unwrap().unwrap();
         assert_eq!(check.places.len(), CHECK_PLACES);
         assert!(check.median_m < 1e-3 && check.covered >= Some(4), "{check:?}");
-        // A place that is pressed 20 mm beside is an error, and no interval covers it.
+        // A place that is pressed 20 mm away is an error that the interval does not cover.
         recording.rows[2].position.x_m += 0.02;
         let missed = Check::new(&locator, &recording).unwrap().unwrap();
         assert!(missed.places[2].error_m > 0.019 && missed.places[2].covered == Some(false), "{missed:?}");

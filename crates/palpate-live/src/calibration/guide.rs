@@ -1,10 +1,10 @@
-//! The guide of a calibration: which press comes next, and when its reading is recorded.
+//! The guide of a calibration: the order of the presses, and the time at which the reading of each is recorded.
 //!
-//! Means of a stretch show that a surface is at rest; the single reading in its middle is recorded. A locator learns from the rows how noisy a reading
-//! is, and readings in use are single ones: from means it would learn noise that is too small by the root of their number. The last reading of a stretch
-//! may be the first of a lift.
+//! Means over a stretch show whether a surface is at rest; the single reading in the middle of the stretch is recorded. A locator learns the noise
+//! of a reading from the rows, and readings in use are single ones. From means it would learn noise that is too small by the square root of their
+//! number. The last reading of a stretch may already be the first of a lift.
 //!
-//! The untouched row of a press is recorded together with the press, so that it is the last reading before the touch, whatever drifted in between.
+//! The untouched row of a press is recorded together with the press. It is thus the last reading before the touch, after any drift in between.
 
 use super::baseline::{Baseline, NOISE_LIMIT_SD};
 use super::press::Press;
@@ -15,38 +15,39 @@ use palpate_mechanics::contact::Position;
 use serde::Serialize;
 use std::time::Duration;
 
-/// Readings in a row that deviate where something touches: one or two may be glitches.
+/// Consecutive deviating readings that count as a touch: one or two may be glitches.
 pub(super) const ONSET_READINGS: u32 = 3;
-/// Step of the untouched reading that is followed at once, in standard deviations of the noise; a larger one may be a light finger, and has to last
+/// Step of the untouched reading that is accepted at once, in standard deviations of the noise. A larger one may be a light finger, and must last
 /// for [`PATIENCE`].
 const FOLLOWED_STEP_SD: f64 = 2.0;
-/// Share of the largest press below which a deviation is no touch: creep and hysteresis leave as much.
+/// Share of the largest press below which a deviation does not count as a touch, because creep and hysteresis leave as much.
 const RESIDUE_SHARE: f64 = 0.005;
-/// Share of a press by which its reading may change between both halves of a stretch at rest: soft surfaces creep, and hands tremble.
+/// Largest change of the reading of a press between both halves of a stretch at rest, as a share of the press: soft surfaces creep, and hands
+/// tremble.
 const REST_SHARE: f64 = 0.005;
-/// The same after [`PATIENCE`], so that a hand that never rests is not asked to for ever.
+/// `REST_SHARE` after [`PATIENCE`], so that a hand that never rests is still accepted.
 const PATIENT_REST_SHARE: f64 = 0.02;
-/// Share of a press by which the untouched reading may change while the surface recovers from creep.
+/// Largest change of the untouched reading while the surface recovers from creep, as a share of the press.
 const RECOVERY_SHARE: f64 = 0.001;
-/// Time after which rest is judged less strictly.
+/// Time after which the criterion of rest is less strict.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Time after which a recovering surface counts as at rest.
 const RECOVERY: Duration = Duration::from_millis(1500);
-/// Share of a press that may remain once it was lifted, and share of the largest press that hysteresis may leave.
+/// Share of a press that may remain after it was lifted, and share of the largest press that hysteresis may leave.
 const LIFTED_SHARE: f64 = 0.1;
 const HYSTERESIS_SHARE: f64 = 0.03;
 /// Share of a press below which a reading at rest by noise alone for [`PARTLY_LIFTED`] counts as lifted.
 const PARTLY_LIFTED_SHARE: f64 = 0.5;
 const PARTLY_LIFTED: Duration = Duration::from_secs(2);
-/// Share of the largest deviation of a touch below which a reading at rest is what a lift left.
+/// Share of the largest deviation of a touch below which a reading at rest counts as the rest of a lift.
 const LIFT_TAIL_SHARE: f64 = 1.0 / 3.0;
-/// Cosine of the angle to the last press below which a deviation goes against it.
+/// Cosine of the angle to the last press below which a deviation counts as opposite to it.
 const AGAINST: f64 = -0.8;
-/// Share of a press that comes within a second; what comes more slowly is drift.
+/// Smallest share of a press that develops within a second; a slower change counts as drift.
 const ONSET_SHARE: f64 = 0.2;
-/// Time for which a finger may linger lightly before it presses: a doubtful touch that rests for longer is asked for again.
+/// Time for which a finger may rest lightly before it presses: a doubtful touch that rests for longer is requested again.
 const LINGER: Duration = Duration::from_millis(1200);
-/// Silence after which the untouched reading is learnt anew: a board may have restarted.
+/// Silence after which the untouched reading is learnt again, because the board may have restarted.
 const SILENCE: Duration = Duration::from_secs(5);
 
 /// Next step that a guide waits for.
@@ -68,7 +69,7 @@ pub enum Waiting {
 /// A row of the recording with the mean reading of its stretch at rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RestingRow {
-    /// The row, whose reading is the one in the middle of the stretch.
+    /// The row, with the reading in the middle of the stretch.
     pub row: Row,
     /// Mean reading of the stretch.
     pub mean: Vec<f64>,
@@ -83,43 +84,43 @@ pub enum Progress {
     Waits(Waiting),
     /// A press was recorded.
     Pressed {
-        /// The untouched surface before it, unless it is recorded already.
+        /// The untouched surface before it; `None` if it was recorded already.
         untouched: Option<RestingRow>,
         /// The press.
         press: RestingRow,
     },
-    /// The last press grew without a lift: this row replaces it.
+    /// The last press grew without a lift, and this row replaces it.
     Replaced(RestingRow),
     /// The untouched surface after the last press was recorded.
     Untouched(RestingRow),
-    /// The press is asked for again.
+    /// The press is requested again.
     AskedAgain(Doubt),
-    /// The recorded press is taken back, and asked for again.
+    /// The recorded press is taken back, and requested again.
     TakenBack(Doubt),
 }
 
-/// A touch from its onset on.
+/// A touch since its onset.
 #[derive(Clone, Copy, Debug, Default)]
 struct Touch {
-    /// Deviating readings in a row before the onset.
+    /// Number of consecutive deviating readings before the onset.
     onset: u32,
-    /// Largest deviation of [`ONSET_READINGS`] readings in a row, in standard deviations of the noise.
+    /// Largest deviation of [`ONSET_READINGS`] consecutive readings, in standard deviations of the noise.
     peak: f64,
     /// Deviations of the last two readings.
     recent: [f64; 2],
     /// Largest growth within a second, in standard deviations of the noise.
     fastest: f64,
-    /// Instant from which on its reading rests and is doubtful.
+    /// Instant since which the reading rests and is doubtful.
     doubtful_since: Option<Duration>,
 }
 
-/// Growth of a touch after its reading was taken.
+/// Growth of a touch after its reading was recorded.
 #[derive(Clone, Debug, Default)]
 struct Growth {
-    /// Instant from which on the readings are larger, and their number.
+    /// Instant since which the readings are larger, and their number.
     since: Duration,
     readings: u32,
-    /// True once that lasted: a hand may jerk as it lifts.
+    /// True once the growth has lasted: a hand may jerk as it lifts.
     has_lasted: bool,
     /// Largest deviation.
     deviation: Vec<f64>,
@@ -132,25 +133,25 @@ pub struct Guide {
     /// Index of the next press.
     next: usize,
     waiting: Waiting,
-    /// Instant from which on it waits, or at which the untouched reading was followed last.
+    /// Instant since which the guide waits, or of the last update of the untouched reading.
     since: Duration,
     /// Instant of the last reading, also of one that repeats the reading before it.
     last_at: Option<Duration>,
-    /// True where the source repeats readings because it is faster than its sensors: each counts once.
+    /// True if the source repeats readings because it is faster than its sensors: each counts once.
     is_sample_and_hold: bool,
     stretch: Stretch,
-    /// Untouched reading, which follows the drift while the surface is untouched.
+    /// Untouched reading, updated with the drift while the surface is untouched.
     baseline: Option<Baseline>,
     /// The last untouched reading at rest, which is recorded with the next press.
     untouched: Option<RestingRow>,
-    /// Mean untouched reading that was learnt, or was recorded with a press, last: a reading that returns to it is no press.
+    /// Mean untouched reading that was learnt or recorded with a press last. A reading that returns to it does not count as a press.
     reference: Vec<f64>,
     touch: Touch,
-    /// Deviation of the press that is let go: recorded, or asked for again.
+    /// Deviation of the press that must be released: recorded, or requested again.
     pressed: Vec<f64>,
     is_recorded: bool,
     growth: Growth,
-    /// Size of what a finger may still hold after the last lift, in standard deviations of the noise; 0 once it let go of that.
+    /// Largest effect of a finger that may remain after the last lift, in standard deviations of the noise; 0 once it is gone.
     lingering: f64,
     /// True from a lift until the untouched reading is at rest by noise alone: soft surfaces creep back.
     is_recovering: bool,
@@ -158,7 +159,7 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// A guide through a plan.
+    /// A guide for a plan.
     pub fn new(plan: Vec<Press>) -> Self {
         let waiting = if plan.is_empty() { Waiting::Nothing } else { Waiting::Untouched };
         Self {
@@ -182,18 +183,18 @@ impl Guide {
         }
     }
 
-    /// The same guide, which compares presses with these rows of before too.
+    /// Sets the rows of earlier presses, with which new presses are also compared.
     pub fn with_rows(mut self, rows: &[Row]) -> Self {
         self.checks = RepeatCheck::new(rows);
         self
     }
 
-    /// The press that is next, and its number in the plan from 0; `None` after the last.
+    /// The next press, and its number in the plan from 0; `None` after the last.
     pub fn next_press(&self) -> Option<(usize, Press)> {
         self.plan.get(self.next).map(|press| (self.next, *press))
     }
 
-    /// Number of presses of the plan that are recorded.
+    /// Number of recorded presses of the plan.
     pub fn taken(&self) -> usize {
         self.next
     }
@@ -203,17 +204,17 @@ impl Guide {
         &self.plan
     }
 
-    /// The step that it waits for.
+    /// The step that the guide waits for.
     pub fn waiting(&self) -> Waiting {
         self.waiting
     }
 
-    /// True where the source repeats readings because it is faster than its sensors: each counts once.
+    /// True if the source repeats readings because it is faster than its sensors: each counts once.
     pub fn is_sample_and_hold(&self) -> bool {
         self.is_sample_and_hold
     }
 
-    /// Mean untouched reading by now; `None` before it is learnt.
+    /// Present mean untouched reading; `None` before it is learnt.
     pub fn untouched_reading(&self) -> Option<&[f64]> {
         self.baseline.as_ref().map(|baseline| baseline.mean.as_slice())
     }
@@ -223,7 +224,7 @@ impl Guide {
         self.baseline.as_ref().map(Baseline::noise_sd)
     }
 
-    /// What is waited for and what is read, in a sentence; `None` where the step says enough.
+    /// The awaited condition and the present reading, in a sentence; `None` if the step itself is explanation enough.
     pub fn explain(&self) -> Option<String> {
         let Some(baseline) = &self.baseline else {
             return (self.waiting == Waiting::Untouched)
@@ -247,14 +248,14 @@ impl Guide {
                 ))
             }
             Waiting::Release => Some(format!(
-                "the reading is still at {:.0} % of the press; if nothing touches, take this reading as untouched",
+                "the reading is still at {:.0} % of the press; if the surface is untouched, take this reading as untouched",
                 100.0 * size / baseline.size_of(&self.pressed).max(1.0)
             )),
             Waiting::Untouched | Waiting::Nothing => None,
         }
     }
 
-    /// Takes a reading at an instant.
+    /// Processes a reading at an instant.
     pub fn add(&mut self, at: Duration, reading: &[f64]) -> Progress {
         if self.last_at.is_some_and(|last| at.saturating_sub(last) > SILENCE) {
             self.relearn();
@@ -277,7 +278,7 @@ impl Guide {
                     Waiting::Rest => self.await_rest(at, &mut baseline),
                     _ => self.await_release(at, &mut baseline),
                 };
-                // A step that asks for the untouched reading has forgotten the old one.
+                // In a step that waits for the untouched reading, the old one is discarded.
                 if self.waiting != Waiting::Untouched {
                     self.baseline = Some(baseline);
                 }
@@ -286,7 +287,7 @@ impl Guide {
         }
     }
 
-    /// Takes back the last press, which is asked for again; false where there is none.
+    /// Takes back the last press, which is requested again; false if there is none.
     pub fn redo(&mut self) -> bool {
         if self.next == 0 {
             return false;
@@ -298,7 +299,7 @@ impl Guide {
         true
     }
 
-    /// Leaves out the press that is next.
+    /// Leaves out the next press.
     pub fn skip(&mut self) {
         if self.next < self.plan.len() {
             self.plan.remove(self.next);
@@ -308,7 +309,7 @@ impl Guide {
         }
     }
 
-    /// Learns the untouched reading anew: the operator says that nothing touches, or the source was away.
+    /// Learns the untouched reading again, after the operator has stated that the surface is untouched, or after the source was lost.
     pub fn relearn(&mut self) {
         self.stretch.clear();
         self.touch = Touch::default();
@@ -334,17 +335,17 @@ impl Guide {
         }
     }
 
-    /// Forgets the readings of the last seconds, as those before a machine moved; what is learnt stays.
+    /// Discards the readings of the last seconds, for example those before a move of a machine; the baseline is kept.
     pub fn forget_readings(&mut self) {
         self.stretch.clear();
     }
 
-    /// Waits for what the next press needs first.
+    /// Returns to the first step that the next press needs.
     fn restart(&mut self) {
         self.waiting = match self.waiting {
             _ if self.next >= self.plan.len() => Waiting::Nothing,
             _ if self.baseline.is_none() => Waiting::Untouched,
-            // The present touch belongs to no press of the plan.
+            // The present touch does not belong to a press of the plan.
             Waiting::Rest => {
                 self.pressed = self.present_deviation();
                 Waiting::Release
@@ -354,7 +355,7 @@ impl Guide {
         };
     }
 
-    /// Deviation of the last reading from the untouched one.
+    /// Deviation of the last reading from the untouched reading.
     fn present_deviation(&self) -> Vec<f64> {
         match (&self.baseline, self.stretch.last()) {
             (Some(baseline), Some(reading)) => baseline.deviation(reading),
@@ -379,8 +380,8 @@ impl Guide {
         self.begin_press(at)
     }
 
-    /// Forgets repeated readings where the source is faster than its sensors. A touch changes all channels together in any source, hence the readings
-    /// must be at rest.
+    /// Removes repeated readings if the source is faster than its sensors. A touch changes all channels together in any source. The readings must
+    /// therefore be at rest.
     fn count_repeats_once(&mut self) {
         let Some(distinct) = self.stretch.without_repeats().filter(|_| !self.is_sample_and_hold) else {
             return;
@@ -402,7 +403,7 @@ impl Guide {
         self.untouched.take().map_or(Progress::Waits(Waiting::Nothing), Progress::Untouched)
     }
 
-    /// Follows the untouched reading until something touches.
+    /// Updates the untouched reading until a touch begins.
     fn await_press(&mut self, at: Duration, baseline: &mut Baseline) -> Progress {
         let recovery = if self.is_recovering { self.checks.largest_size(baseline) } else { 0.0 };
         let least = NOISE_LIMIT_SD.max(RESIDUE_SHARE * recovery);
@@ -433,7 +434,7 @@ impl Guide {
         let mean = mean(&latest);
         let size = baseline.size(&mean);
         if size <= NOISE_LIMIT_SD || size < LIFT_TAIL_SHARE * self.touch.peak {
-            // The surface was let go before its reading came to rest.
+            // The touch ended before its reading came to rest.
             return match baseline.is_at_rest(&latest, 0.0) {
                 true => self.return_to_untouched(at, mean, baseline),
                 false => Progress::None,
@@ -449,7 +450,7 @@ impl Guide {
             return self.return_to_untouched(at, mean, baseline);
         }
         if self.touch.fastest < ONSET_SHARE * size {
-            // Where the touch was one after all, its lift leads back to the reference.
+            // If it was a touch after all, its lift returns to the reference.
             let reference = std::mem::take(&mut self.reference);
             self.relearn();
             self.reference = reference;
@@ -485,7 +486,7 @@ impl Guide {
         Progress::Pressed { untouched, press: self.press_row(&press, mean) }
     }
 
-    /// Waits until a press is lifted, or takes its place by a firmer one.
+    /// Waits until a press is lifted, or replaces it by a firmer one.
     fn await_release(&mut self, at: Duration, baseline: &mut Baseline) -> Progress {
         if let Some(reading) = self.stretch.last() {
             self.growth.follow(at, baseline.deviation(reading), &self.pressed, baseline);
@@ -505,7 +506,7 @@ impl Guide {
             baseline.is_at_rest(&latest, 0.0)
                 || waited > RECOVERY && baseline.is_at_rest(&latest, RECOVERY_SHARE * largest)
         } else {
-            // A touch that was not recorded may have been none: what rests for long is the untouched surface.
+            // An unrecorded touch may not have been one: a reading that rests for long is the untouched one.
             let (share, patience) = if self.is_recorded {
                 (PARTLY_LIFTED_SHARE, PARTLY_LIFTED)
             } else {
@@ -527,7 +528,7 @@ impl Guide {
         self.return_to_untouched(at, mean, baseline)
     }
 
-    /// Takes back a press that grew after its reading was taken, and never rested.
+    /// Takes back a press that grew after its reading was recorded, and never came to rest.
     fn take_back(&mut self, at: Duration, mean: Vec<f64>, baseline: &mut Baseline) -> Progress {
         self.next = self.next.saturating_sub(1);
         self.checks.outgrow_last(std::mem::take(&mut self.growth.deviation));
@@ -537,7 +538,7 @@ impl Guide {
         Progress::TakenBack(Doubt::Grew)
     }
 
-    /// A firmer touch without a lift in between: the light one before was not the press.
+    /// Replaces a press by a firmer touch without a lift in between: the lighter touch was not the press.
     fn replace_press(&mut self, at: Duration, mean: Vec<f64>, baseline: &Baseline) -> Progress {
         if !self.is_recorded {
             return self.wait(at, Waiting::Rest);
@@ -584,7 +585,8 @@ impl Guide {
         from_reference(mean) < 0.5 * from_reference(&baseline.mean)
     }
 
-    /// True for a mean reading that goes against the last press by no more than a lingering finger may have held. This happens once after a press.
+    /// True for a mean reading that is opposite to the last press, by at most the effect of a lingering finger. This is possible once after a
+    /// press.
     fn is_late_lift(&self, mean: &[f64], baseline: &Baseline) -> bool {
         let deviation = baseline.deviation(mean);
         let lengths = baseline.length_of(&deviation) * baseline.length_of(&self.pressed);
@@ -594,7 +596,7 @@ impl Guide {
 }
 
 impl Growth {
-    /// Follows the deviation of a reading from that of the press.
+    /// Compares the deviation of a reading with that of the press.
     fn follow(&mut self, at: Duration, deviation: Vec<f64>, pressed: &[f64], baseline: &Baseline) {
         let size = baseline.size_of(&deviation);
         if size <= GROWTH * baseline.size_of(pressed) {
@@ -613,20 +615,20 @@ impl Growth {
 }
 
 impl Touch {
-    /// Follows the deviation of a reading, the last of a stretch.
+    /// Updates the touch with the last reading of a stretch.
     fn follow(&mut self, baseline: &Baseline, reading: &[f64], stretch: &Stretch) {
         let size = baseline.size(reading);
         self.peak = self.peak.max(size.min(self.recent[0]).min(self.recent[1]));
         self.recent = [self.recent[1], size];
         if size > NOISE_LIMIT_SD {
             let least = stretch.last_second().map(|reading| baseline.size(reading)).fold(size, f64::min);
-            // After a machine moved, the first reading is all that there is: it is compared with the untouched one.
+            // After a move of a machine, only one reading is available: it is compared with the untouched reading.
             let growth = if stretch.has_one_reading() { size } else { size - least };
             self.fastest = self.fastest.max(growth);
         }
     }
 
-    /// True once [`ONSET_READINGS`] readings in a row deviate by more than `least` standard deviations.
+    /// True once [`ONSET_READINGS`] consecutive readings deviate by more than `least` standard deviations.
     fn has_begun(&mut self, least: f64) -> bool {
         self.onset = if self.recent[1] > least { self.onset + 1 } else { 0 };
         self.onset >= ONSET_READINGS

@@ -8,7 +8,7 @@ use palpate_mechanics::units::{Dimension, Unit};
 use palpate_rig::Stage;
 use std::path::{Path, PathBuf};
 
-/// Presses so far, and the file that has them.
+/// Presses so far, and their file.
 #[derive(Debug)]
 pub struct Journal {
     setup: Setup,
@@ -16,16 +16,16 @@ pub struct Journal {
     comment: String,
     path: PathBuf,
     rows: Vec<Row>,
-    /// Trace of each row; of presses of this run only.
+    /// Trace of each row; only presses of this run have one.
     traces: Vec<Option<Trace>>,
-    /// Seconds by which the times of new rows come after those of the file.
+    /// Seconds that are added to the times of new rows, so that they follow those of the file.
     later_s: f64,
 }
 
-/// Presses that cannot be kept.
+/// Error of presses that cannot be recorded.
 #[derive(Debug, thiserror::Error)]
 pub enum JournalError {
-    /// The rig's recordings have a column that nothing tells the value of.
+    /// The rig's recordings have a column with unknown values.
     #[error("presses are recorded without the nuisance coordinate {column}")]
     Nuisance {
         /// The column.
@@ -57,17 +57,17 @@ impl JournalError {
     }
 }
 
-/// Name of the column of depths, where the rig has none.
+/// Name of the column of depths, if the rig has none.
 const DEPTH: &str = "depth_mm";
-/// Seconds between the presses of a file and those that go on with it. The time between two runs is not known; what drifted in it follows from the
+/// Seconds between the presses of a file and those that continue it. The time between two runs is unknown; the drift between them follows from the
 /// untouched rows of both.
 const BETWEEN_RUNS_S: f64 = 60.0;
 
 impl Journal {
-    /// A journal that goes on with these rows of before; the file is written with the next press.
+    /// A journal that continues these earlier rows; the file is written with the next press.
     ///
     /// # Errors
-    /// [`JournalError`] where the columns of the rig's recordings cannot be told.
+    /// [`JournalError`] if the columns of the rig's recordings cannot be determined.
     pub fn new(
         setup: &Setup,
         path: &Path,
@@ -82,18 +82,19 @@ impl Journal {
         Ok(Self { setup: setup.clone(), columns, comment, path, rows: before, traces, later_s })
     }
 
-    /// The same with traces of its rows, where they are known.
+    /// Sets the traces of the rows, where they are known.
     #[must_use]
     pub fn with_traces(self, mut traces: Vec<Option<Trace>>) -> Self {
         traces.resize(self.rows.len(), None);
         Self { traces, ..self }
     }
 
-    /// The columns of a file of presses: those that the rig reads, and where a machine presses to several depths one more, `depth_mm`, by which its rows are
-    /// told from one another when a calibration is gone on with. Where a machine presses, a nuisance coordinate of the rig that is a length is the depth.
+    /// The columns of a file of presses. They are those that the rig reads. If a machine presses to several depths, there is one more, `depth_mm`,
+    /// which distinguishes the rows when a calibration is continued. If a machine presses, a nuisance coordinate of the rig that is a length is the
+    /// depth.
     ///
     /// # Errors
-    /// [`JournalError`] for columns that nothing tells the values of, or that have no names.
+    /// [`JournalError`] for columns with unknown values, or without names.
     pub fn columns(setup: &Setup, depths: DepthKnowledge) -> Result<Columns, JournalError> {
         let columns = setup.recording_columns();
         let is_depth = |nuisance: &recording::ValueColumn| nuisance.unit.dimension() == Dimension::Length;
@@ -117,24 +118,24 @@ impl Journal {
         })
     }
 
-    /// The rows so far, of presses and of the untouched surface.
+    /// The rows so far, both presses and the untouched surface.
     pub fn rows(&self) -> &[Row] {
         &self.rows
     }
 
-    /// Trace of each row, where there is one.
+    /// Trace of each row, if it has one.
     pub fn traces(&self) -> &[Option<Trace>] {
         &self.traces
     }
 
-    /// Keeps the trace of the last row.
+    /// Stores the trace of the last row.
     pub(super) fn set_trace(&mut self, trace: Trace) {
         if let Some(last) = self.traces.last_mut() {
             *last = Some(trace);
         }
     }
 
-    /// Presses that were recorded.
+    /// Number of recorded presses.
     pub fn presses(&self) -> usize {
         self.rows.iter().filter(|row| row.touches()).count()
     }
@@ -144,7 +145,7 @@ impl Journal {
         &self.path
     }
 
-    /// Adds a row, which is on disk afterwards; `depth_m` is that of a machine.
+    /// Adds a row, which is on disk when this returns; `depth_m` is the depth of a machine's press.
     ///
     /// # Errors
     /// [`JournalError::Write`].
@@ -154,14 +155,14 @@ impl Journal {
             Some(_) => vec![depth_m.unwrap_or(0.0)],
             None => Vec::new(),
         };
-        // Rows that were taken out at the end have no trace any more.
+        // Rows that were removed at the end have no trace any more.
         self.traces.resize(self.rows.len(), None);
         self.rows.push(Row { time_s, nuisances, ..row });
         self.traces.push(None);
         self.save()
     }
 
-    /// Takes the last press out, with the untouched rows after it.
+    /// Removes the last press, and the untouched rows after it.
     ///
     /// # Errors
     /// [`JournalError::Write`].
@@ -174,7 +175,7 @@ impl Journal {
         Ok(())
     }
 
-    /// Replaces the last press by a row, which is on disk afterwards.
+    /// Replaces the last press by a row, which is on disk when this returns.
     ///
     /// # Errors
     /// [`JournalError::Write`].
@@ -185,7 +186,7 @@ impl Journal {
         self.add(row, depth_m)
     }
 
-    /// Strikes out a press, counted from 0; false where there is no such press. The untouched rows stay, by which drift is learnt.
+    /// Strikes out a press, counted from 0; false if the press does not exist. The untouched rows are kept, because they show the drift.
     ///
     /// # Errors
     /// [`JournalError::Write`].
@@ -200,7 +201,7 @@ impl Journal {
 
     fn save(&self) -> Result<(), JournalError> {
         let mut rows = self.rows.clone();
-        // An untouched row is distinguished from a press by its force, where presses have one.
+        // The force distinguishes an untouched row from a press, if presses have one.
         if self.columns.force.is_none() || rows.iter().any(|row| row.force_n.is_none()) {
             rows.retain(Row::touches);
         }
@@ -224,7 +225,7 @@ pub enum DepthKnowledge {
 }
 
 impl DepthKnowledge {
-    /// Knowledge of presses by this machine, or by hand without one.
+    /// Knowledge for presses by this machine, or by hand without one.
     pub fn for_stage(stage: Option<&Stage>) -> Self {
         match stage {
             None => Self::Unknown,

@@ -1,4 +1,4 @@
-//! A machine that presses where the guide of a calibration asks for it, or is set up before.
+//! A machine that presses at the request of the guide of a calibration, or is set up first.
 
 use super::guide::Waiting;
 use super::press::Press;
@@ -11,15 +11,15 @@ use std::time::Duration;
 
 /// Time without readings after which the machine is stopped.
 const SILENT: Duration = Duration::from_secs(2);
-/// Time in which a press must be seen in the readings, and in which its reading must come to rest.
+/// Time limit for a press to show in the readings, and for its reading to come to rest.
 const SEEN_WITHIN: Duration = Duration::from_secs(3);
 const AT_REST_WITHIN: Duration = Duration::from_secs(60);
-/// Time in which the surface must be at rest when it has been let go.
+/// Time limit for the surface to come to rest after a lift.
 const RELEASED_WITHIN: Duration = Duration::from_secs(300);
-/// Unseen presses in a row after which the run ends.
+/// Consecutive unseen presses that end the run.
 const MOST_UNSEEN: u32 = 3;
 
-/// A machine that ended its work.
+/// Error that ended the work of a machine.
 #[derive(Debug, thiserror::Error)]
 pub enum MachineError {
     /// The stage failed.
@@ -41,24 +41,24 @@ pub enum MachineError {
         /// The limit.
         limit_n: f64,
     },
-    /// No readings.
+    /// No readings arrive.
     #[error("no reading came for {} s: the machine was stopped", SILENT.as_secs())]
     Silent,
     /// A stop by hand.
     #[error("the machine was stopped by hand")]
     ByHand,
-    /// No page is open.
-    #[error("nobody has watched the machine for {seconds} s: its finger was lifted")]
+    /// No page is connected.
+    #[error("no page has watched the machine for {seconds} s: its finger was lifted")]
     Unwatched {
         /// Seconds without an open page.
         seconds: u64,
     },
-    /// Unseen presses.
+    /// The readings have not shown the last presses.
     #[error(
         "the readings have not shown the last {MOST_UNSEEN} presses: `touch` or `depths` of [stage] are wrong"
     )]
     Unseen,
-    /// A surface that never rests.
+    /// The surface does not come to rest.
     #[error("the untouched readings have not come to rest within {} s", RELEASED_WITHIN.as_secs())]
     NoRest,
 }
@@ -87,7 +87,7 @@ impl MachineError {
             Self::Silent => "see to the board that sends the readings; then reset the machine",
             Self::Unwatched { .. } => "keep a page open while it presses",
             Self::Unseen => "jog the finger to the untouched surface, and write its z as `touch`",
-            Self::NoRest => "see that nothing else touches or shakes the surface",
+            Self::NoRest => "keep everything else off the surface",
         }
     }
 }
@@ -95,13 +95,13 @@ impl MachineError {
 /// Step of a machine, for messages.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MachineNote {
-    /// It looks for its end stops.
+    /// The machine homes against its end stops.
     Homing,
-    /// A press that no reading showed is left out.
+    /// A press is left out, because the readings did not show it.
     Unseen,
-    /// A press whose reading did not come to rest is left out.
+    /// A press is left out, because its reading did not come to rest.
     NoRest,
-    /// A task of the set-up has ended, or gone on.
+    /// A task of the set-up has ended, or made progress.
     SetUp(SetUpNote),
 }
 
@@ -109,33 +109,33 @@ pub enum MachineNote {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Motion {
-    /// It waits for the first reading.
+    /// The machine waits for the first reading.
     Blind,
-    /// It looks for its end stops.
+    /// The machine homes against its end stops.
     Homing,
     /// It travels at the height of travel.
     Travelling,
-    /// It travels to a place, and presses there; or it goes down in search of the touch.
+    /// The machine travels to a place and presses there, or goes down in search of the touch.
     Pressing,
     /// It lifts its finger.
     Lifting,
-    /// Its finger is lifted, and it rests.
+    /// The finger is lifted, and the machine rests.
     Up,
-    /// Finger presses, and it rests.
+    /// The finger presses, and the machine rests.
     Down,
 }
 
-/// A machine that presses where the guide of a calibration asks for it, or is set up before.
+/// A machine that presses at the request of the guide of a calibration, or is set up first.
 ///
 /// The instants of its steps are those of the clock of its [`StageThread`].
 #[derive(Debug)]
 pub struct Machine {
     thread: StageThread,
-    /// Tasks of a machine that is set up; `None` of one that presses.
+    /// Tasks of a machine that is set up; `None` for one that presses.
     set_up: Option<SetUp>,
     force_limit_n: f64,
     motion: Motion,
-    /// The press that it was sent to last.
+    /// The last press that it was sent to.
     press: Option<Press>,
     /// Position after the last move, in metres of the machine.
     at_m: Option<[f64; 3]>,
@@ -145,17 +145,17 @@ pub struct Machine {
     readings: u64,
     read_at: Duration,
     unseen: u32,
-    /// Error with which it ends once its finger is lifted.
+    /// Error that ends the work once the finger is lifted.
     ends_with: Option<MachineError>,
 }
 
 impl Machine {
-    /// A machine whose stage is connected, and not homed yet.
+    /// A machine with a connected stage that is not homed yet.
     pub fn new(thread: StageThread, force_limit_n: Option<f64>, now: Duration) -> Self {
         Self::with_tasks(thread, force_limit_n, now, None)
     }
 
-    /// A machine that is set up: it homes, and does what [`Self::ask`] asks for. No press is taken.
+    /// A machine to be set up: it homes, and executes the tasks of [`Self::ask`]. Presses are not recorded.
     pub fn to_set_up(thread: StageThread, stage: Stage, now: Duration) -> Self {
         let limit_n = stage.force_limit_n;
         Self::with_tasks(thread, limit_n, now, Some(SetUp::new(stage)))
@@ -183,17 +183,17 @@ impl Machine {
         }
     }
 
-    /// The way in which a stop acts on it.
+    /// The way in which a stop acts on the machine.
     pub fn stopping(&self) -> Stopping {
         self.thread.stopping()
     }
 
-    /// Motion.
+    /// Present motion.
     pub fn motion(&self) -> Motion {
         self.motion
     }
 
-    /// The press that it was sent to last; `None` before the first.
+    /// The last press that it was sent to; `None` before the first.
     pub fn press(&self) -> Option<Press> {
         self.press
     }
@@ -203,19 +203,19 @@ impl Machine {
         self.at_m
     }
 
-    /// Asks for a task of a machine that is set up, which follows those before it; false of one that presses.
+    /// Adds a task for a machine that is set up, after the earlier ones; false for a machine that presses.
     pub fn ask(&mut self, task: SetUpTask) -> bool {
         let Some(set_up) = &mut self.set_up else { return false };
         set_up.ask(task);
         true
     }
 
-    /// True where it rests, has no task of a set-up any more, and waits for one.
+    /// True if the machine rests, and waits for a task of a set-up.
     pub fn is_idle(&self) -> bool {
         self.motion == Motion::Up && self.set_up.as_ref().is_some_and(SetUp::is_idle)
     }
 
-    /// True once nothing is left to do, so that it is to be finished.
+    /// True once all work is done, so that the machine can be finished.
     pub fn is_done(&self, calibration: &Calibration) -> bool {
         match &self.set_up {
             None => calibration.guide().waiting() == Waiting::Nothing,
@@ -223,7 +223,7 @@ impl Machine {
         }
     }
 
-    /// Stops it at once, where what the calibration noted asks for that.
+    /// Stops the machine at once, if the notes of the calibration require it.
     ///
     /// # Errors
     /// [`MachineError`] with the reason.
@@ -238,7 +238,7 @@ impl Machine {
         error.map_or(Ok(()), |error| self.fail(error))
     }
 
-    /// Stops it at once.
+    /// Stops the machine at once.
     ///
     /// # Errors
     /// [`MachineError::ByHand`], always.
@@ -246,10 +246,10 @@ impl Machine {
         self.fail(MachineError::ByHand)
     }
 
-    /// Has it do what is next, at an instant; to be called often.
+    /// Executes the next step, at an instant; must be called often.
     ///
     /// # Errors
-    /// [`MachineError`] once it has ended its work.
+    /// [`MachineError`] once the work has ended.
     pub fn step(
         &mut self,
         now: Duration,
@@ -284,7 +284,7 @@ impl Machine {
         }
     }
 
-    /// True where its work depends on readings.
+    /// True if the work depends on readings.
     fn needs_readings(&self) -> bool {
         match &self.set_up {
             None => self.motion != Motion::Blind,
@@ -292,7 +292,7 @@ impl Machine {
         }
     }
 
-    /// Does what the next task of the set-up asks for, where it rests.
+    /// Executes the next task of the set-up, if the machine rests.
     fn set_up_next(&mut self, calibration: &mut Calibration) -> Option<MachineNote> {
         if self.motion == Motion::Blind {
             self.order(Order::Home, calibration);
@@ -301,7 +301,7 @@ impl Machine {
         let at_m = self.at_m.filter(|_| matches!(self.motion, Motion::Up | Motion::Down))?;
         let set_up = self.set_up.as_mut()?;
         if set_up.is_between_tasks() {
-            // The next task waits, and needs readings, from now on.
+            // The next task begins to wait now, and needs readings from now on.
             (self.since, self.read_at) = (self.now, self.now);
         }
         let waited = self.now.saturating_sub(self.since);
@@ -313,7 +313,7 @@ impl Machine {
         None
     }
 
-    /// Does what the guide waits for.
+    /// Executes the step that the guide waits for.
     fn press_next(&mut self, calibration: &mut Calibration) -> Result<Option<MachineNote>, MachineError> {
         let waited = self.now.saturating_sub(self.since);
         match (self.motion, calibration.guide().waiting()) {
@@ -353,10 +353,10 @@ impl Machine {
         Ok(None)
     }
 
-    /// Lifts the finger, and waits for that.
+    /// Lifts the finger, and waits until it is lifted.
     ///
     /// # Errors
-    /// [`MachineError`] where it does not.
+    /// [`MachineError`] if the lift fails.
     pub fn finish(mut self) -> Result<(), MachineError> {
         let ends_with = self.ends_with.take();
         self.thread.finish()?;

@@ -1,9 +1,10 @@
-//! Guided calibration: presses at the right places, each taken when its reading is at rest.
+//! Guided calibration: presses at the planned places, each recorded when its reading is at rest.
 //!
-//! The [`Guide`] takes readings with their instants and says what it waits for; it uses no device, file or clock. A [`Calibration`] passes the readings of
-//! a source to it, and writes every press to the file of a [`Journal`] before the next one is asked for. A [`Machine`] presses in place of a person; an
-//! [`Assessment`] estimates the error of the locator, and the gain of more presses; a [`Check`] measures the error at fresh places. [`Statements`] are
-//! what the operator says before the first press; a [`SetUpTask`] has a machine show its way or find the height of the touch before it.
+//! The [`Guide`] receives readings with their instants and reports the step that it waits for; it uses no device, file or clock. A [`Calibration`]
+//! passes the readings of a source to it, and writes every press to the file of a [`Journal`] before it requests the next one. A [`Machine`]
+//! presses in place of a person. An [`Assessment`] estimates the error of the locator, and the gain of more presses; a [`Check`] measures the error
+//! at fresh places. [`Statements`] contain the information of the operator before the first press. A [`SetUpTask`] lets a machine show its path, or
+//! find the height of the touch, before the first press.
 
 mod assessment;
 mod baseline;

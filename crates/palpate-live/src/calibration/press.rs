@@ -2,13 +2,13 @@
 
 use palpate_mechanics::contact::Position;
 
-/// A press that is planned.
+/// A planned press.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Press {
     /// Position.
     pub position: Position,
-    /// Its force in newtons, where it is known.
+    /// Force in newtons, if it is known.
     pub force_n: Option<f64>,
-    /// Depth in metres, where a machine presses.
+    /// Depth in metres, if a machine presses.
     pub depth_m: Option<f64>,
 }

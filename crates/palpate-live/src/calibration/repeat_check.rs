@@ -1,4 +1,4 @@
-//! A press compared with earlier presses, before it is recorded.
+//! Comparison of a press with earlier presses, before it is recorded.
 
 use super::baseline::Baseline;
 use super::press::Press;
@@ -6,30 +6,30 @@ use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
 use std::fmt;
 
-/// Share of the smallest press so far below which a touch is doubtful.
+/// Share of the smallest press so far; a lighter touch is doubtful.
 const LIGHT_SHARE: f64 = 0.15;
-/// Deviation from the repeats of a press, as a share of its size, above which it is doubtful.
+/// Deviation from the repeats of a press, as a share of its size; a larger one is doubtful.
 const REPEAT_SHARE: f64 = 0.2;
-/// Largest share of a press that hysteresis is assumed to explain.
+/// Largest share of a press that is attributed to hysteresis.
 const MOST_RESIDUE_SHARE: f64 = 0.3;
-/// Growth of a reading, without a lift, that shows the recorded touch to have been a light one before the press.
+/// Growth of a reading without a lift above which the recorded touch was only a light one before the press.
 pub const GROWTH: f64 = 1.2;
-/// Times that one press is asked for again before it is recorded as it is.
+/// Largest number of repeated requests of one press; after these it is recorded unchanged.
 const MOST_REQUESTS: u32 = 2;
 
-/// Reason to ask for a press again.
+/// Reason to request a press again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Doubt {
-    /// The reading moved without a press: too slowly.
+    /// The reading changed too slowly for a press.
     Drift,
-    /// The press grew after its reading was taken, and was lifted before it rested.
+    /// The press grew after its reading was recorded, and was lifted before it came to rest.
     Grew,
     /// The touch is much lighter than earlier presses.
     Light {
         /// Size in % of an earlier press.
         percent: f64,
     },
-    /// The touch differs from the presses of its place.
+    /// The touch differs from the other presses of its place.
     OffRepeats {
         /// The difference in % of their size.
         percent: f64,
@@ -56,11 +56,11 @@ impl fmt::Display for Doubt {
 pub struct TouchReading {
     /// The reading.
     pub reading: Vec<f64>,
-    /// Deviation from the untouched reading before it.
+    /// Deviation from the previous untouched reading.
     pub deviation: Vec<f64>,
 }
 
-/// A press that was recorded.
+/// A recorded press.
 #[derive(Clone, Debug, PartialEq)]
 struct PastPress {
     position: Position,
@@ -75,16 +75,16 @@ impl PastPress {
     }
 }
 
-/// Presses so far, with which the next one is compared.
+/// Presses so far, for comparison with the next one.
 #[derive(Clone, Debug, Default)]
 pub struct RepeatCheck {
     past: Vec<PastPress>,
-    /// The press that was asked for again last, and how often.
+    /// The last press that was requested again, and the number of requests.
     refused: Option<TouchReading>,
     requests: u32,
-    /// Deviation up to which the last press grew after its reading was taken: a lighter touch is not the press.
+    /// Deviation up to which the last press grew after its reading was recorded: a lighter touch does not count as the press.
     outgrown: Option<Vec<f64>>,
-    /// Largest change between untouched readings that were recorded one after the other.
+    /// Largest change between consecutive recorded untouched readings.
     residue: Vec<f64>,
 }
 
@@ -109,9 +109,9 @@ impl RepeatCheck {
         own
     }
 
-    /// The reason to ask for a press with this touch again; `None` where it may be recorded.
+    /// The reason to request a press again, given its touch; `None` if it may be recorded.
     ///
-    /// A second press that confirms the first is recorded, so that nobody is asked in a circle.
+    /// A second press that confirms the first is recorded, to avoid endless requests.
     pub fn doubt(&self, press: &Press, touch: &TouchReading, baseline: &Baseline) -> Option<Doubt> {
         let is_confirmed = self
             .refused
@@ -127,7 +127,7 @@ impl RepeatCheck {
             return Some(Doubt::Light { percent: 100.0 * share });
         }
         let repeats = self.past.iter().filter(|past| past.is_repeat(press));
-        // Agreement with one of them is enough: another may be the wrong one.
+        // Agreement with one repeat is sufficient, because another may be the wrong one.
         let share = repeats.map(|past| self.excess_share(press, touch, &past.touch, baseline));
         if let Some(share) = share.min_by(f64::total_cmp) {
             return (share > REPEAT_SHARE).then_some(Doubt::OffRepeats { percent: 100.0 * share });
@@ -136,7 +136,7 @@ impl RepeatCheck {
         (share < LIGHT_SHARE).then_some(Doubt::Light { percent: 100.0 * share })
     }
 
-    /// Difference to an earlier press as a share of its size, less what the touches before both may have left by hysteresis.
+    /// Difference from an earlier press as a share of its size, less the share that hysteresis of earlier touches may have left.
     fn excess_share(
         &self,
         press: &Press,
@@ -166,7 +166,7 @@ impl RepeatCheck {
         }
     }
 
-    /// Notes that a press was asked for again.
+    /// Notes that a press was requested again.
     pub fn refuse(&mut self, touch: TouchReading) {
         self.refused = Some(touch);
         self.requests += 1;
@@ -179,19 +179,19 @@ impl RepeatCheck {
         self.forget_request();
     }
 
-    /// Forgets the last press.
+    /// Removes the last press.
     pub fn forget_last(&mut self) {
         self.past.pop();
         self.forget_request();
     }
 
-    /// Forgets the last press, which grew up to this deviation after its reading was taken.
+    /// Removes the last press, which grew up to this deviation after its reading was recorded.
     pub fn outgrow_last(&mut self, deviation: Vec<f64>) {
         self.forget_last();
         self.outgrown = Some(deviation);
     }
 
-    /// Forgets that a press was asked for again.
+    /// Resets the count of repeated requests.
     pub fn forget_request(&mut self) {
         self.refused = None;
         self.requests = 0;
@@ -199,10 +199,10 @@ impl RepeatCheck {
     }
 }
 
-/// Length of the difference of two touches as a share of the second.
+/// Length of the difference between two touches as a share of the second.
 ///
-/// Of a known force, the smaller difference counts of the deviations and of the readings: with hysteresis, the readings of a load agree, whatever the touch
-/// before it left. Where the force is unknown, only the directions of the deviations are compared.
+/// If the force is known, the smaller of two differences counts, that of the deviations and that of the readings: with hysteresis, the readings of
+/// a load agree after any earlier touch. If the force is unknown, only the directions of the deviations are compared.
 fn difference_share(
     press: &Press,
     touch: &TouchReading,

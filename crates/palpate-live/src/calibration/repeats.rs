@@ -1,23 +1,23 @@
-//! Repeatability: how far presses of one place are apart.
+//! Repeatability: the scatter of the presses at one place.
 
 use super::press::Press;
 use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
 
-/// A place of a plan, and how its presses agree.
+/// A place of a plan, and the agreement of its presses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// Position.
     pub position: Position,
-    /// Presses that were taken there.
+    /// Number of presses taken there.
     pub taken: usize,
-    /// Presses to come.
+    /// Number of presses to come.
     pub left: usize,
-    /// Standard deviation of its readings in % of their size; `None` of fewer than two, or of different forces.
+    /// Standard deviation of the readings in % of their size; `None` for fewer than two, or for different forces.
     pub spread_percent: Option<f64>,
 }
 
-/// Places of the presses that were taken and of those to come, in their order along the surface.
+/// Places of past and future presses, in their order along the surface.
 pub fn places(rows: &[Row], to_come: &[Press]) -> Vec<Place> {
     let mut positions: Vec<Position> = rows
         .iter()
@@ -40,13 +40,13 @@ pub fn places(rows: &[Row], to_come: &[Press]) -> Vec<Place> {
     positions.into_iter().map(place).collect()
 }
 
-/// Deviation of the last press from the mean of the others of its place and force, in % of its size; `None` where there are none.
+/// Deviation of the last press from the mean of the others at its place and force, in % of its size; `None` without others.
 pub fn last_deviation_percent(rows: &[Row]) -> Option<f64> {
     deviation_percent(rows, rows.len().checked_sub(1)?)
 }
 
-/// Deviation of the press at an index of the rows from the mean of the others of its place and force, in % of its size; `None` of an
-/// untouched row, and where there are no others.
+/// Deviation of the press at an index of the rows from the mean of the others at its place and force, in % of its size; `None` for an untouched
+/// row, or without others.
 pub fn deviation_percent(rows: &[Row], at: usize) -> Option<f64> {
     let press = rows.get(at).filter(|row| row.touches())?;
     let others = rows.iter().enumerate().filter(|(i, row)| *i != at && is_repeat(row, press));
@@ -73,7 +73,7 @@ fn spread_percent(rows: &[Row], here: &[(usize, &Row)]) -> Option<f64> {
     (size > 0.0).then(|| 100.0 * (squares / (presses.len() - 1) as f64).sqrt() / size)
 }
 
-/// True for presses of one place with one force.
+/// True for presses at one place with one force.
 fn is_repeat(row: &Row, other: &Row) -> bool {
     row.touches()
         && row.position == other.position
@@ -92,7 +92,7 @@ fn mean(rows: &[&Row], channels: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Euclidean distance of two readings.
+/// Euclidean distance between two readings.
 pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn repeats_are_measured_against_the_size_of_their_press() {
         let press = Press { position: Position::along(0.3), force_n: None, depth_m: None };
-        // Untouched at (1, 1); a press of (3, 4) less that is of size 5.
+        // Untouched at (1, 1); a press with a deviation of (3, 4) has size 5.
         let rows = [row(0.0, 0.0, [1.0, 1.0]), row(0.1, 2.0, [4.0, 5.0]), row(0.1, 2.0, [4.0, 5.1])];
         assert!((last_deviation_percent(&rows).unwrap() - 2.0).abs() < 1e-9);
         let places = places(&rows, &[press]);

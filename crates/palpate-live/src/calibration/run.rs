@@ -19,10 +19,10 @@ use palpate_rig::Stage;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A calibration that cannot go on.
+/// Error that ends a calibration.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
-    /// A press cannot be kept.
+    /// A press cannot be recorded.
     #[error(transparent)]
     Journal(#[from] JournalError),
     /// A press pulls at the load cell.
@@ -30,40 +30,40 @@ pub enum CalibrationError {
     LoadCell {
         /// Name.
         name: String,
-        /// The force that it reads.
+        /// The force at the load cell.
         force_n: f64,
     },
 }
 
-/// Time between two explanations of a step that takes long.
+/// Time between two explanations of a long step.
 const EXPLAIN_EVERY: Duration = Duration::from_secs(5);
 
-/// Note on what a calibration has read or done.
+/// Note on the readings or steps of a calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Note {
-    /// The source is there; its name.
+    /// The source was opened; its name.
     Opened(String),
-    /// The source went away, and is looked for again; why.
+    /// The source was lost, and is searched for again; the cause.
     Lost(String),
     /// No readings arrive: cause and remedy.
     NoReadings(String),
     /// Readings arrive again.
     ReadingsAgain,
-    /// The source has no more.
+    /// The source has ended.
     Ended,
-    /// Something else is waited for.
+    /// The guide waits for another step.
     Waits(Waiting),
     /// A press was recorded, and is on disk.
     Taken,
     /// The last press grew without a lift, and its row was replaced.
     Replaced,
-    /// The untouched surface was recorded, and is on disk where presses have a force.
+    /// The untouched surface was recorded. It is on disk if presses have a force.
     Untouched,
     /// The source repeats readings because it is faster than its sensors: each counts once.
     RepeatedReadings,
-    /// The press is asked for again.
+    /// The press is requested again.
     AskedAgain(Doubt),
-    /// A step takes long: what is waited for and what is read.
+    /// A step is long: the awaited condition and the present reading.
     StillWaiting(String),
     /// A channel reads the end of its range; its name.
     Saturated(String),
@@ -86,27 +86,27 @@ struct LoadCell {
 pub struct Calibration {
     guide: Guide,
     journal: Journal,
-    /// Frames of the channels and the load cell.
+    /// Frames with the channels and the load cell.
     frames: FrameReader,
     feed: FeedWatch,
-    /// True from a report that no readings arrive until the next reading.
+    /// True from a report of missing readings until the next reading.
     lacks_readings: bool,
     health: HealthWatch,
     load_cell: Option<LoadCell>,
     last: Vec<f64>,
     recent: RecentReadings,
-    /// True while readings are shown to the guide and to the detector: not while a machine moves.
+    /// True while the guide and the detector receive readings: not while a machine moves.
     is_guided: bool,
     /// Detector of a touch-off.
     touch_detector: Option<TouchDetector>,
     /// True once it was noted that the source repeats readings.
     notes_repeats: bool,
-    /// Step that is waited for, and the instant of its last explanation.
+    /// Awaited step, and the instant of its last explanation.
     explained: (Waiting, Duration),
 }
 
 impl Calibration {
-    /// A calibration through a plan; frames without names have these `columns`. A stage may have a load cell, which is the last channel then.
+    /// A calibration for a plan. Frames without names have these `columns`. A stage may have a load cell, which is then the last channel.
     ///
     /// # Errors
     /// [`ColumnsError`] unless every channel is named once.
@@ -159,33 +159,34 @@ impl Calibration {
         &self.journal
     }
 
-    /// Frames that were no reading, by cause.
+    /// Frames that contained no valid reading, by cause.
     pub fn bad_frames(&self) -> &BTreeMap<BadFrame, u64> {
         self.frames.bad_frames()
     }
 
-    /// Readings that arrived.
+    /// Number of readings that arrived.
     pub fn readings(&self) -> u64 {
         self.frames.readings()
     }
 
-    /// Fault of the source: no reading arrived, or none towards the end.
+    /// Fault of the source: no reading arrived, or none near the end.
     pub fn fault(&self) -> Option<String> {
         self.feed.fault(&self.frames)
     }
 
-    /// The last reading, in SI units or raw, without the load cell; empty before there was one.
+    /// The last reading, in SI units or raw, without the load cell; empty before the first.
     pub fn last_reading(&self) -> &[f64] {
         &self.last
     }
 
-    /// Force at the load cell, in newtons, less what it read untouched; `None` without one, or before the first reading.
+    /// Force at the load cell, in newtons, less its untouched reading; `None` without one, or before the first reading.
     pub fn cell_force_n(&self) -> Option<f64> {
         let cell = self.load_cell.as_ref()?;
         Some(cell.now_n? - self.cell_untouched_n())
     }
 
-    /// Untouched reading of the load cell, in newtons: its first reading until one is learnt at rest, as a cell that is not tared has an offset.
+    /// Untouched reading of the load cell, in newtons. It is the first reading until one is learnt at rest, because a cell that is not tared has an
+    /// offset.
     fn cell_untouched_n(&self) -> f64 {
         let of_guide = self.guide.untouched_reading().and_then(|reading| reading.last().copied());
         let of_detector = || self.touch_detector.as_ref().and_then(TouchDetector::untouched_last);
@@ -193,14 +194,14 @@ impl Calibration {
         of_guide.or_else(of_detector).or_else(first).unwrap_or(0.0)
     }
 
-    /// Takes what a source brought; what follows is added to `notes`.
+    /// Processes an arrival from a source; resulting notes are added to `notes`.
     ///
     /// # Errors
-    /// [`CalibrationError`] where a press cannot be kept.
+    /// [`CalibrationError`] if a press cannot be recorded.
     pub fn receive(&mut self, arrived: &Arrived, notes: &mut Vec<Note>) -> Result<(), CalibrationError> {
         match &arrived.arrival {
             Arrival::Opened(name) | Arrival::Piped(name) | Arrival::Joined(name) => {
-                // Offsets of a board that was away may have moved.
+                // The offsets of a board that was disconnected may have changed.
                 self.guide.relearn();
                 notes.push(Note::Opened(name.clone()));
             }
@@ -222,7 +223,7 @@ impl Calibration {
         Ok(())
     }
 
-    /// Notes once that no readings arrive; to be called often while nothing arrives.
+    /// Notes once that no readings arrive; must be called often during a silence.
     pub fn check_feed(&mut self, now: Duration, notes: &mut Vec<Note>) {
         if let Some(words) = self.feed.report(now, &self.frames) {
             self.lacks_readings = true;
@@ -254,7 +255,7 @@ impl Calibration {
             return Ok(());
         }
         if let Some(detector) = &mut self.touch_detector {
-            // A load cell sees the touch best: its value alone decides.
+            // A load cell is the most sensitive to the touch: its value alone decides.
             let from = if self.load_cell.is_some() { channels } else { 0 };
             detector.add(at, &reading[from..]);
         }
@@ -295,7 +296,7 @@ impl Calibration {
         Ok(())
     }
 
-    /// Keeps the trace of the press that was recorded last, from before its untouched row on.
+    /// Stores the trace of the last recorded press, beginning before its untouched row.
     fn trace_last_press(&mut self) {
         let rows = self.journal.rows();
         let Some(untouched) = untouched_before(rows, rows.len()) else { return };
@@ -305,7 +306,7 @@ impl Calibration {
         self.journal.set_trace(trace);
     }
 
-    /// Explains a step that takes long, except the wait for a press.
+    /// Explains a long step, except the wait for a press.
     fn explain(&mut self, at: Duration, notes: &mut Vec<Note>) {
         let waiting = self.guide.waiting();
         let (explained, since) = self.explained;
@@ -317,7 +318,8 @@ impl Calibration {
         }
     }
 
-    /// The row of a press with the force of the load cell, where there is one: the mean of the stretch at rest, as a force is no reading that is located.
+    /// The row of a press with the force of the load cell, if there is one. The force is the mean of the stretch at rest, because it is not a
+    /// reading to be located.
     fn weighed(&self, press: RestingRow) -> Result<Row, CalibrationError> {
         let Some(cell) = &self.load_cell else { return Ok(press.row) };
         let force_n = press.mean.last().map_or(0.0, |read_n| read_n - self.cell_untouched_n());
@@ -333,7 +335,7 @@ impl Calibration {
         row
     }
 
-    /// Shows readings to the guide from now on, or not: those that are taken while a machine moves mean nothing.
+    /// Sets whether the guide receives readings: those during a move of a machine are meaningless.
     pub(super) fn set_guided(&mut self, is_guided: bool) {
         if is_guided != self.is_guided {
             self.guide.forget_readings();
@@ -344,7 +346,7 @@ impl Calibration {
         self.is_guided = is_guided;
     }
 
-    /// Begins to look for a touch in the readings, or ends that.
+    /// Starts or ends the detection of a touch in the readings.
     pub(super) fn detect_touch(&mut self, is_wanted: bool) {
         self.touch_detector = is_wanted.then(TouchDetector::default);
     }
@@ -354,10 +356,10 @@ impl Calibration {
         self.touch_detector.as_mut()
     }
 
-    /// Takes back the last press, which is asked for again; false where there is none.
+    /// Takes back the last press, which is requested again; false if there is none.
     ///
     /// # Errors
-    /// [`JournalError`] where the file cannot be written.
+    /// [`JournalError`] if the file cannot be written.
     pub fn redo(&mut self) -> Result<bool, JournalError> {
         if !self.guide.redo() {
             return Ok(false);
@@ -366,25 +368,25 @@ impl Calibration {
         Ok(true)
     }
 
-    /// Learns the untouched reading anew: the operator says that nothing touches.
+    /// Learns the untouched reading again, after the operator has stated that the surface is untouched.
     pub fn relearn_untouched(&mut self) {
         self.guide.relearn();
     }
 
-    /// Strikes out a press, counted from 0; false where there is no such press. [`Self::replan`] asks for it again.
+    /// Strikes out a press, counted from 0; false if the press does not exist. [`Self::replan`] requests it again.
     ///
     /// # Errors
-    /// [`JournalError`] where the file cannot be written.
+    /// [`JournalError`] if the file cannot be written.
     pub fn strike(&mut self, press: usize) -> Result<bool, JournalError> {
         self.journal.strike(press)
     }
 
-    /// Asks for these presses from now on; the untouched reading is learnt anew.
+    /// Requests these presses from now on; the untouched reading is learnt again.
     pub fn replan(&mut self, to_come: Vec<Press>) {
         self.guide = Guide::new(to_come).with_rows(self.journal.rows());
     }
 
-    /// Leaves out the press that is next.
+    /// Leaves out the next press.
     pub fn skip(&mut self) {
         self.guide.skip();
     }

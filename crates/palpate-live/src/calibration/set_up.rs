@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Longest jog along an axis, in metres.
 pub const LONGEST_JOG_M: f64 = 0.01;
 
-/// Places of a plan, each once, over which a dry run travels.
+/// Places of a plan, each once, for a dry run.
 pub fn dry_run(plan: &[Press]) -> Vec<Position> {
     let mut places: Vec<Position> = plan.iter().map(|press| press.position).collect();
     places.dedup();
@@ -23,13 +23,13 @@ pub fn dry_run(plan: &[Press]) -> Vec<Position> {
 /// Task of a machine that is set up.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SetUpTask {
-    /// To travel over these places at the height of travel, and to end.
+    /// Travel over these places at the height of travel, and end.
     DryRun(Vec<Position>),
-    /// To move by these distances along x, y and z, never below the height of travel.
+    /// Move by these distances along x, y and z, never below the height of travel.
     Jog([f64; 3]),
-    /// To find the height of the touch where it is.
+    /// Find the height of the touch at the current position.
     TouchOff,
-    /// To end with the finger lifted.
+    /// End with the finger lifted.
     End,
 }
 
@@ -38,7 +38,7 @@ pub enum SetUpTask {
 pub enum SetUpNote {
     /// A dry run is above a place.
     Above(Position),
-    /// A dry run has ended after so many places.
+    /// A dry run has ended after this number of places.
     DryRunEnded(usize),
     /// A jog ended at this position, in metres of the machine.
     At([f64; 3]),
@@ -94,7 +94,7 @@ pub(super) enum SetUpAction {
 /// A task under way.
 #[derive(Debug)]
 enum Work {
-    /// The places to come, the one that it travels to, and the number of those that it reached.
+    /// The places to come, the place that it travels to, and the number of places that it reached.
     DryRun {
         places: VecDeque<Position>,
         to: Option<Position>,
@@ -124,7 +124,7 @@ impl SetUp {
 
     pub fn ask(&mut self, task: SetUpTask) {
         match task {
-            // Whatever goes on: the machine lifts its finger as it is finished.
+            // This ends any task, because the machine lifts its finger when it is finished.
             SetUpTask::End => self.has_ended = true,
             task => self.asked.push_back(task),
         }
@@ -144,7 +144,7 @@ impl SetUp {
         self.work.is_none()
     }
 
-    /// True while a touch-off goes down by what the readings show.
+    /// True while a touch-off lowers the finger according to the readings.
     pub fn needs_readings(&self) -> bool {
         matches!(self.work, Some(Work::TouchOff(_)))
     }
@@ -173,7 +173,7 @@ impl SetUp {
         };
         let is_over = matches!(&action, SetUpAction::Note(note) if !matches!(note, SetUpNote::Above(_)));
         if is_over {
-            // Nobody waits for what comes after a dry run.
+            // A dry run ends the set-up, because no user waits for further tasks.
             self.has_ended |= matches!(action, SetUpAction::Note(SetUpNote::DryRunEnded(_)));
             self.work = None;
             calibration.detect_touch(false);
@@ -198,7 +198,7 @@ impl SetUp {
     }
 }
 
-/// Travels over the next place, once the last one was reached.
+/// Travels over the next place, after the last one was reached.
 fn fly_over(places: &mut VecDeque<Position>, to: &mut Option<Position>, reached: &mut usize) -> SetUpAction {
     if let Some(position) = to.take() {
         *reached += 1;

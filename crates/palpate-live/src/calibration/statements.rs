@@ -8,16 +8,16 @@ use palpate_rig::Rig;
 /// Statements of the operator.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Statements {
-    /// Standard deviation in each direction of the pressed place about the asked one, in metres.
+    /// Standard deviation of the pressed place about the requested one, in each direction, in metres.
     pub placement_sd_m: Option<f64>,
     /// A second weight, in newtons.
     pub second_force_n: Option<f64>,
-    /// True where contacts in use have the force of the presses.
+    /// True if contacts in use have the force of the presses.
     pub force_is_known: bool,
 }
 
 impl Statements {
-    /// Checks that numbers are finite and greater than 0.
+    /// Checks that the numbers are finite and greater than 0.
     ///
     /// # Errors
     /// [`OutOfRange`].
@@ -28,7 +28,7 @@ impl Statements {
         )
     }
 
-    /// These, completed by what the rig and a file of presses say.
+    /// The statements, completed from the rig and from a file of presses.
     #[must_use]
     pub fn or_known(self, rig: &Rig, force_n: Option<f64>, in_file_m: Option<f64>, before: &[Row]) -> Self {
         let of_rig = rig.training.as_ref().and_then(|training| training.placement_sd_m);
@@ -42,7 +42,7 @@ impl Statements {
         }
     }
 
-    /// The rig as stated: with the force in use where it is that of the presses.
+    /// The rig according to the statements: with a known force in use, if it is that of the presses.
     #[must_use]
     pub fn applied_to(&self, rig: &Rig, force_n: Option<f64>) -> Rig {
         let mut rig = rig.clone();
@@ -58,8 +58,8 @@ impl Statements {
         Weights { force_n, second_n: self.second_force_n.filter(|_| !self.force_is_known) }
     }
 
-    /// The one weight of all presses, in newtons, where one is too few: a surface without a model learns from the forces of its presses how a
-    /// reading grows with the force, and the force in use is unknown.
+    /// The single weight of all presses, in newtons, if one is not enough. This is the case for a surface without a model and an unknown force in
+    /// use: the forces of the presses show how a reading grows with the force.
     pub fn single_weight_n(&self, rig: &Rig, force_n: Option<f64>) -> Option<f64> {
         let has_forces = rig.setup.recording_columns().force.is_some();
         let asks = rig.setup.surface().model().is_none()
@@ -113,7 +113,7 @@ kind = "influence"
         for answered in [
             Statements { second_force_n: Some(4.0), ..stated },
             Statements { force_is_known: true, ..stated },
-            // The file of presses has a second weight already.
+            // The file of presses already contains a second weight.
             stated.or_known(&rig, None, None, &[row(0.0), row(2.0), row(4.0)]),
         ] {
             assert_eq!(answered.single_weight_n(&rig, None), None, "{answered:?}");

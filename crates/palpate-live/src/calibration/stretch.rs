@@ -4,13 +4,13 @@ use palpate_estimators::recording::{RepeatCause, RepeatCounts, is_same_reading};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Span over which readings are judged to be at rest, and the fewest readings: those of a slow board span more.
+/// Span over which readings are tested for rest, and the smallest number of readings: those of a slow board span more.
 pub const REST_SPAN: Duration = Duration::from_millis(400);
 const REST_READINGS: usize = 8;
-/// Span from which the noise is learnt, and the fewest readings in it.
+/// Span from which the noise is learnt, and the smallest number of readings in it.
 const NOISE_SPAN: Duration = Duration::from_secs(1);
 const NOISE_READINGS: usize = 20;
-/// Longest span that is kept: a steady drift shows in it.
+/// Longest stored span: it is long enough to show a steady drift.
 pub const LONGEST_SPAN: Duration = Duration::from_secs(3);
 
 /// The readings of the last seconds, with their instants.
@@ -20,7 +20,7 @@ pub struct Stretch {
 }
 
 impl Stretch {
-    /// Adds a reading, and forgets those that are older than [`LONGEST_SPAN`].
+    /// Adds a reading, and removes those that are older than [`LONGEST_SPAN`].
     pub fn add(&mut self, at: Duration, reading: &[f64]) {
         self.readings.push_back((at, reading.to_vec()));
         while self.readings.len() > NOISE_READINGS
@@ -30,12 +30,12 @@ impl Stretch {
         }
     }
 
-    /// Forgets all readings.
+    /// Removes all readings.
     pub fn clear(&mut self) {
         self.readings.clear();
     }
 
-    /// True for a single reading, as after a machine moved.
+    /// True for a single reading, for example after a move of a machine.
     pub fn has_one_reading(&self) -> bool {
         self.readings.len() == 1
     }
@@ -50,7 +50,8 @@ impl Stretch {
         self.readings.back().map(|(_, reading)| reading.as_slice())
     }
 
-    /// The reading in the middle of [`Self::latest`], with its instant; before that is covered, in the middle of the last [`REST_SPAN`].
+    /// The reading in the middle of [`Self::latest`], with its instant; before that span is covered, the one in the middle of the last
+    /// [`REST_SPAN`].
     pub fn middle(&self) -> Option<(Duration, &[f64])> {
         let last = self.last_at()?;
         let begin = self.rest_begin().unwrap_or(last.saturating_sub(REST_SPAN));
@@ -73,15 +74,15 @@ impl Stretch {
         Some(readings)
     }
 
-    /// Begin of the span over which readings are judged to be at rest, where it is covered.
+    /// Begin of the span over which readings are tested for rest, if it is covered.
     fn rest_begin(&self) -> Option<Duration> {
         let few = self.readings.len().checked_sub(REST_READINGS)?;
         let begin = self.last_at()?.checked_sub(REST_SPAN)?.min(self.readings[few].0);
-        // One reading at the begin or before it shows that the span is covered.
+        // A reading at the begin or before it shows that the span is covered.
         (self.readings.front()?.0 <= begin).then_some(begin)
     }
 
-    /// True where the source repeats readings because it is faster than its sensors; the readings must be at rest.
+    /// True if the source repeats readings because it is faster than its sensors; the readings must be at rest.
     pub fn is_sample_and_hold(&self) -> bool {
         let Some(reading) = self.last() else { return false };
         let mut counts = RepeatCounts::new(reading.len());
@@ -95,7 +96,7 @@ impl Stretch {
         self.last().is_some_and(|last| is_same_reading(last, reading))
     }
 
-    /// The stretch without readings that repeat the one before them; `None` where there are no such readings.
+    /// The stretch without readings that repeat their predecessor; `None` if none does.
     pub fn without_repeats(&self) -> Option<Self> {
         let pairs = self.readings.iter().zip(self.readings.iter().skip(1));
         if !pairs.into_iter().any(|((_, before), (_, reading))| is_same_reading(before, reading)) {
@@ -110,7 +111,7 @@ impl Stretch {
         Some(distinct)
     }
 
-    /// The readings of at least a second, with seconds before the last one, where they are enough to learn the noise from.
+    /// The readings of at least a second, with seconds before the last one, if they are sufficient to learn the noise.
     pub fn for_noise(&self) -> Option<Vec<(f64, &[f64])>> {
         let end = self.last_at()?;
         let span = end.saturating_sub(self.readings.front()?.0);
@@ -120,7 +121,7 @@ impl Stretch {
         (span >= NOISE_SPAN && readings.len() >= NOISE_READINGS).then_some(readings)
     }
 
-    /// The readings of the last second, and the one before them, which is older after a pause.
+    /// The readings of the last second, and the reading before them, which is older after a pause.
     pub fn last_second(&self) -> impl Iterator<Item = &[f64]> {
         let begin = self.last_at().unwrap_or_default().saturating_sub(NOISE_SPAN);
         let later = self.readings.partition_point(|(at, _)| *at <= begin);

@@ -1,7 +1,7 @@
 //! Touch-off: the height at which a machine's finger touches the untouched surface, found by the readings.
 //!
-//! The finger goes down in steps, at rest after each, until the readings show the touch. A coarse pass from the height of travel finds the step of the
-//! touch; after a lift, which must bring the untouched reading back, a fine pass finds the height within that step.
+//! The finger goes down in steps, and rests after each, until the readings show the touch. A coarse pass from the height of travel finds the step
+//! of the touch. After a lift, which must restore the untouched reading, a fine pass finds the height within that step.
 
 use super::baseline::{Baseline, NOISE_LIMIT_SD};
 use super::guide::ONSET_READINGS;
@@ -9,20 +9,20 @@ use super::stretch::{Stretch, mean};
 use palpate_rig::Stage;
 use std::time::Duration;
 
-/// Readings without a touch that show that nothing touches.
+/// Number of readings without a touch that shows an untouched surface.
 const CLEAR_READINGS: usize = 2 * ONSET_READINGS as usize;
-/// Share of the shallowest press that a coarse step is: a touch-off presses no harder than that.
+/// Coarse step as a share of the shallowest press, which limits how hard a touch-off presses.
 const COARSE_SHARE: f64 = 0.1;
-/// Share of a coarse step that a fine one is.
+/// Fine step as a share of the coarse step.
 const FINE_SHARE: f64 = 0.1;
 /// Smallest step in metres: a firmware reports hundredths of a millimetre.
 const LEAST_STEP_M: f64 = 1e-5;
 /// Share of the deviation of a touch that may remain after the lift.
 const RETURN_SHARE: f64 = 0.5;
-/// Time in which the untouched reading must come to rest, and return after a lift.
+/// Time limit for the untouched reading to come to rest, and to return after a lift.
 const SETTLES_WITHIN: Duration = Duration::from_secs(30);
 
-/// Reason for which a touch-off found no height.
+/// Reason why a touch-off found no height.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TouchOffFailure {
     /// The lowest height was reached.
@@ -34,13 +34,13 @@ pub enum TouchOffFailure {
         /// The lowest height, in metres of the machine.
         lowest_m: f64,
     },
-    /// The untouched reading does not rest.
+    /// The untouched reading does not come to rest.
     #[error(
         "the untouched readings have not come to rest within {} s: keep the surface free of other contacts",
         SETTLES_WITHIN.as_secs()
     )]
     NoRest,
-    /// The reading stays where it was when the finger is lifted.
+    /// The reading does not return when the finger is lifted.
     #[error(
         "the readings did not return within {} s after the lift: they drift, or something else touches the surface",
         SETTLES_WITHIN.as_secs()
@@ -48,29 +48,29 @@ pub enum TouchOffFailure {
     NoReturn,
 }
 
-/// Contact as the readings show it.
+/// State of contact according to the readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Contact {
-    /// Too few readings came since the last move.
+    /// There are too few readings since the last move.
     Undecided,
     None,
     Touch,
 }
 
-/// Readings of a finger at rest, compared with the untouched reading.
+/// Readings of a finger at rest, for comparison with the untouched reading.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TouchDetector {
     /// Readings since the last move.
     stretch: Stretch,
     baseline: Option<Baseline>,
-    /// Readings since the last move, and those in a row that deviate by more than noise.
+    /// Number of readings since the last move, and number of consecutive ones that deviate by more than noise.
     count: usize,
     deviating: u32,
     is_touched: bool,
 }
 
 impl TouchDetector {
-    /// Takes a reading: the load cell's value, or those of all channels.
+    /// Processes a reading: the load cell's value, or the values of all channels.
     pub fn add(&mut self, at: Duration, reading: &[f64]) {
         self.stretch.add(at, reading);
         self.count += 1;
@@ -84,7 +84,7 @@ impl TouchDetector {
         }
     }
 
-    /// Forgets the readings before a move; what is learnt stays.
+    /// Discards the readings before a move; the baseline is kept.
     pub fn forget_readings(&mut self) {
         *self = Self { baseline: self.baseline.take(), ..Self::default() };
     }
@@ -102,7 +102,7 @@ impl TouchDetector {
         }
     }
 
-    /// Largest deviation of the mean of the readings at rest, in standard deviations of the noise; `None` while there are too few.
+    /// Largest deviation of the mean of the readings at rest, in standard deviations of the noise; `None` while there are too few readings.
     fn size(&self) -> Option<f64> {
         let readings: Vec<&[f64]> = self.stretch.last_second().collect();
         let baseline = self.baseline.as_ref().filter(|_| readings.len() >= CLEAR_READINGS)?;
@@ -119,7 +119,7 @@ pub(super) enum TouchOffAction {
     Lower(f64),
     /// The finger is lifted to the height of travel.
     Lift,
-    /// The finger is lifted, and touches at this height.
+    /// The finger is lifted, and the touch is at this height.
     Found(f64),
     /// The finger is lifted.
     Failed(TouchOffFailure),
@@ -134,7 +134,7 @@ enum Step {
     Down { z_m: f64 },
     /// The finger was lifted after a touch of this deviation.
     Return { size: f64 },
-    /// The finger is lifted, and nothing was found.
+    /// The finger is lifted, and no height was found.
     Failed(TouchOffFailure),
 }
 
@@ -142,7 +142,7 @@ enum Step {
 #[derive(Clone, Debug)]
 pub(super) struct TouchOff {
     step: Step,
-    /// Heights of the present pass, in metres of the machine: the first, the lowest, and the distance of two.
+    /// Heights of the present pass, in metres of the machine: the first, the lowest, and the distance between two.
     top_m: f64,
     lowest_m: f64,
     step_m: f64,
@@ -153,7 +153,7 @@ pub(super) struct TouchOff {
 }
 
 impl TouchOff {
-    /// A search in the machine's present place, from the height of travel to the deepest press.
+    /// A search at the machine's present position, from the height of travel to the deepest press.
     pub fn new(stage: &Stage) -> Self {
         let shallowest_m = stage.depths_m.iter().copied().fold(f64::INFINITY, f64::min);
         let step_m = (COARSE_SHARE * shallowest_m).max(LEAST_STEP_M);
@@ -167,7 +167,7 @@ impl TouchOff {
         }
     }
 
-    /// The action that follows from the readings since the last one. `waited` is the time since then.
+    /// The action that follows from the readings since the last action. `waited` is the time since then.
     pub fn next(&mut self, waited: Duration, detector: &mut TouchDetector) -> TouchOffAction {
         match self.step {
             Step::Learn => self.learn(waited, detector),
@@ -210,7 +210,7 @@ impl TouchOff {
         }
     }
 
-    /// A reading that stays after the lift was no touch.
+    /// Checks that the reading returns after the lift; otherwise it was not a touch.
     fn check_return(&mut self, size: f64, waited: Duration, detector: &mut TouchDetector) -> TouchOffAction {
         match detector.size() {
             Some(now) if now < RETURN_SHARE * size => {}
@@ -220,7 +220,7 @@ impl TouchOff {
         if let Some(found_m) = self.found_m {
             return TouchOffAction::Found(found_m);
         }
-        // Nothing touched one coarse step higher.
+        // One coarse step higher, the surface was untouched.
         let coarse_m = self.coarse_m.unwrap_or(self.top_m);
         (self.top_m, self.lowest_m) = (coarse_m + self.step_m, (coarse_m - self.step_m).max(self.lowest_m));
         self.step_m = (FINE_SHARE * self.step_m).max(LEAST_STEP_M);
@@ -238,10 +238,10 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     const TOUCH_M: f64 = 0.0217;
-    /// Distance of two readings.
+    /// Time between two readings.
     const EVERY: Duration = Duration::from_millis(10);
 
-    /// A stage whose `touch` is 0.3 mm too high, as it stands above the surface.
+    /// A stage with a `touch` that is 0.3 mm too high, so that it is above the surface.
     fn stage() -> Stage {
         Stage {
             origin_m: (0.0, 0.0),
@@ -256,7 +256,7 @@ mod tests {
         }
     }
 
-    /// Outcome of a search over a surface whose reading follows from the finger's height and the time; with the lowest height and the time.
+    /// Outcome of a search over a surface with a reading that depends on the finger's height and the time; with the lowest height and the time.
     fn search(
         setup: &Stage,
         read: impl Fn(f64, f64) -> Vec<f64>,
@@ -286,7 +286,7 @@ mod tests {
         }
     }
 
-    /// 3,000 counts a millimetre, of two channels with an offset and a noise of 1 count.
+    /// 3,000 counts a millimetre, for two channels with an offset and a noise of 1 count.
     fn counts(z_m: f64) -> Vec<f64> {
         let depth_mm = (TOUCH_M - z_m).max(0.0) * 1e3;
         vec![500.0 + 3000.0 * depth_mm, -80.0 - 900.0 * depth_mm]
@@ -304,7 +304,7 @@ mod tests {
 
     #[test]
     fn a_weak_reading_is_found_where_it_exceeds_the_noise() {
-        // 20 counts a millimetre: the touch shows 0.4 mm below the surface.
+        // 20 counts a millimetre: the touch becomes detectable 0.4 mm below the surface.
         let weak = |z_m: f64, _| vec![20.0 * (TOUCH_M - z_m).max(0.0) * 1e3];
         let found_m = search(&stage(), weak).0.unwrap();
         assert!((3e-4..6e-4).contains(&(TOUCH_M - found_m)), "{found_m}");

@@ -1,4 +1,4 @@
-//! Binary frames: values of 32 bits with a number, a time and a checksum, stuffed so that a zero byte ends each.
+//! Binary frames: 32-bit values with a number, a time and a checksum. The bytes are stuffed, and a zero byte ends each frame.
 //!
 //! | bytes | content |
 //! |---|---|
@@ -10,24 +10,24 @@
 //! | 2 | CRC-16/CCITT-FALSE of all bytes before |
 //!
 //! All numbers are little-endian. The bytes are stuffed by COBS (Cheshire, Baker, "Consistent Overhead Byte Stuffing", IEEE/ACM Transactions on
-//! Networking 7, 1999), and a zero follows. COBS is written here: the crate `cobs` brings five others for these two functions.
+//! Networking 7, 1999), and a zero follows. COBS is implemented here: the crate `cobs` adds five dependencies for these two functions.
 
 use super::names::{Filling, Names, Role};
 use super::{BadFrame, Frame};
 use crc::{CRC_16_IBM_3740, Crc};
 use std::time::Duration;
 
-/// CRC-16/CCITT-FALSE, of which IBM 3740 is another name.
+/// CRC-16/CCITT-FALSE, also named IBM 3740.
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 /// Type of a frame of values.
 const VALUES: u8 = 1;
-/// Bytes before the values, and after.
+/// Bytes before and after the values.
 const HEAD: usize = 10;
 const TAIL: usize = 2;
-/// Most bytes of a stuffed frame, without the zero: 255 values, and one byte more in each 254.
+/// Most bytes of a stuffed frame, without the zero: 255 values, and one additional byte per 254.
 pub const LONGEST: usize = HEAD + 4 * 255 + TAIL + 5;
 
-/// Appends the binary frame of up to 255 values to `bytes`; further values are left out.
+/// Appends the binary frame of up to 255 values to `bytes`; further values are omitted.
 pub fn encode_into(bytes: &mut Vec<u8>, sequence: u32, time_us: u32, values: &[f32]) {
     let values = &values[..values.len().min(255)];
     let mut frame = Vec::with_capacity(HEAD + 4 * values.len() + TAIL);
@@ -81,7 +81,7 @@ fn stuff(bytes: &[u8], to: &mut Vec<u8>) {
         let block = &block[..zero.unwrap_or(block.len())];
         to.push(block.len() as u8 + 1);
         to.extend_from_slice(block);
-        // A full block stands for no zero, and so does the last.
+        // A full block does not imply a zero after it; neither does the last block.
         match zero {
             Some(zero) => rest = &rest[zero + 1..],
             None if block.len() == rest.len() => return,
@@ -90,7 +90,7 @@ fn stuff(bytes: &[u8], to: &mut Vec<u8>) {
     }
 }
 
-/// Puts the bytes that were stuffed into `to`; `None` where they cannot have been.
+/// Writes the unstuffed bytes into `to`; `None` for invalid stuffing.
 fn unstuff(stuffed: &[u8], to: &mut Vec<u8>) -> Option<()> {
     to.clear();
     let mut rest = stuffed;

@@ -7,11 +7,11 @@ use palpate_mechanics::units::Unit;
 /// Channel of a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// Name of its sensor.
+    /// Name of the sensor.
     pub name: String,
-    /// Name by which a board calls it: the column of the recordings that the locator learnt from, where that has a name.
+    /// Name in the frames of a board: the column of the locator's calibration recordings, if it has a name.
     pub label: String,
-    /// Unit of the board's numbers: that of the recordings.
+    /// Unit of the numbers of the board, which is that of the recordings.
     pub unit: Unit,
 }
 

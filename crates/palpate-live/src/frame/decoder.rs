@@ -9,29 +9,29 @@ use super::{BadFrame, Channel, Frame, quote};
 const LONGEST_LINE: usize = 1 << 16;
 /// Most bytes of a message.
 pub const LONGEST_MESSAGE: usize = 1 << 17;
-/// Bytes of a frame that are kept for a quotation of at most 80 characters, of up to four bytes each.
+/// Bytes of a frame that are kept for a quotation: at most 80 characters of up to four bytes each.
 const QUOTED: usize = 320;
 
 /// Decoder of the frames of a source: text or binary, whichever it sends.
 ///
-/// A stream is text once a line is a frame or a header, and binary once the bytes between two zeros are a frame with its checksum. What it is does
-/// not depend on how its bytes are cut.
+/// A stream is text once a line is a frame or a header, and binary once the bytes between two zeros are a frame with its checksum. The decision does
+/// not depend on how the bytes are split into arrivals.
 #[derive(Debug)]
 pub struct Decoder {
     text: TextReader,
     form: Form,
-    /// Bytes since the last line end (text), the last zero (binary), or the last that is judged (unknown).
+    /// Bytes since the last line end (text), the last zero (binary), or the last decided byte (unknown).
     held: Vec<u8>,
     /// Unknown form: start of the last line in `held`.
     line_start: usize,
-    /// Unknown form: lines in `held` that are no text.
+    /// Unknown form: lines in `held` that are not text.
     not_text: u64,
-    /// The start of the present line, or binary frame, is not there.
+    /// The start of the present line, or binary frame, is missing.
     torn_line: bool,
     torn_binary: bool,
-    /// Bytes are left out until a frame ends, for there were too many.
+    /// Bytes are skipped up to the end of a frame that is too long.
     skips: bool,
-    /// Start of the last frame that was no reading, empty before there was one.
+    /// Start of the last bad frame; empty before the first one.
     last_bad: Vec<u8>,
     scratch: Vec<u8>,
 }
@@ -44,10 +44,10 @@ enum Form {
     Binary,
 }
 
-/// Names of unnamed values that do not name every channel.
+/// Columns that do not name every channel once.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ColumnsError {
-    /// A channel that has no column.
+    /// A channel without a column.
     #[error(
         "the columns {columns} have no channel `{channel}`; name every channel, and anything else that a line has"
     )]
@@ -84,8 +84,8 @@ impl Decoder {
         }
     }
 
-    /// Names the values of frames that have no names: channels, time, number of the frame, and others, which are left out. Without any they stay the
-    /// channels in their order.
+    /// Names the values of frames without names: channels, time, number of the frame, and others, which are ignored. With an empty list the values stay
+    /// the channels in their order.
     ///
     /// # Errors
     /// [`ColumnsError`] unless every channel is named once.
@@ -106,7 +106,7 @@ impl Decoder {
         Ok(())
     }
 
-    /// Begins a stream; names that a header gave are kept, for a board that was merely unplugged from the host does not say them again.
+    /// Begins a stream. Names from a header are kept, because a board that was only unplugged from the host does not repeat its header.
     pub fn open(&mut self) {
         self.form = Form::Unknown;
         self.text.open();
@@ -114,13 +114,13 @@ impl Decoder {
         (self.torn_line, self.torn_binary, self.skips) = (false, false, false);
     }
 
-    /// Begins a stream amid its frames: what comes before the first end of a frame is left out, unless it is a frame for certain.
+    /// Begins a stream amid its frames: bytes before the first end of a frame are skipped, unless they are certainly a whole frame.
     pub fn join(&mut self) {
         self.open();
         (self.torn_line, self.torn_binary) = (true, true);
     }
 
-    /// Takes the next bytes of a stream, and hands on the frames that they end.
+    /// Takes the next bytes of a stream, and hands on the completed frames.
     pub fn receive(&mut self, mut bytes: &[u8], mut hand_on: impl FnMut(Result<Frame, BadFrame>)) {
         while !bytes.is_empty() {
             let taken = if self.skips {
@@ -136,17 +136,17 @@ impl Decoder {
         }
     }
 
-    /// Takes bytes of a stream that waited for it to be opened: their readings are old, and only names in a header count.
+    /// Takes bytes that waited before the stream was opened. Their readings are old; only names in a header are used.
     pub fn receive_waiting(&mut self, bytes: &[u8]) {
         self.receive(bytes, |_| {});
         if !self.held.is_empty() {
-            // The frame that has begun is old, too; a line end may stand within it where it is binary.
+            // The incomplete frame is old, too. A binary frame can contain a line end.
             self.clear();
             (self.skips, self.torn_binary) = (true, true);
         }
     }
 
-    /// The last frame that was no reading, as a message can quote it; `None` before there was one.
+    /// Quotation of the last bad frame, for messages; `None` before the first one.
     pub fn last_bad(&self) -> Option<String> {
         (!self.last_bad.is_empty()).then(|| quote(&self.last_bad))
     }
@@ -156,7 +156,7 @@ impl Decoder {
         &self.held
     }
 
-    /// Takes a message: lines of text, or binary frames, all whole.
+    /// Takes a message: whole lines of text, or whole binary frames.
     pub fn receive_message(&mut self, bytes: &[u8], mut hand_on: impl FnMut(Result<Frame, BadFrame>)) {
         if bytes.len() > LONGEST_MESSAGE {
             self.keep_bad(bytes);
@@ -170,7 +170,7 @@ impl Decoder {
         }
     }
 
-    /// Ends a stream: what it leaves without an end is a frame of its own.
+    /// Ends a stream: its remaining bytes are a frame.
     pub fn end(&mut self, mut hand_on: impl FnMut(Result<Frame, BadFrame>)) {
         let held = std::mem::take(&mut self.held);
         if !held.is_empty() && !self.skips {
@@ -191,14 +191,15 @@ impl Decoder {
         (self.line_start, self.not_text) = (0, 0);
     }
 
-    /// Leaves out bytes up to the end of a frame.
+    /// Skips bytes up to the end of a frame.
     fn skip(&mut self, bytes: &[u8]) -> usize {
         let end = bytes.iter().position(|byte| is_line_end(byte) || *byte == 0);
         self.skips = end.is_none();
         end.map_or(bytes.len(), |end| end + 1)
     }
 
-    /// Adds bytes up to the next `end` to what is held; the bytes taken, and whether the end is there. Hands on the cause where there are too many.
+    /// Appends bytes up to the next end to `held`. Returns the number of bytes taken, and whether the end was reached. Hands on
+    /// [`BadFrame::TooLong`] for more than `longest` bytes.
     fn hold(
         &mut self,
         bytes: &[u8],
@@ -230,7 +231,7 @@ impl Decoder {
         if self.held.is_empty()
             && let Some(end) = find_line_end(&bytes[..bytes.len().min(LONGEST_LINE + 1)])
         {
-            // The second byte of a line end is an empty line, which is nothing.
+            // The second byte of a line end makes an empty line, which is ignored.
             if end > 0 {
                 self.end_line(&bytes[..end], bytes[end], hand_on);
             }
@@ -241,7 +242,7 @@ impl Decoder {
             let line = std::mem::take(&mut self.held);
             self.end_line(&line, bytes[taken - 1], hand_on);
             if self.held.is_empty() {
-                // Kept for the next line.
+                // The allocation is kept for the next line.
                 self.held = line;
                 self.held.clear();
             }
@@ -249,7 +250,7 @@ impl Decoder {
         taken
     }
 
-    /// Reads a line of a stream of text; one with zeros may be binary frames, of which the last has a line end in it.
+    /// Reads a line of a text stream. A line with zeros may consist of binary frames, with a line end within the last of them.
     fn end_line(&mut self, line: &[u8], end: u8, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
         let Some(last) = line.iter().rposition(|byte| *byte == 0) else {
             return self.read_line(line, hand_on);
@@ -292,7 +293,7 @@ impl Decoder {
         taken
     }
 
-    /// Judges the bytes that a zero ended.
+    /// Decides on the bytes before a zero.
     fn judge_binary(&mut self, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
         let held = std::mem::take(&mut self.held);
         self.clear();
@@ -314,7 +315,7 @@ impl Decoder {
         }
     }
 
-    /// Judges the bytes that a line end ended, which may as well stand within a binary frame.
+    /// Decides on the bytes before a line end. The line end may also be a byte of a binary frame.
     fn judge_line(&mut self, end: u8, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
         let mut held = std::mem::take(&mut self.held);
         let torn = std::mem::take(&mut self.torn_line);
@@ -331,7 +332,7 @@ impl Decoder {
             Ok(Line::Header) => return self.begin_text(hand_on),
             Ok(Line::Nothing) => {}
             Err(BadFrame::Encoding) => {
-                // Judged anew with all that follows, up to a zero.
+                // These bytes are decided again, together with the following bytes up to a zero.
                 self.not_text += u64::from(!torn);
                 self.keep_bad(&held[self.line_start..]);
                 held.push(end);
@@ -346,14 +347,14 @@ impl Decoder {
             }
         }
         if !is_first {
-            // Behind bytes that may be the start of a binary frame.
+            // The line follows bytes that may be the start of a binary frame.
             held.push(end);
             self.line_start = held.len();
             self.held = held;
         }
     }
 
-    /// Knows the stream for text; lines before that were no text are counted now.
+    /// Sets the form to text, and reports the earlier lines that are not text.
     fn begin_text(&mut self, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
         (0..self.not_text).for_each(|_| hand_on(Err(BadFrame::Encoding)));
         self.clear();
@@ -394,7 +395,7 @@ impl Decoder {
     }
 }
 
-/// Place of the first end of a line. Bytes are looked at sixteen at a time, which compilers do in one instruction.
+/// Index of the first line end. Bytes are compared in groups of sixteen, which compilers do in one instruction.
 fn find_line_end(bytes: &[u8]) -> Option<usize> {
     let (chunks, rest) = bytes.as_chunks::<16>();
     let has_end = |chunk: &[u8; 16]| chunk.iter().fold(false, |found, byte| found | is_line_end(byte));
@@ -404,7 +405,7 @@ fn find_line_end(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-/// True for a byte that ends a line: LF, or CR, behind which LF may follow.
+/// True for a byte that ends a line: LF or CR. CR may be followed by LF.
 fn is_line_end(byte: &u8) -> bool {
     matches!(byte, b'\n' | b'\r')
 }
@@ -440,7 +441,7 @@ mod tests {
             received(&mut decoder(), b"1,2\r\n\r\n3,x\n5,6\n7,"),
             [Ok(vec![1.0, 2.0]), Err(BadFrame::NotANumber), Ok(vec![5.0, 6.0])]
         );
-        // Numbers of frames up to 300 have line ends among their bytes.
+        // The bytes of frame numbers up to 300 include line ends.
         let verdicts = received(&mut decoder(), &binary(0..300));
         let expected: Vec<Verdict> = (0..300_u16).map(|n| Ok(vec![f64::from(n), 10.0])).collect();
         assert_eq!(verdicts, expected);
@@ -483,7 +484,7 @@ mod tests {
     fn a_torn_start_is_not_counted() {
         let mut decoder = decoder();
         decoder.join();
-        // "12.5,1" without its first digit is a frame like any other.
+        // "12.5,1" without its first digit looks like a valid frame.
         assert_eq!(received(&mut decoder, b"2.5,1\n3,4\n"), [Ok(vec![3.0, 4.0])]);
         decoder.join();
         assert_eq!(
@@ -521,7 +522,7 @@ mod tests {
         let good = |value: f64| verdicts.iter().filter(|is| matches!(is, Ok(is) if is[1] == value)).count();
         assert_eq!(good(2.0), 1);
         assert!(good(10.0) >= 58, "{}", good(10.0));
-        // As many bytes as no binary frame has are lost.
+        // The loss is limited to the bytes of the longest binary frame.
         assert!(good(4.0) >= 1000 - binary::LONGEST / 4 - 2, "{}", good(4.0));
     }
 

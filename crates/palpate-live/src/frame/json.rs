@@ -1,18 +1,18 @@
-//! Frames of JSON: an array or an object a line.
+//! JSON frames: one array or object per line.
 
 use super::names::{Filling, Names, Role};
 use super::{BadFrame, Frame};
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
-/// Reads an array of values, whose roles are those of `columns`.
+/// Reads an array of values with the roles `columns`.
 pub fn array(line: &[u8], names: &Names, columns: &[Role]) -> Result<Frame, BadFrame> {
     let mut frame = Filling::new(names);
     verdict(line, |json| json.deserialize_seq(Values { frame: &mut frame, columns }))?;
     frame.finish()
 }
 
-/// Reads an object; `role` tells what the name of the `i`-th value is.
+/// Reads an object; `role` gives the role of the `i`-th value by its name.
 pub fn object(line: &[u8], names: &Names, role: impl FnMut(usize, &[u8]) -> Role) -> Result<Frame, BadFrame> {
     let mut frame = Filling::new(names);
     verdict(line, |json| json.deserialize_map(Members { frame: &mut frame, role }))?;
@@ -21,7 +21,7 @@ pub fn object(line: &[u8], names: &Names, role: impl FnMut(usize, &[u8]) -> Role
 
 type Json<'de> = serde_json::Deserializer<serde_json::de::SliceRead<'de>>;
 
-/// Outcome of reading the values of a line; bytes that are no JSON, or more than one value, are malformed.
+/// Outcome of reading the values of a line. Bytes that are not JSON, or more than one JSON value, are malformed.
 fn verdict<'de>(
     line: &'de [u8],
     read: impl FnOnce(&mut Json<'de>) -> serde_json::Result<Result<(), BadFrame>>,
@@ -110,7 +110,7 @@ impl<R: FnMut(usize, &[u8]) -> Role> Visitor<'_> for Name<'_, R> {
     }
 }
 
-/// Reader of a value, which it sets by its role: a number, in quotes or not, or a time in quotes. Anything else is no number.
+/// Reader that sets a value by its role: a number, in quotes or not, or a time in quotes. Any other value is not a number.
 struct Value<'a, 'f> {
     frame: &'a mut Filling<'f>,
     role: Role,

@@ -22,15 +22,15 @@ use std::time::Duration;
 /// A frame that has been decoded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// One finite value a channel, in SI units or raw.
+    /// One finite value per channel, in SI units or raw.
     pub reading: Vec<f64>,
-    /// Number that the board counts its frames by, where it does; it may wrap around.
+    /// Number of the frame, if the board counts its frames; it may wrap around.
     pub sequence: Option<u32>,
-    /// Time by the board's clock, where it tells it.
+    /// Time by the clock of the board, if the frame contains it.
     pub device_time: Option<Duration>,
 }
 
-/// Cause for which a frame is no reading.
+/// Cause of a bad frame: why it is not a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BadFrame {
@@ -38,17 +38,17 @@ pub enum BadFrame {
     TooLong,
     /// Another number of values than channels.
     Channels,
-    /// A channel that the names do not have.
+    /// A channel that is missing among the names.
     MissingChannel,
-    /// A value that is no finite number.
+    /// A value that is not a finite number.
     NotANumber,
     /// A value in another unit than the channel's.
     OtherUnit,
     /// Bytes that are neither text nor a binary frame.
     Encoding,
-    /// A checksum that is not that of the bytes.
+    /// A checksum that does not match the bytes.
     Checksum,
-    /// A binary frame of a length or a type that is none.
+    /// A binary frame with an invalid length or type, or invalid JSON.
     Malformed,
 }
 
@@ -65,13 +65,13 @@ impl BadFrame {
         Self::Malformed,
     ];
 
-    /// In words.
+    /// Description in words.
     pub const fn describe(self) -> &'static str {
         match self {
             Self::TooLong => "longer than any frame",
             Self::Channels => "another number of values than channels",
             Self::MissingChannel => "a channel is missing",
-            Self::NotANumber => "a value is no number",
+            Self::NotANumber => "a value is not a number",
             Self::OtherUnit => "a value has another unit than before, or than the channel",
             Self::Encoding => "not text",
             Self::Checksum => "the checksum is wrong",
@@ -79,7 +79,7 @@ impl BadFrame {
         }
     }
 
-    /// Change to a board with channels of these labels, or to its URL, by which its frames become readings.
+    /// Change to a board with channels of these labels, or to its URL, that makes its frames readings.
     pub fn remedy<'a>(self, labels: impl IntoIterator<Item = &'a str>) -> String {
         let labels: Vec<&str> = labels.into_iter().collect();
         let labels = labels.join("`, `");

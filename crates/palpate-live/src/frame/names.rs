@@ -1,4 +1,4 @@
-//! Names of a frame's values, and a frame that is filled by them.
+//! Names of the values of a frame, and a builder of frames from named values.
 
 use super::{BadFrame, Channel, Frame, printed};
 use std::time::Duration;
@@ -8,15 +8,15 @@ use std::time::Duration;
 pub enum Role {
     /// The value of a channel, by its index.
     Channel(usize),
-    /// The time by the board's clock, in units of so many seconds.
+    /// The time by the clock of the board; the number is its unit in seconds.
     Time(f64),
     /// The number of the frame.
     Sequence,
-    /// A name that nothing is known of: its value may be anything.
+    /// An unknown name; its value is ignored.
     Ignored,
 }
 
-/// Names of the time, and the seconds of its unit.
+/// Names of the time, with its unit in seconds.
 const TIMES: [(&str, f64); 8] = [
     ("t", 1.0),
     ("time", 1.0),
@@ -29,7 +29,7 @@ const TIMES: [(&str, f64); 8] = [
 ];
 /// Names of the number of the frame.
 const SEQUENCES: [&str; 3] = ["n", "seq", "sequence"];
-/// Longest time by a board's clock, in seconds: some 30,000 years.
+/// Longest time by the clock of a board, in seconds: about 30,000 years.
 const LONGEST_S: f64 = 1e12;
 
 /// Names of channels, and factors of their units.
@@ -56,7 +56,7 @@ impl Names {
         &self.channels[i]
     }
 
-    /// Role of a name: a channel by label, else by the name of its sensor, else time or number of the frame. ASCII letters in any case.
+    /// Role of a name: a channel by label, else by the name of its sensor, else time or number of the frame. The case of ASCII letters is ignored.
     pub fn role(&self, name: &str) -> Role {
         let is = |known: &str| known.eq_ignore_ascii_case(name);
         let channels = || self.channels.iter();
@@ -74,7 +74,7 @@ impl Names {
         }
     }
 
-    /// The first channel that these roles lack.
+    /// The first channel that is missing among these roles.
     pub fn lacking(&self, roles: &[Role]) -> Option<&Channel> {
         let lacks = |i: &usize| !roles.contains(&Role::Channel(*i));
         (0..self.len()).find(lacks).map(|i| &self.channels[i])
@@ -86,7 +86,7 @@ pub fn is_reserved(name: &str) -> bool {
     Names::new(&[]).role(name) != Role::Ignored
 }
 
-/// A frame whose values come one by one.
+/// A frame under construction, value by value.
 pub struct Filling<'a> {
     factors: &'a [f64],
     frame: Frame,
@@ -126,7 +126,7 @@ impl<'a> Filling<'a> {
                 if value.fract() != 0.0 || !(0.0..9e15).contains(&value) {
                     return Err(BadFrame::NotANumber);
                 }
-                // A board that counts in more bits is followed in the lowest 32.
+                // A counter with more bits is reduced to its lowest 32.
                 self.frame.sequence = Some(value as u64 as u32);
             }
             Role::Ignored => {}
@@ -134,7 +134,7 @@ impl<'a> Filling<'a> {
         Ok(())
     }
 
-    /// Sets the time from a date and a time of day; false where the text is neither. One that is told to the second only is left out.
+    /// Sets the time from a date with a time of day, or a time of day alone; false for any other text. A time without milliseconds is ignored.
     pub fn set_time_text(&mut self, text: &[u8]) -> bool {
         let Ok(text) = std::str::from_utf8(text) else { return false };
         let text = text.trim_matches('"');
@@ -145,7 +145,7 @@ impl<'a> Filling<'a> {
         time_s.is_some() || printed::is_time(text)
     }
 
-    /// Sets what a binary frame tells beside its values.
+    /// Sets the number and the time of a binary frame.
     pub fn set_header(&mut self, sequence: u32, device_time: Duration) {
         self.frame.sequence = Some(sequence);
         self.frame.device_time = Some(device_time);

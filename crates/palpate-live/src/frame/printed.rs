@@ -1,13 +1,14 @@
-//! Lines as programs print them for people: prefixes of logs, names and units beside the values.
+//! Lines that programs print for people, with log prefixes, and names and units beside the values.
 //!
-//! Such a line is a list of items `[name :] value [unit]`. Text that is neither a name nor a unit makes it no list: its meaning is not plain.
+//! Such a line is a list of items `[name :] value [unit]`. A line with text that is neither a name nor a unit is rejected, because its meaning is
+//! ambiguous.
 
 use std::borrow::Cow;
 
-/// Value of a line, as text, with its name and its unit, both empty where there is none.
+/// Value of a line, as text, with its name and its unit; a missing name or unit is empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Item<'a> {
-    /// Name, which may have blanks.
+    /// Name, which may contain blanks.
     pub name: &'a str,
     /// Number.
     pub value: &'a str,
@@ -15,7 +16,7 @@ pub struct Item<'a> {
     pub unit: &'a str,
 }
 
-/// The line without escape sequences of terminals (`ESC [ … letter`), as coloured logs have them.
+/// The line without the terminal escape sequences (`ESC [ … letter`) of coloured logs.
 pub fn without_colours(line: &[u8]) -> Cow<'_, [u8]> {
     const ESCAPE: u8 = 0x1B;
     if !line.contains(&ESCAPE) {
@@ -32,10 +33,10 @@ pub fn without_colours(line: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(plain)
 }
 
-/// What follows the first prefix of a log in a line, or stands within brackets around the whole; `None` where there is neither.
+/// Text after the first log prefix of a line, or within brackets around the whole line; `None` without either.
 ///
-/// Prefixes are a date or a time of day (`10:11:12.345 -> `), groups in brackets (`[INFO]`), the level, clock and tag of ESP-IDF (`I (1234) tag: `), a level
-/// (`INFO: `), the name of a function (`loop(): `), and `>`. A line that reports a warning or an error keeps its prefix: it is no reading.
+/// Prefixes are a date or a time of day (`10:11:12.345 -> `), groups in brackets (`[INFO]`), the level, clock and tag of ESP-IDF (`I (1234) tag: `),
+/// a level (`INFO: `), the name of a function (`loop(): `), and `>`. A line that reports a warning or an error keeps its prefix: it is not a reading.
 pub fn message(line: &str) -> Option<&str> {
     strip_time(line)
         .or_else(|| strip_group(line))
@@ -48,27 +49,27 @@ pub fn message(line: &str) -> Option<&str> {
         .filter(|message| !message.is_empty())
 }
 
-/// The line with a `T` for the blank between the date and the time of day that it begins with, so that they are one field.
+/// The line with a `T` in place of the blank between its initial date and time of day, which makes them one field.
 pub fn with_joined_time(line: &str) -> Option<String> {
     let is_apart = time_length(line)? > 10 && line.as_bytes()[10] == b' ';
     is_apart.then(|| format!("{}T{}", &line[..10], &line[11..]))
 }
 
-/// Levels of logs whose messages may be readings.
+/// Log levels with messages that may be readings.
 const LEVELS: [&str; 6] = ["trace", "debug", "verbose", "info", "notice", "log"];
 
 fn is_level(word: &str) -> bool {
     LEVELS.iter().any(|level| level.eq_ignore_ascii_case(word))
 }
 
-/// True for a text with a word of a warning or an error.
+/// True for a text with a word that indicates a warning or an error.
 fn is_alarm(text: &str) -> bool {
     let words = text.split(|letter: char| !letter.is_ascii_alphabetic());
     let alarms = ["e", "w", "f", "warn", "warning", "err", "error", "fatal", "critical", "panic"];
     words.into_iter().any(|word| alarms.iter().any(|alarm| alarm.eq_ignore_ascii_case(word)))
 }
 
-/// What follows a date, a time of day, or both at the start of a line.
+/// Text after a date, a time of day, or both at the start of a line.
 fn strip_time(line: &str) -> Option<&str> {
     let length = time_length(line)?;
     let rest = line[length..].trim_start();
@@ -76,7 +77,7 @@ fn strip_time(line: &str) -> Option<&str> {
     Some(rest.strip_prefix([',', ';', '|', ':']).unwrap_or(rest))
 }
 
-/// Length of the date, the time of day, or both that a text begins with; a time of day has its seconds.
+/// Length of the initial date, time of day, or both of a text. A time of day includes its seconds.
 fn time_length(text: &str) -> Option<usize> {
     let bytes = text.as_bytes();
     // `d` stands for a digit.
@@ -105,7 +106,7 @@ fn time_length(text: &str) -> Option<usize> {
 
 fn strip_group(line: &str) -> Option<&str> {
     let (group, rest) = line.strip_prefix('[')?.split_once(']')?;
-    // A group that is the whole line is a list of values.
+    // Brackets around the whole line are not a prefix but enclose a list of values.
     (!rest.trim().is_empty() && !is_alarm(group)).then_some(rest.strip_prefix(':').unwrap_or(rest))
 }
 
@@ -136,7 +137,7 @@ fn strip_brackets(line: &str) -> Option<&str> {
     })
 }
 
-/// Words that stand where a number should be, and are no units.
+/// Words in place of a number, which are not units.
 const NO_NUMBERS: [&str; 16] = [
     "nan", "inf", "infinity", "ovf", "ovl", "ovr", "over", "overflow", "overload", "err", "error", "fault",
     "null", "none", "na", "ol",
@@ -154,7 +155,8 @@ fn is_unit(word: &str) -> bool {
 
 const SEPARATORS: [char; 4] = [',', ';', '|', '\t'];
 
-/// The items of a line, with decimal commas or without; `None` where some of its text has no plain meaning. `is_name` is true of known names.
+/// The items of a line, with decimal commas or without; `None` for a line with text that is neither a name nor a unit. `is_name` is true for known
+/// names.
 pub fn items<'a>(
     line: &'a str,
     decimal_comma: bool,
@@ -180,7 +182,7 @@ pub fn items<'a>(
     Some(items)
 }
 
-/// Unit of the value before, and name of the value after a text between two values.
+/// Unit of the preceding value, and name of the following value, from the text between two values.
 fn unit_and_name<'a>(
     between: &'a str,
     is_first: bool,
@@ -206,12 +208,12 @@ fn unit_and_name<'a>(
         },
     };
     let name_is_plain = name.is_empty() || named.is_some() || is_name(name);
-    // A name may not swallow a value that is no number, as in `1,x,S2:2`.
+    // A name must not include a value that is not a number, as in `1,x,S2:2`.
     let name_is_one = !name.contains(SEPARATORS);
     ((unit.is_empty() || is_unit(unit)) && name_is_plain && name_is_one).then_some((unit, name))
 }
 
-/// True where two separators of a kind follow one another: a value is missing between them.
+/// True for two consecutive separators of one kind: a value is missing between them.
 fn has_empty_field(text: &str) -> bool {
     let mut last = None;
     text.chars().filter(|letter| *letter != ' ').any(|letter| {
@@ -221,8 +223,8 @@ fn has_empty_field(text: &str) -> bool {
     })
 }
 
-/// Start and end of the next number that is a value: not part of a word, and not a name before `:` or `=`. At the start of the text there may be one where the
-/// line begins there.
+/// Start and end of the next number that is a value: not part of a word, and not a name before `:` or `=`. At the start of the text a number counts
+/// only if the line begins there.
 fn next_number(text: &str, decimal_comma: bool, is_line: bool) -> Option<(usize, usize)> {
     let bytes = text.as_bytes();
     let mut at = 0;
@@ -242,7 +244,7 @@ fn next_number(text: &str, decimal_comma: bool, is_line: bool) -> Option<(usize,
     None
 }
 
-/// Length of the number that bytes begin with.
+/// Length of the number at the start of the bytes.
 fn number_length(bytes: &[u8], decimal_comma: bool) -> Option<usize> {
     let sign = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
     let count = |from: usize, is: fn(&u8) -> bool| {
@@ -272,7 +274,7 @@ fn number_length(bytes: &[u8], decimal_comma: bool) -> Option<usize> {
     Some(end)
 }
 
-/// Value of a number as [`items`] gives it. A hexadecimal number of 4, 6 or 8 digits whose first bit is set is `None`: it may stand for a negative one.
+/// Value of a number from [`items`]; `None` for a hexadecimal number of 4, 6 or 8 digits with the first bit set, which may be a negative number.
 pub fn value(text: &str) -> Option<f64> {
     let (sign, digits) = text.strip_prefix('-').map_or((1.0, text), |digits| (-1.0, digits));
     let hexadecimal = digits.strip_prefix("0x").or_else(|| digits.strip_prefix("0X"));
@@ -288,8 +290,8 @@ pub fn is_time(text: &str) -> bool {
     time_length(text) == Some(text.len())
 }
 
-/// Seconds of a date with a time of day (since 1970, whatever its zone), or of a time of day alone. `None` where the text is neither, or has no fraction of at
-/// least a millisecond: such a clock tells no time between readings.
+/// Seconds of a date with a time of day (since 1970, without regard to its zone), or of a time of day alone. `None` where the text is neither, or has
+/// less than three digits of fractional seconds: such a clock cannot resolve the time between readings.
 pub fn time_s(text: &str) -> Option<f64> {
     let text = text.trim();
     if !is_time(text) {
@@ -321,7 +323,7 @@ pub fn time_s(text: &str) -> Option<f64> {
     Some(whole + format!("0.{fraction}").parse::<f64>().ok()?)
 }
 
-/// Days from 1970-01-01 to a civil date, reckoned in years that begin in March.
+/// Days from 1970-01-01 to a civil date, computed in years that begin in March.
 fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
     let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     let leap_days = year / 4 - year / 100 + year / 400;

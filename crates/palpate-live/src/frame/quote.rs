@@ -5,7 +5,7 @@ use std::fmt::Write;
 /// Most characters of a quotation.
 const MOST: usize = 80;
 
-/// The bytes as a message can show them: letters, digits and printable ASCII as they are, others escaped, and an ellipsis where there are more than 80 characters.
+/// The bytes in a form for messages: letters, digits and printable ASCII unchanged, others escaped, and an ellipsis after 80 characters.
 pub fn quote(bytes: &[u8]) -> String {
     let mut quotation = String::new();
     let mut length = 0;

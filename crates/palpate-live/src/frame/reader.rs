@@ -1,10 +1,10 @@
-//! Reader of a source's frames, with counts of those that are no reading.
+//! Reader of the frames of a source, with counts of bad frames.
 
 use super::{BadFrame, Channel, ColumnsError, Decoder, Frame};
 use crate::input::Arrival;
 use std::collections::BTreeMap;
 
-/// Reader of a source's frames: decodes what the source brings, and counts readings and bad frames.
+/// Reader of the frames of a source: decodes the arrivals, and counts readings and bad frames.
 #[derive(Debug)]
 pub struct FrameReader {
     decoder: Decoder,
@@ -16,7 +16,7 @@ pub struct FrameReader {
 }
 
 impl FrameReader {
-    /// A reader of frames with these channels.
+    /// Reader of frames with these channels.
     pub fn new(channels: &[Channel]) -> Self {
         Self {
             decoder: Decoder::new(channels),
@@ -36,7 +36,7 @@ impl FrameReader {
         self.decoder.set_columns(columns)
     }
 
-    /// Reads what the source brought; returns the frames that are readings.
+    /// Reads an arrival of the source; returns the frames that are readings.
     pub fn receive(&mut self, arrival: &Arrival) -> Vec<Frame> {
         let mut frames = Vec::new();
         let hand_on = |frame| frames.push(frame);
@@ -78,7 +78,7 @@ impl FrameReader {
         self.last_cause = Some(cause);
     }
 
-    /// Counts a frame that was handed on as a bad one.
+    /// Counts a frame from [`Self::receive`] as a bad one.
     pub fn refuse(&mut self, cause: BadFrame) {
         self.readings -= 1;
         self.count_bad(cause);
@@ -89,7 +89,7 @@ impl FrameReader {
         self.readings
     }
 
-    /// Numbers of frames that are no reading, by cause.
+    /// Numbers of bad frames by cause.
     pub fn bad_frames(&self) -> &BTreeMap<BadFrame, u64> {
         &self.bad
     }
@@ -99,7 +99,7 @@ impl FrameReader {
         self.bad_in_a_row
     }
 
-    /// Cause and quotation of the last bad frame; `None` before there was one.
+    /// Cause and quotation of the last bad frame; `None` before the first one.
     pub fn last_bad_frame(&self) -> Option<(BadFrame, String)> {
         self.last_cause.zip(self.decoder.last_bad())
     }
@@ -109,7 +109,7 @@ impl FrameReader {
         self.decoder.unfinished()
     }
 
-    /// Names by which a board may call the channels.
+    /// Labels of the channels.
     pub fn labels(&self) -> impl Iterator<Item = &str> {
         self.labels.iter().map(String::as_str)
     }

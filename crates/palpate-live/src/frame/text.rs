@@ -1,4 +1,4 @@
-//! Frames of text: a line a reading.
+//! Text frames: one line per reading.
 
 use super::json;
 use super::names::{Filling, Names, Role};
@@ -13,9 +13,9 @@ pub enum Line {
     Nothing,
     /// Names of the values of the lines that follow.
     Header,
-    /// A frame of values without names, whose first value may have lost its first digits where the start of the line is not there.
+    /// A frame of values without names. If the start of the line is missing, its first value may lack its first digits.
     Unnamed(Frame),
-    /// A frame that would not be one if the start of its line were not there.
+    /// A frame that would be invalid if the start of its line were missing.
     Whole(Frame),
 }
 
@@ -23,20 +23,20 @@ pub enum Line {
 #[derive(Debug)]
 pub struct TextReader {
     names: Names,
-    /// Roles of values without names: of the channels in their order, until a header or a user names them.
+    /// Roles of values without names: the channels in their order, until a header or a user names them.
     columns: Vec<Role>,
-    /// Names of the last line that had some, with their roles: most lines have the same.
+    /// Names of the last line with names, with their roles: most lines repeat them.
     known: Vec<(Vec<u8>, Role)>,
-    /// Unit of each raw channel in the lines so far, where they had one.
+    /// Unit of each raw channel in the lines so far, if they had one.
     units: Vec<Option<String>>,
-    /// Label before the values of the first line that had one, or none: lines with another label are other values.
+    /// Label before the values of the first printed line, possibly empty. Lines with another label contain other values.
     label: Option<String>,
-    /// Values of a reading whose lines have one channel each; `None` before the line of the first channel.
+    /// Values of a reading with one line per channel; `None` before the line of the first channel.
     partial: Option<Vec<Option<f64>>>,
 }
 
 impl TextReader {
-    /// A reader of frames of these channels.
+    /// Reader of frames of these channels.
     pub fn new(names: Names) -> Self {
         let columns = (0..names.len()).map(Role::Channel).collect();
         let units = vec![None; names.len()];
@@ -58,12 +58,12 @@ impl TextReader {
         self.columns = columns;
     }
 
-    /// Forgets the lines of a reading that is not complete.
+    /// Discards the lines of an incomplete reading.
     pub fn open(&mut self) {
         self.partial = None;
     }
 
-    /// Reads a line without its end: as a form for programs, else as one printed for people.
+    /// Reads a line without its end: in a form for programs, else as printed for people.
     pub fn read(&mut self, line: &[u8]) -> Result<Line, BadFrame> {
         self.read_form(line).or_else(|cause| self.read_printed(line, cause))
     }
@@ -84,7 +84,7 @@ impl TextReader {
         }
     }
 
-    /// Reads a line that is no form for programs, for this cause, by the rules of [`printed`].
+    /// Reads a line by the rules of [`printed`]. `cause` is the reason why it is not in a form for programs.
     #[cold]
     fn read_printed(&mut self, line: &[u8], cause: BadFrame) -> Result<Line, BadFrame> {
         let line = printed::without_colours(line);
@@ -104,7 +104,7 @@ impl TextReader {
                 return Ok(read);
             }
         }
-        // The minus sign of typography has more bytes than a hyphen.
+        // The typographic minus sign is not a hyphen.
         let message = message.replace('\u{2212}', "-");
         let marks = Marks::found_in(message.as_bytes());
         let decimal_comma = Separator::found_in(message.as_bytes(), marks) != Separator::Comma;
@@ -134,7 +134,7 @@ impl TextReader {
         } else {
             return Err(cause);
         };
-        // Values with and without a unit side by side may be one value with a decimal comma.
+        // Adjacent values with and without a unit may be one value with a decimal comma.
         let units = items.iter().filter(|item| !item.unit.is_empty()).count();
         if is_labelled && units != 0 && units != items.len() {
             return Err(cause);
@@ -166,8 +166,8 @@ impl TextReader {
         Ok(if is_named || !label.is_empty() { Line::Whole(frame) } else { Line::Unnamed(frame) })
     }
 
-    /// Adds a line of the plotter Teleplot to the reading that its lines make, from that of the first channel on: `name:value` or `name:time:value`, then perhaps
-    /// `§unit` and `|flags`.
+    /// Adds a line of the plotter Teleplot to a reading, which begins with the line of the first channel. The form is `name:value` or
+    /// `name:time:value`, then optionally `§unit` and `|flags`.
     fn add_to_partial(&mut self, line: &str, cause: BadFrame) -> Result<Line, BadFrame> {
         let line = line.split(['§', '|']).next().unwrap_or_default();
         let last = line.rsplit(';').next().unwrap_or_default();
@@ -180,7 +180,7 @@ impl TextReader {
         if channel == 0 {
             torn = self.partial.replace(vec![None; self.names.len()]);
         }
-        // Lines before the first channel's belong to a reading whose start is not there.
+        // Lines before that of the first channel belong to a reading with a missing start.
         let Some(partial) = &mut self.partial else { return Ok(Line::Nothing) };
         partial[channel] = Some(value);
         if partial.iter().any(Option::is_none) {
@@ -237,7 +237,7 @@ impl TextReader {
         frame.finish()
     }
 
-    /// Takes a line for names, where it has some number that is none.
+    /// Reads a line with a field that is not a number as a header of names.
     fn header(&mut self, fields: Fields) -> Result<Line, BadFrame> {
         let separator = fields.separator;
         let mut roles = Vec::new();
@@ -281,7 +281,7 @@ fn role_of(names: &Names, known: &mut Vec<(Vec<u8>, Role)>, i: usize, name: &[u8
     role
 }
 
-/// True for a label of values in general, such as `Reading` or `HX711 reading`, which says no more than that they are readings.
+/// True for a general label of values, such as `Reading` or `HX711 reading`, which does not distinguish them from other values.
 fn is_general_label(label: &str) -> bool {
     const LABELS: [&str; 13] = [
         "adc",
@@ -303,7 +303,7 @@ fn is_general_label(label: &str) -> bool {
     label.chars().all(is_part) && LABELS.iter().any(|known| known.eq_ignore_ascii_case(word))
 }
 
-/// Factor by which a value in a unit becomes one in the unit that its role has. A raw channel has the unit of its first line.
+/// Factor that converts a value from `unit` to the unit of its role. A raw channel has the unit of its first line.
 fn factor(names: &Names, units: &[Option<String>], role: Role, unit: &str) -> Result<f64, BadFrame> {
     match role {
         Role::Channel(i) if names.channel(i).unit == Unit::NONE => match &units[i] {
@@ -328,13 +328,13 @@ fn factor(names: &Names, units: &[Option<String>], role: Role, unit: &str) -> Re
     }
 }
 
-/// True for a field with a name; the colons of a time of day follow none.
+/// True for a field with a name; the colons of a time of day do not follow a name.
 fn begins_with_name(field: &[u8]) -> bool {
     let is_time = || std::str::from_utf8(field).is_ok_and(printed::is_time);
     named(field).is_some() && !(field[0].is_ascii_digit() && is_time())
 }
 
-/// Name and value of a field, where it has a name.
+/// Name and value of a field; `None` without a name.
 fn named(field: &[u8]) -> Option<(&[u8], &[u8])> {
     let at = field.iter().position(|byte| matches!(byte, b':' | b'='))?;
     Some((field[..at].trim_ascii_end(), field[at + 1..].trim_ascii_start()))
@@ -343,7 +343,7 @@ fn named(field: &[u8]) -> Option<(&[u8], &[u8])> {
 /// Most characters of a number with a decimal comma.
 const LONGEST_NUMBER: usize = 64;
 
-/// A number, with a decimal comma too where commas do not separate.
+/// Parses a number; with a decimal comma too where commas are not separators.
 fn number(field: &[u8], separator: Separator) -> Option<f64> {
     let parse = |bytes: &[u8]| std::str::from_utf8(bytes).ok()?.parse().ok();
     let comma = || field.iter().position(|byte| *byte == b',');
@@ -362,7 +362,7 @@ fn number(field: &[u8], separator: Separator) -> Option<f64> {
     }
 }
 
-/// Kinds of bytes that a line has.
+/// Kinds of bytes in a line.
 #[derive(Clone, Copy)]
 struct Marks(u8);
 
@@ -402,7 +402,7 @@ impl Marks {
     }
 }
 
-/// True for bytes that may be lines of text: no control characters but tabs, line ends and the escape of terminals.
+/// True for bytes that may be lines of text: without control characters except tabs, line ends and the escape of terminals.
 pub fn is_text(bytes: &[u8]) -> bool {
     bytes.iter().all(|byte| matches!(byte, b'\t' | b'\r' | b'\n' | 0x1B) || !byte.is_ascii_control())
 }
@@ -430,7 +430,7 @@ impl Separator {
     }
 }
 
-/// True where every comma stands between two digits: with blanks in the line, these separate.
+/// True where every comma is between two digits: if the line has blanks, the blanks are the separators.
 fn commas_are_decimal(line: &[u8]) -> bool {
     let digit = |i: usize| line.get(i).is_some_and(u8::is_ascii_digit);
     let decimal = |(i, byte): (usize, &u8)| *byte != b',' || (i > 0 && digit(i - 1) && digit(i + 1));
@@ -457,7 +457,7 @@ impl<'a> Iterator for Fields<'a> {
         };
         let Some(end) = rest.iter().position(|is| *is == byte) else { return Some(rest.trim_ascii()) };
         let left = rest[end + 1..].trim_ascii_start();
-        // A tab is a blank to `trim_ascii_start`, but the start of an empty field here.
+        // For `trim_ascii_start` a tab is a blank; here it begins an empty field.
         let left = if self.separator == Separator::Tab { &rest[end + 1..] } else { left };
         self.rest = (!left.is_empty()).then_some(left);
         Some(rest[..end].trim_ascii())
@@ -630,7 +630,7 @@ mod tests {
             Ok(other) => panic!("{line}: {other:?}"),
             Err(cause) => Err(cause),
         };
-        // The end of a reading whose start is not there.
+        // The end of a reading with a missing start.
         assert_eq!(read(">b:9"), Ok(None));
         assert_eq!(read(">a:1.5"), Ok(None));
         assert_eq!(read(">temperature:21"), Ok(None));

@@ -1,4 +1,4 @@
-//! The head of a recording: what its readings are of.
+//! Head of a recording: describes the source and channels of its readings.
 
 use super::RecordingError;
 use crate::frame::Channel;
@@ -17,18 +17,18 @@ pub struct Head {
     pub source: String,
     /// Channels of a reading, in their order.
     pub channels: Vec<RecordedChannel>,
-    /// How the session came from tared readings to estimates.
+    /// Method by which the session made estimates from tared readings.
     pub estimation: Estimation,
 }
 
 /// Channel of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecordedChannel {
-    /// Name of its sensor.
+    /// Name of the sensor.
     pub name: String,
-    /// Name by which the board calls it.
+    /// Name in the frames of the board.
     pub label: String,
-    /// Symbol of the unit of its numbers.
+    /// Symbol of the unit of the recorded numbers.
     pub unit: String,
 }
 
@@ -36,7 +36,7 @@ pub struct RecordedChannel {
 #[derive(Clone, Debug)]
 pub(super) struct Subject {
     pub head: Head,
-    /// The locator, as its file has it.
+    /// The text of the locator file.
     pub locator: String,
     pub channels: Vec<Channel>,
     pub extent: Extent,
@@ -64,11 +64,11 @@ impl Subject {
 
 /// Name of the metadata of a recording.
 pub(super) const METADATA: &str = "palpate";
-/// Name of the attachment that holds the locator.
+/// Name of the attachment with the locator.
 pub(super) const LOCATOR: &str = "locator.json";
 
 impl Head {
-    /// The metadata that say it.
+    /// Metadata of the MCAP file for this head.
     pub(super) fn metadata(&self) -> BTreeMap<String, String> {
         let channels = serde_json::to_string(&self.channels).unwrap_or_default();
         let estimation = serde_json::to_string(&self.estimation).unwrap_or_default();
@@ -81,8 +81,8 @@ impl Head {
         ])
     }
 
-    /// The head that metadata say; `None` where the channels are not there, or the estimation is not one that is known. Without any
-    /// readings were located by themselves.
+    /// Reads the head from metadata; `None` where the channels are missing, or the estimation is unknown. Without an estimation each reading was
+    /// located by itself.
     pub(super) fn from_metadata(metadata: &BTreeMap<String, String>) -> Option<Self> {
         let text = |key: &str| metadata.get(key).cloned().unwrap_or_default();
         let estimation = match metadata.get("estimation") {

@@ -1,4 +1,4 @@
-//! The records of an MCAP file, one by one, without holding the file: blocks of messages are passed over, and decoded where they are wanted.
+//! Reads the records of an MCAP file one by one, without the whole file in memory. Blocks of messages are skipped, and decoded on demand.
 
 use super::head::{Head, LOCATOR, METADATA};
 use super::unpack::{self, BlockFault, MOST};
@@ -24,15 +24,15 @@ pub struct McapFile {
     length: u64,
     /// Head of the recording.
     pub head: Head,
-    /// The locator that is attached, as its file has it.
+    /// Text of the attached locator file.
     locator: Result<String, LocatorFault>,
-    /// Blocks of messages, in their order.
+    /// Blocks of messages, in the order of the file.
     pub blocks: Vec<Block>,
-    /// True where it ends as it should.
+    /// True for a complete end of the file.
     pub is_whole: bool,
-    /// Place of the record that ends the data, and the checksum of all bytes before it, where it has one.
+    /// Place of the record that ends the data, and the checksum of all bytes before it, if it has one.
     data_checksum: Option<(u64, u32)>,
-    /// Topic of each channel by its place in [`TOPICS`]; `None` of one that is no topic of palpate.
+    /// Topic of each channel, as its index in [`TOPICS`]; `None` for a topic that is not one of palpate.
     channels: BTreeMap<u16, Option<usize>>,
 }
 
@@ -42,16 +42,16 @@ pub struct Block {
     kind: BlockKind,
     at: u64,
     length: u64,
-    /// Times of its first and its last message, in ns since 1970.
+    /// Times of the first and the last message, in ns since 1970.
     pub span_ns: (u64, u64),
-    /// Readings in it.
+    /// Number of readings in the block.
     pub readings: u64,
 }
 
 /// Kind of a block of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum BlockKind {
-    /// A record that packs messages.
+    /// A record that contains messages.
     Chunk,
     /// Records of messages, one after the other.
     Loose,
@@ -66,24 +66,24 @@ pub struct Messages {
     pub foreign: u64,
     /// Number of messages on a channel that the file does not describe.
     pub unknown: u64,
-    /// Fault for which the block cannot be read.
+    /// Fault that makes the block unreadable.
     pub fault: Option<BlockFault>,
 }
 
 /// Message of a recording.
 #[derive(Clone, Debug)]
 pub struct RawMessage {
-    /// Topic, by its place in [`TOPICS`].
+    /// Topic, as its index in [`TOPICS`].
     pub topic: usize,
-    /// Number.
+    /// Sequence number.
     pub sequence: u32,
     /// Time, in ns since 1970.
     pub unix_ns: u64,
-    /// Its JSON.
+    /// Content as JSON.
     pub data: Vec<u8>,
 }
 
-/// Place of a record: its kind, and where its content is.
+/// Kind of a record, and the place of its content.
 struct RecordPlace {
     op: u8,
     at: u64,
@@ -100,10 +100,10 @@ impl RecordPlace {
 }
 
 impl McapFile {
-    /// Looks a file through: its head, and where its blocks of messages are.
+    /// Reads the head of a file, and scans it for blocks of messages.
     ///
     /// # Errors
-    /// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
+    /// [`RecordingError`] for a file that cannot be read, or is not a recording of palpate.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let shown = path.display().to_string();
         let (file, length) = open_regular(path).map_err(|error| cannot("open", &shown, error))?;
@@ -128,7 +128,7 @@ impl McapFile {
         Ok(own)
     }
 
-    /// The locator that is attached, as its file has it.
+    /// Text of the attached locator file.
     pub fn locator(&self) -> Result<&str, RecordingError> {
         let fault = |fault: &LocatorFault| RecordingError::Locator { path: self.path.clone(), fault: *fault };
         self.locator.as_deref().map_err(fault)
@@ -137,7 +137,7 @@ impl McapFile {
     fn look_through(&mut self) -> Result<(), RecordingError> {
         self.check_magic()?;
         let mut metadata = None;
-        // False while the readings of the last chunk are not counted yet: by its index, or else by decoding it.
+        // False while the readings of the last chunk are not yet counted. The index gives their number, or else the decoded chunk.
         let mut counted = true;
         while let Some(place) = self.next_place()? {
             match place.op {
@@ -176,7 +176,7 @@ impl McapFile {
                     self.is_whole = true;
                     if place.op == op::DATA_END && place.length == 4 {
                         let checksum = self.body(place.at, 4)?.and_then(|bytes| bytes.first_chunk().copied());
-                        // 0 stands for none.
+                        // 0 means that the record has no checksum.
                         let checksum = checksum.map(u32::from_le_bytes).filter(|checksum| *checksum != 0);
                         self.data_checksum =
                             checksum.map(|checksum| (place.at - RecordPlace::HEAD, checksum));
@@ -199,11 +199,11 @@ impl McapFile {
             })
         })?;
         self.head = Head::from_metadata(&metadata)
-            .ok_or_else(|| lacks("its metadata do not say its channels and how readings were located"))?;
+            .ok_or_else(|| lacks("its metadata lack the channels and the way of locating"))?;
         Ok(())
     }
 
-    /// Checks messages that stand outside chunks, which have checksums of their own, by the checksum of all data; true where there is nothing to check.
+    /// Checks messages outside chunks by the checksum of all data. Chunks have their own checksums. True without such messages or without a checksum.
     pub fn check_loose(&mut self) -> Result<bool, RecordingError> {
         let is_loose = self.blocks.iter().any(|block| block.kind == BlockKind::Loose);
         let Some((end, checksum)) = self.data_checksum.filter(|_| is_loose) else { return Ok(true) };
@@ -230,7 +230,7 @@ impl McapFile {
         }
     }
 
-    /// Adds a chunk to the blocks; false where its record is too short to be one.
+    /// Adds a chunk to the blocks; false for a record that is too short for a chunk.
     fn add_chunk(&mut self, place: &RecordPlace) -> Result<bool, RecordingError> {
         let Some([start_ns, end_ns]) = self.numbers(place)? else { return Ok(false) };
         let span_ns = (start_ns, end_ns);
@@ -239,9 +239,9 @@ impl McapFile {
         Ok(true)
     }
 
-    /// Adds a message that stands outside chunks to the block before it, or to a new one.
+    /// Adds a message outside chunks to the block before it, or to a new one.
     fn add_loose(&mut self, place: &RecordPlace) -> Result<(), RecordingError> {
-        // Channel and number, then the times, as a message begins.
+        // A message begins with channel and number, then the times.
         let Some([head, head_and_time]) = self.numbers(place)? else { return Ok(()) };
         let [channel_0, channel_1, _, _, _, _, time_0, time_1] = head.to_le_bytes();
         let [t2, t3, t4, t5, t6, t7, _, _] = head_and_time.to_le_bytes();
@@ -266,7 +266,7 @@ impl McapFile {
         Ok(())
     }
 
-    /// The first two numbers of 8 bytes of a record; `None` where it is shorter.
+    /// The first two numbers of 8 bytes of a record; `None` for a shorter record.
     fn numbers(&mut self, place: &RecordPlace) -> Result<Option<[u64; 2]>, RecordingError> {
         if place.length < 16 {
             return Ok(None);
@@ -278,7 +278,7 @@ impl McapFile {
         Ok(Some(bytes.map(u64::from_le_bytes)))
     }
 
-    /// Counts the readings of the last chunk by decoding it, where no index has told them.
+    /// Decodes the last chunk to count its readings, unless an index gave the count.
     fn count_last(&mut self, counted: bool) -> Result<(), RecordingError> {
         let Some(last) = self.blocks.last().copied().filter(|_| !counted) else { return Ok(()) };
         let here = self.position()?;
@@ -290,7 +290,7 @@ impl McapFile {
         self.seek(here)
     }
 
-    /// The messages of a block; none of one that has a fault.
+    /// Messages of a block. The result contains the fault of a damaged block.
     pub fn messages(&mut self, block: &Block) -> Result<Messages, RecordingError> {
         let mut found = Messages::default();
         let Some(body) = self.body(block.at, block.length)? else {
@@ -306,7 +306,7 @@ impl McapFile {
         Ok(found)
     }
 
-    /// Takes a record of a block: a channel, or a message.
+    /// Adds a channel or a message of a block.
     fn take(&mut self, record: Record, found: &mut Messages) {
         match record {
             Record::Message { header, data } => match self.channels.get(&header.channel_id) {
@@ -330,7 +330,8 @@ impl McapFile {
         }
     }
 
-    /// The locator, where this attachment is it. One that is damaged is held to be: a recording has no other, and its name may be what is damaged.
+    /// The locator, if this attachment contains it. A damaged attachment counts as the locator: a recording has no other attachment, and the damage
+    /// may be in the name.
     fn attached(&mut self, place: &RecordPlace) -> Result<Result<String, LocatorFault>, RecordingError> {
         let body = self.body(place.at, place.length)?;
         Ok(match body.as_deref().and_then(|body| parse(op::ATTACHMENT, body)) {
@@ -347,7 +348,7 @@ impl McapFile {
         Ok(parse(place.op, &body).map(Record::into_owned))
     }
 
-    /// The next record that is whole; the file is at its content then.
+    /// The next whole record. The file is then at the content of the record.
     fn next_place(&mut self) -> Result<Option<RecordPlace>, RecordingError> {
         let at = self.position()?.saturating_add(RecordPlace::HEAD);
         if at > self.length {
@@ -368,7 +369,7 @@ impl McapFile {
         let mut body = vec![0; length as usize];
         match self.file.read_exact(&mut body) {
             Ok(()) => Ok(Some(body)),
-            // It was cut off meanwhile.
+            // The file was cut off meanwhile.
             Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(None),
             Err(error) => Err(self.cannot(error)),
         }
@@ -378,7 +379,7 @@ impl McapFile {
         self.file.stream_position().map_err(|error| cannot("read", &self.path, error))
     }
 
-    /// Goes to a place; what is read ahead is kept where it is near.
+    /// Moves to a place; buffered bytes are kept for a near one.
     fn seek(&mut self, to: u64) -> Result<(), RecordingError> {
         let here = self.position()?;
         let by = i64::try_from(i128::from(to) - i128::from(here)).ok();
@@ -394,7 +395,7 @@ impl McapFile {
     }
 }
 
-/// Opens a regular file, without waiting for whoever writes into a pipe of its name; and its length.
+/// Opens a regular file, and returns it with its length. Does not wait for a writer if the path is a pipe.
 fn open_regular(path: &Path) -> std::io::Result<(File, u64)> {
     let mut options = File::options();
     options.read(true);
@@ -405,7 +406,7 @@ fn open_regular(path: &Path) -> std::io::Result<(File, u64)> {
     if found.is_file() {
         Ok((file, found.len()))
     } else {
-        Err(std::io::Error::other("it is no regular file"))
+        Err(std::io::Error::other("it is not a regular file"))
     }
 }
 

@@ -1,8 +1,8 @@
 //! Recordings of sessions: MCAP files, which Foxglove and the official readers open.
 //!
-//! A recording holds what the board sent (`/reading`), what was made of it (`/estimate`) and what happened (`/event`), all as JSON with
-//! schemas, and the locator as an attachment, so that nothing that a later look at it needs is outside the file. A file that was cut off
-//! anywhere is read up to there.
+//! A recording contains the readings of the board (`/reading`), their estimates (`/estimate`) and the events of the session (`/event`), all as
+//! JSON with schemas. The locator is an attachment, so the file is sufficient for a later evaluation. A file that was cut off is read up to the
+//! cut.
 
 mod head;
 mod mcap_file;
@@ -21,19 +21,19 @@ pub use recover::{Recovery, recover};
 pub use switch::{RecordingSwitch, check_name};
 pub use unpack::BlockFault;
 
-/// End of the names of recordings.
+/// File extension of recordings.
 pub const EXTENSION: &str = "mcap";
 
 /// Fault of the locator that is attached to a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LocatorFault {
-    /// None is attached.
+    /// The recording has no attached locator.
     #[error("no `locator.json` is attached")]
     Missing,
-    /// The file ends before it.
+    /// The file ends before the attachment.
     #[error("the file is cut off before its attached `locator.json`")]
     CutOff,
-    /// Its bytes are others than were written.
+    /// The bytes of the attachment differ from those that were written.
     #[error("the attached `locator.json` is damaged: its bytes do not match their checksum and lengths")]
     Damaged,
 }
@@ -48,10 +48,10 @@ pub enum RecordingError {
         verb: &'static str,
         /// The file.
         path: String,
-        /// Why.
+        /// Cause.
         error: std::io::Error,
     },
-    /// The file is there already, and is not written over.
+    /// The file exists already, and is not overwritten.
     #[error("cannot record into {path}: it is there already; name another file")]
     Exists {
         /// The file.
@@ -59,39 +59,39 @@ pub enum RecordingError {
     },
     /// A name that a recording cannot have.
     #[error(
-        "`{name}` is no name of a recording: at most 100 letters, digits, dots, dashes and underscores, of which a dot is not the first"
+        "`{name}` is not a name of a recording: at most 100 letters, digits, dots, dashes and underscores, beginning without a dot"
     )]
     Name {
         /// The name.
         name: String,
     },
     /// A link, a pipe, a device or a folder has the name of a recording.
-    #[error("{path} is no regular file")]
+    #[error("{path} is not a regular file")]
     NotRegular {
         /// The file.
         path: String,
     },
-    /// A recording is going on, and another cannot be begun.
+    /// A recording is active, and a second one cannot begin.
     #[error("{name} is being recorded; end it first")]
     GoesOn {
-        /// Name.
+        /// Name of the active recording.
         name: String,
     },
     /// The file is not MCAP.
-    #[error("{path} is no MCAP file")]
+    #[error("{path} is not an MCAP file")]
     NotMcap {
         /// The file.
         path: String,
     },
     /// The file is MCAP, but not a recording of palpate.
-    #[error("{path} is no recording of palpate: {lacks}")]
+    #[error("{path} is not a recording of palpate: {lacks}")]
     NotOurs {
         /// The file.
         path: String,
         /// The missing part.
         lacks: &'static str,
     },
-    /// Its locator cannot be had from it; its readings can.
+    /// The locator of the recording cannot be read; its readings can.
     #[error("{path}: {fault}")]
     Locator {
         /// The file.

@@ -1,4 +1,4 @@
-//! Recordings read again: lists of them, thinned parts for charts, and all of one in its order.
+//! Readers of recordings: lists of them, thinned parts for charts, and all messages of one in their order.
 
 use super::head::RecordedChannel;
 use super::mcap_file::{Block, McapFile, RawMessage};
@@ -10,36 +10,36 @@ use std::path::Path;
 /// Summary of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RecordingSummary {
-    /// Name of its file.
+    /// Name of the file.
     pub name: String,
     /// Bytes of the file.
     pub bytes: u64,
     /// First instant, in seconds since 1970-01-01 00:00 UTC; `None` without any.
     pub start_s: Option<f64>,
-    /// Seconds from its first instant to its last.
+    /// Seconds from the first instant to the last.
     pub seconds: f64,
-    /// Readings in it.
+    /// Number of readings.
     pub readings: u64,
-    /// True where its end is missing: it is being recorded, or was cut off.
+    /// True where the end is missing: the recording is active, or was cut off.
     pub is_cut_off: bool,
 }
 
-/// Part of a recording, thinned to so many samples.
+/// Part of a recording, thinned to a number of samples.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Excerpt {
     /// Channels of a reading.
     pub channels: Vec<RecordedChannel>,
     /// First instant of the recording, in seconds since 1970-01-01 00:00 UTC; `None` without any.
     pub start_s: Option<f64>,
-    /// Seconds from its first instant to its last.
+    /// Seconds from the first instant of the recording to its last.
     pub seconds: f64,
-    /// Samples, as [`SampleRecord`](crate::sample::SampleRecord) has them.
+    /// Samples, in the form of [`SampleRecord`](crate::sample::SampleRecord).
     pub samples: Vec<Value>,
-    /// All events, as [`EventRecord`](crate::event::EventRecord) has them.
+    /// All events, in the form of [`EventRecord`](crate::event::EventRecord).
     pub events: Vec<Value>,
 }
 
-/// Recordings in a folder, newest first, those without an instant last; other files, links and pipes are left out. A folder that is not there has none.
+/// Recordings in a folder, newest first, recordings without an instant last. Other files, links and pipes are omitted. A missing folder has none.
 ///
 /// # Errors
 /// [`RecordingError::File`] for a folder that cannot be read.
@@ -51,7 +51,7 @@ pub fn list(folder: &Path) -> Result<Vec<RecordingSummary>, RecordingError> {
         }
         Ok(entries) => entries,
     };
-    // A link may lead out of the folder, and a pipe is waited for.
+    // A link can lead out of the folder, and a pipe would block.
     let files = entries.flatten().filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_file()));
     let mut found: Vec<_> = files
         .map(|entry| entry.path())
@@ -68,7 +68,7 @@ pub fn list(folder: &Path) -> Result<Vec<RecordingSummary>, RecordingError> {
 /// Summary of one recording.
 ///
 /// # Errors
-/// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
+/// [`RecordingError`] for a file that cannot be read, or is not a recording of palpate.
 pub fn summary(path: &Path) -> Result<RecordingSummary, RecordingError> {
     let file = McapFile::open(path)?;
     let (start_s, seconds) = span_s(&file.blocks);
@@ -85,7 +85,7 @@ pub fn summary(path: &Path) -> Result<RecordingSummary, RecordingError> {
 /// The part of a recording between two times in seconds from its start, thinned evenly to at most `points` samples and the last one.
 ///
 /// # Errors
-/// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
+/// [`RecordingError`] for a file that cannot be read, or is not a recording of palpate.
 pub fn read(path: &Path, from_s: f64, to_s: f64, points: usize) -> Result<Excerpt, RecordingError> {
     let mut file = McapFile::open(path)?;
     let (start_s, seconds) = span_s(&file.blocks);
@@ -116,7 +116,7 @@ pub fn read(path: &Path, from_s: f64, to_s: f64, points: usize) -> Result<Excerp
 }
 
 fn span_s(blocks: &[Block]) -> (Option<f64>, f64) {
-    // A chunk that has no messages, or those before the clock was known, says 0.
+    // A chunk without messages, or with messages from before the clock was known, has the time 0.
     let blocks = || blocks.iter().filter(|block| block.span_ns.0 > 0);
     let (start, end) =
         (blocks().map(|block| block.span_ns.0).min(), blocks().map(|block| block.span_ns.1).max());
@@ -124,18 +124,18 @@ fn span_s(blocks: &[Block]) -> (Option<f64>, f64) {
     (start.map(|start| start as f64 * 1e-9), seconds)
 }
 
-/// Samples of which every so many are kept.
+/// Thinning of samples: one in `stride` is kept.
 struct Thinning {
     stride: u64,
     channels: Vec<RecordedChannel>,
     count: u64,
     samples: Vec<Value>,
-    /// The last reading that is not kept so far, and whether it will be.
+    /// The last reading, not yet added, and whether it is kept in any case or only as the last one.
     last: Option<(Pending, Keep)>,
     events: Vec<Value>,
 }
 
-/// A reading whose estimate is to follow.
+/// A reading that waits for its estimate.
 struct Pending {
     reading: RawMessage,
     estimate: Option<RawMessage>,
@@ -209,34 +209,34 @@ impl ReadingIn {
 pub enum Recorded {
     /// A reading, as the board sent it.
     Reading {
-        /// Which of the session, from 0.
+        /// Number of the reading in the session, from 0.
         number: u64,
         /// Time, in ns since 1970.
         unix_ns: u64,
-        /// One number a channel, in the units of the head's channels.
+        /// One number per channel, in the units of the channels in the head.
         values: Vec<f64>,
     },
     /// The estimate of a reading.
     Estimate {
-        /// The reading that it is of.
+        /// Number of the reading.
         number: u64,
         /// Time, in ns since 1970.
         unix_ns: u64,
         /// The reading that was located, in SI units or raw.
         located: Vec<f64>,
-        /// The estimate, as its record has it.
+        /// Fields of the estimate's record.
         estimate: Map<String, Value>,
     },
     /// An event.
     Event {
         /// Time, in ns since 1970.
         unix_ns: u64,
-        /// The event, as its record has it.
+        /// Fields of the event's record.
         event: Map<String, Value>,
     },
 }
 
-/// All of a recording, in its order.
+/// Playback of all messages of a recording, in their order.
 #[derive(Debug)]
 pub struct Playback {
     file: McapFile,
@@ -245,20 +245,20 @@ pub struct Playback {
     passed_over: PassedOver,
 }
 
-/// Numbers of what a playback has passed over so far.
+/// Numbers of blocks and messages that a playback has skipped so far.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PassedOver {
     /// Blocks of messages that cannot be read.
     pub blocks: u64,
-    /// Readings in those blocks, where an index tells them.
+    /// Readings in those blocks, as far as an index gives their number.
     pub readings: u64,
     /// Fault of the first of those blocks.
     pub fault: Option<BlockFault>,
     /// Messages that are damaged, or on a channel that the file does not describe.
     pub messages: u64,
-    /// Messages on topics that are not of palpate.
+    /// Messages on topics of other programs.
     pub foreign: u64,
-    /// True where messages outside chunks, which are read all the same, do not match the checksum of the file.
+    /// True where messages outside chunks do not match the checksum of the file. They are read all the same.
     pub is_altered: bool,
 }
 
@@ -267,7 +267,7 @@ impl PassedOver {
     pub fn loss(&self) -> Option<String> {
         let blocks = (self.blocks > 0).then(|| {
             let fault = self.fault.as_ref().map_or_else(String::new, |fault| format!(": {fault}"));
-            // Readings of a block whose channels are not known are not counted.
+            // Readings of a block with unknown channels are not counted.
             let readings =
                 if self.readings > 0 { format!(" with {} readings", self.readings) } else { String::new() };
             format!("{} blocks{readings} cannot be read, the first{fault}", self.blocks)
@@ -284,7 +284,7 @@ impl Playback {
     /// Opens a recording, whole or cut off.
     ///
     /// # Errors
-    /// [`RecordingError`] for a file that cannot be read, or is no recording of palpate.
+    /// [`RecordingError`] for a file that cannot be read, or is not a recording of palpate.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let mut file = McapFile::open(path)?;
         let passed_over = PassedOver { is_altered: !file.check_loose()?, ..PassedOver::default() };
@@ -296,25 +296,25 @@ impl Playback {
         &self.file.head
     }
 
-    /// The locator that is attached, as its file has it.
+    /// Text of the attached locator file.
     ///
     /// # Errors
-    /// [`RecordingError::Locator`] where there is none that can be read; the readings are there all the same.
+    /// [`RecordingError::Locator`] where the recording has no readable locator. The readings are available all the same.
     pub fn locator(&self) -> Result<&str, RecordingError> {
         self.file.locator()
     }
 
-    /// True where its end is there.
+    /// True for a recording with a complete end.
     pub fn is_whole(&self) -> bool {
         self.file.is_whole
     }
 
-    /// Numbers of what was passed over so far.
+    /// Numbers of blocks and messages that were skipped so far.
     pub fn passed_over(&self) -> &PassedOver {
         &self.passed_over
     }
 
-    /// The next of what it holds; `None` at its end.
+    /// The next message of the recording; `None` at its end.
     ///
     /// # Errors
     /// [`RecordingError::File`] for a file that cannot be read.
@@ -360,7 +360,7 @@ impl Playback {
                 let mut estimate: Map<String, Value> = serde_json::from_slice(data).ok()?;
                 let number = estimate.remove("number")?.as_u64()?;
                 let located = estimate.remove("located")?;
-                // Stands beside the record, as on the stream.
+                // The covariance is not part of the estimate's record.
                 estimate.remove("covariance_mm2");
                 let located = located.as_array()?.iter().map(Value::as_f64).collect::<Option<_>>()?;
                 Some(Recorded::Estimate { number, unix_ns, located, estimate })

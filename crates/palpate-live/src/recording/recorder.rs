@@ -18,36 +18,36 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Batches that wait for the thread at most; those beyond are counted as lost.
+/// Most batches that wait for the thread; further ones are counted as lost.
 const WAITING: usize = 8192;
-/// Time between two writes: what a process that is killed has not written is younger. Half of the 100 ms that are promised, for a machine that is busy.
+/// Time between two writes. A killed process loses at most the data since the last write. Half of the promised 100 ms, as a margin on a busy machine.
 const FLUSH_EVERY: Duration = Duration::from_millis(50);
-/// Bytes of messages that make a chunk, unless the time for a write comes first.
+/// Bytes of messages in a chunk, unless the time for a write comes first.
 const CHUNK: u64 = 1 << 16;
-/// Bytes that wait at most for a disk that is full; readings beyond are counted as lost.
+/// Most bytes that wait for a full disk; further readings are counted as lost.
 const MOST_PENDING: usize = 8 << 20;
-/// Time between two attempts to write where a disk is full, and between two looks whether the file is still there.
+/// Time between two attempts to write to a full disk, and between two checks that the file still exists.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 /// State of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RecordingStatus {
-    /// Name of its file.
+    /// Name of the file.
     pub name: String,
     /// Bytes of the file.
     pub bytes: u64,
-    /// Seconds from its first reading to its last.
+    /// Seconds from the first reading to the last.
     pub seconds: f64,
-    /// Readings in it.
+    /// Readings in the file.
     pub readings: u64,
-    /// Readings that it lacks, because the disk was full or too slow.
+    /// Readings that are missing, because the disk was full or too slow.
     pub lost: u64,
-    /// The problem it has now.
+    /// The present problem.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
 }
 
-/// A recorder: takes a session's batches, and writes them in a thread of its own.
+/// Writes the batches of a session into a file, in a separate thread.
 #[derive(Debug)]
 pub struct Recorder {
     to: Option<SyncSender<Arc<Batch>>>,
@@ -56,10 +56,10 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Begins a recording in a file that is not there yet. Troubles are told to the session through `reports`.
+    /// Begins a recording in a new file. Problems are reported to the session through `reports`.
     ///
     /// # Errors
-    /// [`RecordingError`] where the file is there already or cannot be made.
+    /// [`RecordingError`] for a file that exists already or cannot be made.
     pub(super) fn begin(
         path: &Path,
         subject: Arc<Subject>,
@@ -87,7 +87,7 @@ impl Recorder {
         Ok(Self { to: Some(to), status, thread: Some(thread) })
     }
 
-    /// State.
+    /// State of the recording.
     pub fn status(&self) -> RecordingStatus {
         lock(&self.status).clone()
     }
@@ -150,7 +150,7 @@ impl Write for Encoded {
     }
 }
 
-/// A recording in its thread. MCAP's writer writes into memory, which never fails; the file has the rest of it to itself.
+/// A recording in its thread. MCAP's writer writes into memory, which never fails; [`Tail`] writes the bytes into the file.
 struct Recording<'a> {
     writer: Writer<NoSeek<Encoded>>,
     encoded: Encoded,
@@ -162,11 +162,11 @@ struct Recording<'a> {
     sequence: u32,
     scratch: Vec<u8>,
     times_ns: Option<(u64, u64)>,
-    /// Readings that were encoded; those in the file are of the status.
+    /// Readings that were encoded; the status counts those in the file.
     encoded_readings: u64,
     status: Arc<Mutex<RecordingStatus>>,
     reports: SyncSender<Input>,
-    /// Instant from which it is tried again to write, and to look for the file.
+    /// Instant of the next attempt to write and the next check of the file.
     look_at: Instant,
     health: Health,
 }
@@ -175,9 +175,9 @@ struct Recording<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Health {
     Well,
-    /// It takes no more bytes for now.
+    /// The disk is full.
     Full,
-    /// It is there no more, or its encoder has failed: the recording has ended.
+    /// The file no longer exists, or the encoder has failed: the recording has ended.
     Gone,
 }
 
@@ -275,7 +275,7 @@ impl<'a> Recording<'a> {
         self.writer.write_to_known_channel(&header, &self.scratch)
     }
 
-    /// Ends the chunk, and hands all there is to the operating system.
+    /// Ends the chunk, and hands all pending bytes to the operating system.
     fn flush(&mut self) {
         if self.health == Health::Gone {
             return;
@@ -341,7 +341,7 @@ impl<'a> Recording<'a> {
         self.write();
     }
 
-    /// Says a problem in the status, and to the session.
+    /// Reports a problem in the status, and to the session.
     fn trouble(&self, problem: &str) {
         lock(&self.status).problem = Some(problem.to_owned());
         self.report(problem);
@@ -349,12 +349,12 @@ impl<'a> Recording<'a> {
 
     fn report(&self, problem: &str) {
         let text = format!("recording {}: {problem}", lock(&self.status).name);
-        // A session that is too busy to hear of it finds it in the status.
+        // A session with a full queue finds the problem in the status.
         let _ = self.reports.try_send(Input::Command(Command::Trouble(text)));
     }
 }
 
-/// Begins an MCAP file that grows: its summary stands at the end, and nothing before it is changed.
+/// Begins an MCAP file that is only appended to: its summary is at the end, and written bytes never change.
 fn begin_file(encoded: Encoded, subject: &Subject) -> Result<(Writer<NoSeek<Encoded>>, [u16; 3]), McapError> {
     let options = options(&subject.head.version).disable_seeking(true);
     let mut writer = options.create(NoSeek::new(encoded))?;
@@ -362,7 +362,7 @@ fn begin_file(encoded: Encoded, subject: &Subject) -> Result<(Writer<NoSeek<Enco
     Ok((writer, topics))
 }
 
-/// Options of the files of recordings.
+/// MCAP options of recordings.
 pub(super) fn options(version: &str) -> WriteOptions {
     WriteOptions::new()
         .compression(Some(Compression::Lz4))
@@ -370,7 +370,7 @@ pub(super) fn options(version: &str) -> WriteOptions {
         .library(format!("palpate {version}"))
 }
 
-/// Writes the description of a recording: metadata, the locator, and the channels of its topics, whose numbers it gives.
+/// Writes the description of a recording: metadata, the locator, and the channels of its topics. Returns the ids of the channels.
 pub(super) fn describe<W: Write + Seek>(
     writer: &mut Writer<W>,
     head: &Head,

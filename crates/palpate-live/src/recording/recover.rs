@@ -1,4 +1,4 @@
-//! A recording that was cut off or is damaged, rewritten with its index and summary.
+//! Recovery: rewrites a recording that was cut off or is damaged, with its index and summary.
 
 use super::recorder::{describe, options};
 use super::{PassedOver, Playback, RecordingError};
@@ -16,18 +16,18 @@ pub struct Recovery {
     pub readings: u64,
     /// Messages in the new file, readings among them.
     pub messages: u64,
-    /// True where the old file ended as it should.
+    /// True for an old file with a complete end.
     pub was_whole: bool,
-    /// Fault for which the new file has no locator.
+    /// Fault due to which the new file has no locator.
     pub locator_fault: Option<String>,
     /// Parts of the old file that are not in the new one.
     pub passed_over: PassedOver,
 }
 
-/// Writes all messages that can be read of a recording into another file, which appears when it is whole.
+/// Writes all readable messages of a recording into another file, which appears when it is complete.
 ///
 /// # Errors
-/// [`RecordingError`] for a file that is no recording of palpate, or one that cannot be written.
+/// [`RecordingError`] for a file that is not a recording of palpate, or one that cannot be written.
 pub fn recover(from: &Path, to: &Path) -> Result<Recovery, RecordingError> {
     let mut playback = Playback::open(from)?;
     let mut recovery = None;

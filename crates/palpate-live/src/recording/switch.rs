@@ -1,4 +1,4 @@
-//! A sink that records when somebody wishes.
+//! A sink that records on demand.
 
 use super::head::Subject;
 use super::recorder::{Recorder, RecordingStatus};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A sink that begins and ends recordings while a session goes on; its clones are one and the same.
+/// A sink that begins and ends recordings during a session. Clones share their state.
 #[derive(Clone, Debug)]
 pub struct RecordingSwitch {
     subject: Arc<Subject>,
@@ -20,10 +20,11 @@ pub struct RecordingSwitch {
 }
 
 impl RecordingSwitch {
-    /// A switch that is off, of a session of this locator and estimation. `source` is the URL that recordings say they are of; troubles are told to the session through `reports`.
+    /// A switch that is off, for a session with this locator and estimation. `source` is the URL in the head of the recordings. Problems are reported
+    /// to the session through `reports`.
     ///
     /// # Errors
-    /// [`RecordingError::Encode`] for a locator whose file cannot be written.
+    /// [`RecordingError::Encode`] for a locator that cannot be written as a file.
     pub fn new(
         locator: &Locator,
         estimation: Estimation,
@@ -34,15 +35,15 @@ impl RecordingSwitch {
         Ok(Self { subject, reports, recorder: Arc::default() })
     }
 
-    /// Head of its recordings: version, source, channels.
+    /// Head of the recordings: version, source, channels.
     pub fn head(&self) -> &Head {
         &self.subject.head
     }
 
-    /// Begins a recording in a file that is not there yet.
+    /// Begins a recording in a new file.
     ///
     /// # Errors
-    /// [`RecordingError`] where one goes on, the file is there already, or it cannot be made.
+    /// [`RecordingError`] while another recording is active, or for a file that exists already or cannot be made.
     pub fn begin(&self, path: &Path) -> Result<RecordingStatus, RecordingError> {
         let mut recorder = self.recorder();
         if let Some(recorder) = &*recorder {
@@ -54,11 +55,11 @@ impl RecordingSwitch {
         Ok(status)
     }
 
-    /// Begins a recording in a folder, which is made where it is not there, under a name or one that says the time; the name gets a number where there is such a
-    /// recording already.
+    /// Begins a recording in a folder, which is made if it is missing. The default name is the time `unix_s`. The name gets a number if the recording
+    /// exists already.
     ///
     /// # Errors
-    /// [`RecordingError`] for a name that a recording cannot have, and as of [`Self::begin`].
+    /// [`RecordingError`] for a name that a recording cannot have, and as for [`Self::begin`].
     pub fn begin_in(
         &self,
         folder: &Path,
@@ -85,14 +86,14 @@ impl RecordingSwitch {
         }
     }
 
-    /// Ends the recording, and waits until its file is whole; `None` where none goes on.
+    /// Ends the recording, and waits until its file is complete; `None` without an active recording.
     pub fn end(&self) -> Option<RecordingStatus> {
-        // The lock is let go before the wait: the session goes on.
+        // The lock is released before the wait: the session continues.
         let recorder = self.recorder().take();
         recorder.map(Recorder::finish)
     }
 
-    /// State of the recording that goes on.
+    /// State of the active recording.
     pub fn status(&self) -> Option<RecordingStatus> {
         self.recorder().as_ref().map(Recorder::status)
     }
@@ -110,10 +111,10 @@ impl Sink for RecordingSwitch {
     }
 }
 
-/// Checks a name that came from somewhere: it names a file in a folder, and nothing above it.
+/// Checks an untrusted name: it must name a file directly in its folder.
 ///
 /// # Errors
-/// [`RecordingError::Name`].
+/// [`RecordingError::Name`] for any other name.
 pub fn check_name(name: &str) -> Result<&str, RecordingError> {
     let is_letter = |letter: char| letter.is_ascii_alphanumeric() || "._-".contains(letter);
     let is_name =
@@ -121,10 +122,10 @@ pub fn check_name(name: &str) -> Result<&str, RecordingError> {
     if is_name { Ok(name) } else { Err(RecordingError::Name { name: name.to_owned() }) }
 }
 
-/// A time as names of files have it: `2026-11-24T20-14-24Z`.
+/// A time in the form for file names: `2026-11-24T20-14-24Z`.
 fn utc(unix_s: u64) -> String {
     let (days, second) = (unix_s / 86_400, unix_s % 86_400);
-    // Civil date of a day since 1970-01-01, reckoned in eras of 400 years that begin in March.
+    // Civil date of a day since 1970-01-01, in eras of 400 years that begin in March.
     let z = days + 719_468;
     let (era, day_of_era) = (z / 146_097, z % 146_097);
     let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
@@ -143,7 +144,7 @@ mod tests {
     #[test]
     fn names_say_the_time() {
         assert_eq!(utc(0), "1970-01-01T00-00-00Z");
-        // Leap day of a year that 400 divides, and the last second of a year.
+        // The leap day of a year divisible by 400, and the last second of a year.
         assert_eq!(utc(951_782_400), "2000-02-29T00-00-00Z");
         assert_eq!(utc(1_798_761_599), "2026-12-31T23-59-59Z");
     }

@@ -1,4 +1,4 @@
-//! The end of a file that grows: bytes that could not be written yet are kept, and written as soon as there is room.
+//! End of a growing file: bytes that could not be written yet are kept, and written as soon as the disk has room.
 
 use super::RecordingError;
 use std::fs::{File, Metadata};
@@ -13,15 +13,15 @@ pub struct Tail {
     identity: Option<(u64, u64)>,
     /// Bytes in the file.
     written: u64,
-    /// Bytes that are not yet.
+    /// Bytes that are not yet in the file.
     pending: Vec<u8>,
 }
 
 impl Tail {
-    /// Makes a file, which must not be there yet.
+    /// Makes a new file.
     ///
     /// # Errors
-    /// [`RecordingError`] where it is there, or cannot be made.
+    /// [`RecordingError`] for a file that exists already, or cannot be made.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
         let shown = || path.display().to_string();
         let file = File::create_new(path).map_err(|error| match error.kind() {
@@ -32,7 +32,7 @@ impl Tail {
         Ok(Self { file, path: path.to_owned(), identity, written: 0, pending: Vec::new() })
     }
 
-    /// Bytes in the file, and those that wait for room.
+    /// Bytes in the file and pending bytes together.
     pub fn bytes(&self) -> u64 {
         self.written
     }
@@ -42,15 +42,15 @@ impl Tail {
         self.pending.len()
     }
 
-    /// Takes bytes, which [`Self::write`] writes.
+    /// Adds bytes, which [`Self::write`] writes.
     pub fn push(&mut self, bytes: &[u8]) {
         self.pending.extend_from_slice(bytes);
     }
 
-    /// Hands to the operating system what waits. What it does not take is kept.
+    /// Hands the pending bytes to the operating system. Bytes that it refuses are kept.
     ///
     /// # Errors
-    /// The error with which it refused the rest.
+    /// The error with which the operating system refused the rest.
     pub fn write(&mut self) -> std::io::Result<()> {
         let mut done = 0;
         let result = loop {
@@ -67,7 +67,7 @@ impl Tail {
         result
     }
 
-    /// False once the file's name leads to it no more: somebody took it or its folder away.
+    /// False once the name of the file no longer leads to it: the file or its folder was removed.
     pub fn is_there(&self) -> bool {
         match std::fs::metadata(&self.path) {
             Ok(found) => self.identity.is_none() || identity(&found) == self.identity,

@@ -1,4 +1,4 @@
-//! Messages of a block of an MCAP file: a chunk, unpacked and checked against its checksum, or messages that stand outside chunks.
+//! Messages of a block of an MCAP file: a chunk, unpacked and checked against its checksum, or messages outside chunks.
 
 use super::whole_record::parse;
 use mcap::McapError;
@@ -6,19 +6,19 @@ use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::io::Read;
 
-/// Most bytes of a record that is read, and of a chunk without its compression.
+/// Most bytes of a record, and of an uncompressed chunk.
 pub const MOST: u64 = 256 << 20;
 
-/// Fault of a block whose messages cannot be read.
+/// Fault of a block with unreadable messages.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BlockFault {
     /// A compression that is not implemented.
     #[error("its compression `{0}` is unknown; known are `lz4`, `zstd` and none")]
     Compression(String),
-    /// The bytes are others than were written.
+    /// The bytes differ from those that were written.
     #[error("its checksum does not match its bytes")]
     Checksum,
-    /// More bytes than are read at once.
+    /// More bytes than the reader accepts.
     #[error("it has more than {} MiB", MOST >> 20)]
     TooLarge,
     /// Compressed bytes or records that cannot be decoded.
@@ -26,7 +26,7 @@ pub enum BlockFault {
     Damaged,
 }
 
-/// Hands on the records of a chunk, whose record has this content. Nothing is handed on from a chunk that has a fault.
+/// Hands on the records of the chunk with the content `body`. A faulty chunk hands on no records.
 pub fn unpack_chunk(body: &[u8], mut hand_on: impl FnMut(Record)) -> Result<(), BlockFault> {
     let Some(Record::Chunk { header, data }) = parse(op::CHUNK, body) else {
         return Err(BlockFault::Damaged);
@@ -34,13 +34,13 @@ pub fn unpack_chunk(body: &[u8], mut hand_on: impl FnMut(Record)) -> Result<(), 
     if header.uncompressed_size > MOST {
         return Err(BlockFault::TooLarge);
     }
-    // MCAP's reader decodes lz4; zstd is decoded here, as its decoder is a library in C that takes half a minute to compile.
+    // MCAP's reader decodes lz4. For zstd it uses a library in C that takes half a minute to compile; zstd is decoded here instead.
     let (compression, data) = match header.compression.as_str() {
         "zstd" => ("", unpack_zstd(&data, header.uncompressed_size)?),
         other => (other, data.into_owned()),
     };
-    // A file of one record, the chunk: MCAP's reader of chunks alone allocates whatever length a damaged record says. Bytes behind the data of the
-    // chunk are not in it: the reader would take them for the rest of a record that reaches beyond the chunk.
+    // A file of one record, the chunk: MCAP's reader of chunks alone allocates any length that a damaged record states. Bytes behind the data of the
+    // chunk are omitted: the reader would count them as the rest of a record that reaches beyond the chunk.
     let mut chunk = Vec::with_capacity(data.len() + 64);
     for number in [header.message_start_time, header.message_end_time, header.uncompressed_size] {
         chunk.extend(number.to_le_bytes());
@@ -69,7 +69,7 @@ pub fn unpack_chunk(body: &[u8], mut hand_on: impl FnMut(Record)) -> Result<(), 
                 reader.notify_read(next.len());
                 rest = later;
             }
-            // The checksum is known at the end of the chunk.
+            // The checksum is verified at the end of the chunk.
             LinearReadEvent::Record { data, opcode } => {
                 records.extend(parse(opcode, data).map(Record::into_owned));
             }
@@ -89,16 +89,16 @@ fn fault_of(error: &McapError) -> BlockFault {
     }
 }
 
-/// Bytes that zstd has compressed to `packed`: as many as are said to be there.
+/// Decompresses `packed` with zstd. The result must have `size` bytes.
 fn unpack_zstd(packed: &[u8], size: u64) -> Result<Vec<u8>, BlockFault> {
     let mut decoder = ruzstd::decoding::StreamingDecoder::new(packed).map_err(|_| BlockFault::Damaged)?;
     let mut data = Vec::new();
-    // One byte more than there should be: a frame that has more is not decoded on.
+    // One byte more than `size` reveals a longer frame, without decoding all of it.
     decoder.by_ref().take(size + 1).read_to_end(&mut data).map_err(|_| BlockFault::Damaged)?;
     if data.len() as u64 == size { Ok(data) } else { Err(BlockFault::Damaged) }
 }
 
-/// Hands on the records of messages that stand one after the other outside chunks.
+/// Hands on the records of consecutive messages outside chunks.
 pub fn read_loose(mut bytes: &[u8], mut hand_on: impl FnMut(Record)) -> Result<(), BlockFault> {
     while let Some((head, rest)) = bytes.split_first_chunk::<9>() {
         let [kind, length @ ..] = head;

@@ -1,25 +1,25 @@
-//! Records whose texts and lists lie within them.
+//! Parser of records that checks their inner lengths first.
 //!
-//! MCAP's own parser allocates what a length says before it looks for so much: four gigabytes for a record of a hundred bytes.
+//! MCAP's own parser allocates the stated length before it checks that so many bytes exist: four gigabytes for a record of a hundred bytes.
 
 use mcap::records::{Record, op};
 
 /// A part of a record.
 #[derive(Clone, Copy)]
 enum Part {
-    /// So many bytes.
+    /// A fixed number of bytes.
     Bytes(usize),
-    /// A length of four bytes, and so many bytes.
+    /// A length of four bytes, and as many bytes.
     Text,
-    /// The same of eight bytes.
+    /// A length of eight bytes, and as many bytes.
     Long,
-    /// A length of four bytes, and pairs of texts in so many bytes.
+    /// A length of four bytes, and pairs of texts in as many bytes.
     Map,
 }
 
 use Part::{Bytes, Long, Map, Text};
 
-/// The parts of the kinds of records that a recording is read from.
+/// Parts of a kind of record; `None` for a kind that the reader does not use.
 fn parts(kind: u8) -> Option<&'static [Part]> {
     match kind {
         op::CHANNEL => Some(&[Bytes(2 + 2), Text, Text, Map]),
@@ -32,7 +32,7 @@ fn parts(kind: u8) -> Option<&'static [Part]> {
     }
 }
 
-/// A record of a kind that a recording is read from; `None` of any other, and of one whose parts are not within it.
+/// Parses a record; `None` for a kind that the reader does not use, and for a record with parts that reach beyond its end.
 pub(super) fn parse(kind: u8, body: &[u8]) -> Option<Record<'_>> {
     let mut rest = body;
     for part in parts(kind)? {
@@ -41,7 +41,7 @@ pub(super) fn parse(kind: u8, body: &[u8]) -> Option<Record<'_>> {
     mcap::parse_record(kind, body).ok()
 }
 
-/// What comes after a part.
+/// The bytes after a part.
 fn after(part: Part, bytes: &[u8]) -> Option<&[u8]> {
     let past = |head: usize, length: u64| bytes.get(head..)?.get(usize::try_from(length).ok()?..);
     let short = || bytes.first_chunk().copied().map(u32::from_le_bytes);
@@ -53,7 +53,7 @@ fn after(part: Part, bytes: &[u8]) -> Option<&[u8]> {
             let after_map = past(4, short()?.into())?;
             let mut pairs = &bytes[4..bytes.len() - after_map.len()];
             while !pairs.is_empty() {
-                // A key without a value would be read on beyond the map.
+                // Without this check, the value of an unpaired key would be read beyond the map.
                 pairs = after(Text, after(Text, pairs)?)?;
             }
             Some(after_map)

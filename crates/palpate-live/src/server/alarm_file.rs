@@ -1,10 +1,10 @@
-//! The file that keeps alarms from one run of the server to the next.
+//! The file that stores alarms between runs of the server.
 
 use crate::whole_file;
 use std::io::{ErrorKind, Result};
 use std::path::{Path, PathBuf};
 
-/// File that keeps the alarms that browsers set.
+/// File with the alarms that browsers set.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AlarmFile(PathBuf);
 
@@ -24,10 +24,10 @@ impl AlarmFile {
         &self.0
     }
 
-    /// The text of the file; empty where there is no file.
+    /// The text of the file; empty if the file does not exist.
     ///
     /// # Errors
-    /// The file cannot be read, or is no text.
+    /// The file cannot be read, or is not text.
     pub fn read(&self) -> Result<String> {
         match std::fs::read_to_string(&self.0) {
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(String::new()),
@@ -35,10 +35,10 @@ impl AlarmFile {
         }
     }
 
-    /// Writes the file whole; removes it for a text without rules.
+    /// Writes the whole file; removes it for a text without rules.
     ///
     /// # Errors
-    /// The folder takes no file, or the file cannot be removed.
+    /// The folder does not accept the file, or the file cannot be removed.
     pub fn write(&self, text: &str) -> Result<()> {
         if text.trim().is_empty() {
             return match std::fs::remove_file(&self.0) {

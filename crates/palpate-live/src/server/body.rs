@@ -1,4 +1,4 @@
-//! Bodies of requests and answers: JSON, and complaints in words.
+//! Bodies of requests and answers: JSON, and error messages.
 
 use super::connections::Connection;
 use axum::body::Bytes;
@@ -9,7 +9,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// An answer that is no success: what is wrong, and what to do.
+/// An error answer: the problem, and the remedy.
 #[derive(Debug)]
 pub struct Refusal {
     status: StatusCode,
@@ -24,7 +24,7 @@ impl Refusal {
         Self { status, error: error.into(), help, field: None }
     }
 
-    /// Adds the name of the field of a form that is to be corrected.
+    /// Adds the name of the form field that must be corrected.
     pub fn with_field(self, field: Option<&'static str>) -> Self {
         Self { field, ..self }
     }
@@ -40,7 +40,7 @@ impl IntoResponse for Refusal {
     }
 }
 
-/// An answer of JSON.
+/// An answer with JSON.
 pub struct JsonAnswer<T>(pub T);
 
 impl<T: Serialize> IntoResponse for JsonAnswer<T> {
@@ -52,7 +52,7 @@ impl<T: Serialize> IntoResponse for JsonAnswer<T> {
     }
 }
 
-/// The bytes of a body, of which the rest is waited for so long as a connection lets.
+/// Reads a body, within the time limit of the connection.
 async fn whole_body<S: Send + Sync>(request: Request, state: &S) -> Result<Bytes, Refusal> {
     let connection = request.extensions().get::<Connection>().cloned();
     let bytes = Bytes::from_request(request, state);
@@ -62,7 +62,7 @@ async fn whole_body<S: Send + Sync>(request: Request, state: &S) -> Result<Bytes
         return Err(Refusal::new(
             StatusCode::REQUEST_TIMEOUT,
             error,
-            "send as many bytes as Content-Length says",
+            "send as many bytes as Content-Length states",
         ));
     };
     connection.note_whole_request();
@@ -82,12 +82,12 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
         let bytes = whole_body(request, state).await?;
         let refused = |error: String| {
-            Refusal::new(StatusCode::BAD_REQUEST, error, "docs/live-server.md says what the body is")
+            Refusal::new(StatusCode::BAD_REQUEST, error, "docs/live-server.md describes the body")
         };
         let body = serde_json::from_slice(&bytes).map_err(|error| refused(error.to_string()))?;
-        // A list of a struct's values would be read as the struct.
+        // serde would read a list of the values as the struct.
         if bytes.trim_ascii_start().first() != Some(&b'{') {
-            return Err(refused("the body is no JSON object".to_owned()));
+            return Err(refused("the body is not a JSON object".to_owned()));
         }
         Ok(Self(body))
     }

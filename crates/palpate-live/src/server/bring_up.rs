@@ -12,28 +12,28 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-/// Greatest number of bits a second of a serial port.
+/// Largest number of bits a second of a serial port.
 const GREATEST_BAUD: u32 = 20_000_000;
 
-/// A port or a rate that cannot be taken.
+/// Error of a port or a rate that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum BringUpError {
     /// A rig was made already, or the server was started with one.
     #[error("this server has a rig already")]
     HasRig,
-    /// Only serial ports have a port and a rate to choose.
+    /// Only serial ports have a choice of port and rate.
     #[error("the source {from} has no port and no baud rate")]
     NotSerial {
         /// The source.
         from: String,
     },
-    /// A port that is not there.
-    #[error("there is no serial port {port}")]
+    /// The port does not exist.
+    #[error("no serial port is named {port}")]
     NoPort {
         /// Name.
         port: String,
     },
-    /// A rate that no port has.
+    /// The rate is out of range.
     #[error("{baud} baud; a port takes 1 to {GREATEST_BAUD}")]
     Baud {
         /// The rate.
@@ -42,7 +42,7 @@ pub enum BringUpError {
     /// The source cannot be opened.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// There is no thread for it.
+    /// The thread of the source cannot be started.
     #[error("no thread for the source: {0}")]
     Thread(#[from] std::io::Error),
 }
@@ -50,9 +50,9 @@ pub enum BringUpError {
 /// A serial port of this machine.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PortRecord {
-    /// Path, on Windows its name.
+    /// Path; on Windows the name.
     pub name: String,
-    /// What is plugged into it, where that is known.
+    /// Description of the connected device, if it is known.
     pub device: Option<String>,
 }
 
@@ -61,7 +61,7 @@ pub struct PortRecord {
 pub struct BringUpRecord {
     /// Source of the readings, as its URL.
     from: String,
-    /// The serial port and its bits a second; null of other sources.
+    /// The serial port and its bits a second; null for other sources.
     port: Option<String>,
     baud: Option<u32>,
     /// Serial ports of this machine.
@@ -93,7 +93,7 @@ impl BringUp {
     /// Watches a source.
     ///
     /// # Errors
-    /// [`BringUpError`] where it cannot be opened.
+    /// [`BringUpError`] if the source cannot be opened.
     pub fn begin(from: SourceUrl, folder: &Path, clock: HostClock) -> Result<Self, BringUpError> {
         let watched = Some(Watched::open(&from, folder, clock)?);
         Ok(Self { clock, state: Mutex::new(State { from, watched }) })
@@ -119,10 +119,10 @@ impl BringUp {
         BringUpRecord { from: state.from.to_string(), port, baud, ports, seen }
     }
 
-    /// Opens another serial port of this machine, or the same at another rate.
+    /// Opens another serial port of this machine, or the same port at another rate.
     ///
     /// # Errors
-    /// [`BringUpError`] where the source is no serial port, or the port or the rate cannot be taken.
+    /// [`BringUpError`] if the source is not a serial port, or the port or the rate cannot be used.
     pub fn choose(&self, port: Option<&str>, baud: Option<u32>, folder: &Path) -> Result<(), BringUpError> {
         let mut state = locked(&self.state);
         let SourceUrl::Serial { port: old_port, baud: old_baud, columns } = state.from.clone() else {
@@ -130,7 +130,7 @@ impl BringUp {
         };
         let port = match port.map(PathBuf::from) {
             Some(port) if port != old_port => {
-                // A page opens ports of this machine, and no other file.
+                // A page may open serial ports of this machine, but no other files.
                 let is_port = |one: &PortRecord| Path::new(&one.name) == port;
                 if !ports().iter().any(is_port) {
                     return Err(BringUpError::NoPort { port: port.display().to_string() });
@@ -152,7 +152,7 @@ impl BringUp {
         Ok(())
     }
 
-    /// Names of the channels that were found, and whether the board gives them.
+    /// Names of the detected channels, and whether the board provides them.
     pub fn channels(&self) -> (Vec<String>, bool) {
         let state = locked(&self.state);
         let Some(watched) = &state.watched else { return (Vec::new(), false) };
@@ -160,7 +160,7 @@ impl BringUp {
         (monitor.channel_names(), monitor.is_named())
     }
 
-    /// Ends it, so that the source is free; returns the fault of a source that brought no reading.
+    /// Ends the source, so that it is free; returns the fault of a source that delivered no reading.
     pub fn end(&self) -> Option<String> {
         locked(&self.state).watched.take()?.end()
     }
@@ -181,7 +181,7 @@ impl Watched {
     fn end(self) -> Option<String> {
         let Self { inputs, thread, source, monitor } = self;
         drop(source);
-        // Refused only by a thread that has ended.
+        // Only a thread that has ended refuses this.
         let _ = inputs.send(Input::Stop);
         let _ = thread.join();
         locked(&monitor).fault()
@@ -198,7 +198,7 @@ fn watch(inputs: &Receiver<Input>, monitor: &Mutex<Monitor>) {
     }
 }
 
-/// Serial ports of this machine; none where they cannot be listed.
+/// Serial ports of this machine; empty if they cannot be listed.
 fn ports() -> Vec<PortRecord> {
     let ports = serialport::available_ports().unwrap_or_default();
     let record = |port: serialport::SerialPortInfo| PortRecord {

@@ -1,4 +1,4 @@
-//! A calibration that browsers guide a person through, and the locator that it ends with.
+//! A calibration that a browser guides, and the resulting locator.
 
 use super::lock::locked;
 use super::machine::{Attendance, MachineRecord, MachineState};
@@ -47,13 +47,13 @@ pub struct CalibrationPlan {
     pub out: PathBuf,
     /// Comment of the file of presses.
     pub comment: String,
-    /// Force of every press, where it is not that of the rig.
+    /// Force of every press, if it differs from that of the rig.
     pub force_n: Option<f64>,
-    /// The machine that presses, as the rig's stage says; without one a person does.
+    /// The machine that presses, from the rig's stage; `None` if a person presses.
     pub machine: Option<StageUrl>,
-    /// Rows that the file of presses has already.
+    /// Rows that the file of presses already contains.
     pub before: Vec<Row>,
-    /// Statements of the operator so far, and of the rig and the file of presses.
+    /// Statements of the operator so far, completed by the rig and the file of presses.
     pub statements: Statements,
     /// Seed of the fit.
     pub seed: u64,
@@ -70,12 +70,12 @@ impl CalibrationPlan {
         self.machine.as_ref().zip(self.rig.stage.as_ref())
     }
 
-    /// The presses that are not among these rows.
+    /// Presses of the plan that are not among these rows.
     fn to_come(&self, statements: &Statements, rows: &[Row]) -> Result<Vec<Press>, PlanError> {
         plan(&self.rig, statements.weights(self.force_n), self.depths_m(), rows)
     }
 
-    /// Depths of the presses; none where a person presses.
+    /// Depths of the presses; empty if a person presses.
     fn depths_m(&self) -> &[f64] {
         self.machine().map_or(&[], |(_, stage)| &stage.depths_m)
     }
@@ -86,57 +86,57 @@ impl CalibrationPlan {
     }
 }
 
-/// A step of a calibration that cannot be done.
+/// Error of a calibration step that cannot be done.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibratorError {
-    /// It goes on already.
+    /// The calibration is running already.
     #[error("the calibration goes on already")]
     GoesOn,
-    /// It does not go on.
+    /// The calibration has not begun, or has ended.
     #[error("the calibration has not begun, or has ended")]
     NotBegun,
-    /// A machine presses, which a hand must not be led past.
+    /// A machine presses, so that presses cannot be taken back or left out by hand.
     #[error("a machine presses: it takes no press back and leaves none out by hand, and is to end first")]
     MachinePresses,
-    /// There is no machine that could be stopped.
+    /// No machine runs that could be stopped.
     #[error("no machine runs")]
     NoMachine,
-    /// No machine is set up, which a jog or a touch-off needs.
+    /// No machine is connected for set-up, which a jog or a touch-off needs.
     #[error("the machine is not connected for a jog or a touch-off")]
     NotSetUp,
-    /// A jog that is too long, or no move.
+    /// The jog is too long, or its length is 0.
     #[error("a jog moves one axis by at most {} mm, and not by 0", LONGEST_JOG_M * 1e3)]
     Jog,
-    /// There is nothing to fit, or to take back.
+    /// No press was taken that could be fitted, or taken back.
     #[error("no press was taken yet")]
     NoPress,
-    /// A press that is to be struck out.
-    #[error("there is no press {press}; {presses} were taken")]
+    /// The press to be struck out does not exist.
+    #[error("press {press} does not exist; {presses} were taken")]
     NoSuchPress {
         /// Number, from 1.
         press: usize,
         /// Presses that were taken.
         presses: usize,
     },
-    /// There is no locator to check, or no place between those of its calibration.
+    /// No locator was fitted, or its calibration leaves no fresh place for a check.
     #[error("no locator was fitted that could be checked")]
     NothingToCheck,
-    /// A statement of the operator that is no length or force.
+    /// A statement of the operator is not a valid length or force.
     #[error(transparent)]
     Statement(#[from] OutOfRange),
-    /// The rig does not say where to press.
+    /// The rig does not specify where to press.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// Presses cannot be kept.
+    /// The presses cannot be recorded.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// The columns of the source are not those of the rig's channels.
+    /// The columns of the source differ from the channels of the rig.
     #[error(transparent)]
     Columns(#[from] ColumnsError),
     /// The source cannot be opened.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// There is no thread for it.
+    /// The thread of the calibration cannot be started.
     #[error("no thread for the calibration: {0}")]
     Thread(#[from] std::io::Error),
 }
@@ -145,11 +145,11 @@ pub enum CalibratorError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Phase {
-    /// It waits for somebody to begin, or to go on.
+    /// The calibration waits to be started, or to be continued.
     Ready,
-    /// Presses are asked for.
+    /// Presses are requested.
     Pressing,
-    /// All presses were taken, or somebody ended it early.
+    /// All presses were taken, or the operator ended the calibration early.
     Pressed,
     /// The locator is fitted.
     Fitting,
@@ -157,7 +157,7 @@ enum Phase {
     Assessing,
     /// All is done.
     Done,
-    /// Presses at fresh places are asked for, which check the locator.
+    /// Presses at fresh places are requested, which check the locator.
     Checking,
     /// A machine is set up: a dry run, jogs, touch-off.
     SettingUp,
@@ -179,21 +179,21 @@ pub struct CalibrationRecord {
     reading: Vec<f64>,
     bad_frames: u64,
     presses: String,
-    /// Placement, in mm; `None` while nobody says it.
+    /// Placement, in mm; `None` until it is stated.
     placement_mm: Option<f64>,
-    /// The one weight of all presses, in newtons, where a second one is to be asked for.
+    /// The single weight of all presses, in newtons, if a second one should be requested.
     single_weight_n: Option<f64>,
     problem: Option<String>,
-    /// Why a press is asked for again, or what a step that takes long waits for.
+    /// Reason for requesting a press again, or what a long step waits for.
     hint: Option<String>,
-    /// The machine, where one presses.
+    /// The machine, if one presses.
     machine: Option<MachineRecord>,
     outcome: Option<OutcomeRecord>,
     /// The last check of the locator.
     check: Option<CheckRecord>,
-    /// True where the locator can be checked.
+    /// True if the locator can be checked.
     can_check: bool,
-    /// True where a machine can be set up.
+    /// True if a machine can be set up.
     can_set_up: bool,
 }
 
@@ -223,7 +223,7 @@ struct OutcomeRecord {
     remarks: Vec<String>,
 }
 
-/// A calibration, its state behind a lock.
+/// A calibration with its state behind a lock.
 pub struct Calibrator {
     plan: CalibrationPlan,
     /// Folder of the paths of sources.
@@ -231,16 +231,16 @@ pub struct Calibrator {
     clock: HostClock,
     channels: Vec<Channel>,
     state: Mutex<State>,
-    /// The stop of the machine that was started last: apart from the state, which may be waited for.
+    /// Stop flag of the machine that was started last. It is separate from the state, because the lock of the state may be busy for long.
     stop: Mutex<Arc<AtomicBool>>,
     attendance: Arc<Attendance>,
 }
 
 struct State {
     phase: Phase,
-    /// Rows of the file of presses, before it begins and after it has ended.
+    /// Rows of the file of presses, before the calibration begins and after it has ended.
     rows: Vec<Row>,
-    /// Trace of each row, and error of each press at its place held out, where they are known.
+    /// Trace of each row, and held-out error of each press, where they are known.
     traces: Vec<Option<Trace>>,
     errors_m: Vec<Option<f64>>,
     statements: Statements,
@@ -257,11 +257,11 @@ struct State {
 /// Purpose of the readings of a calibration that runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Purpose {
-    /// They are shown before it begins.
+    /// Readings are shown before the calibration begins.
     Preview,
-    /// Presses are taken for the calibration.
+    /// Presses are recorded for the calibration.
     Press,
-    /// Presses are taken at fresh places.
+    /// Presses at fresh places are recorded for a check.
     Check,
     /// A machine is set up.
     SetUp,
@@ -274,12 +274,12 @@ struct Running {
     thread: JoinHandle<()>,
     purpose: Purpose,
     by_machine: bool,
-    /// Thread ends with it.
+    /// The thread of the source ends when this is dropped.
     _source: Source,
 }
 
 impl Calibrator {
-    /// A calibration that has not begun, whose source may be a path in a folder.
+    /// A calibration that has not begun. The source may be a path relative to `folder`.
     pub fn new(mut plan: CalibrationPlan, folder: PathBuf, clock: HostClock) -> Self {
         let rows = std::mem::take(&mut plan.before);
         let state = State {
@@ -316,11 +316,11 @@ impl Calibrator {
         &self.attendance
     }
 
-    /// Begins, or goes on after it was ended early, with what the operator states; with a machine it greets that, which then moves.
-    /// `free_source` ends the session that has the source.
+    /// Begins the calibration with the statements of the operator, or continues one that was ended early. A machine is connected first, and moves
+    /// afterwards. `free_source` ends the session that uses the source.
     ///
     /// # Errors
-    /// [`CalibratorError`] where it goes on already, the source cannot be opened, or the presses cannot be kept.
+    /// [`CalibratorError`] if the calibration is running already, the source cannot be opened, or the presses cannot be recorded.
     pub fn begin(&self, stated: Statements, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
         stated.check()?;
         let mut state = self.lock();
@@ -339,7 +339,7 @@ impl Calibrator {
         let (rows, comment) = (state.rows.clone(), self.plan.comment(&state.statements));
         let journal =
             Journal::new(&rig.setup, presses, comment, rows, depths)?.with_traces(state.traces.clone());
-        // Many sources have room for one.
+        // Many sources accept only one client.
         free_source();
         let running = self.run(Purpose::Press, to_come, journal, machine)?;
         (state.phase, state.problem, state.hint) = (Phase::Pressing, None, None);
@@ -347,10 +347,11 @@ impl Calibrator {
         Ok(())
     }
 
-    /// Connects to the machine, which homes; with `dry_run` it travels over all places at the height of travel, and ends. Nothing is recorded.
+    /// Connects to the machine, which homes. A dry run (`is_dry_run`) travels over all places at the height of travel, and ends. Nothing is
+    /// recorded.
     ///
     /// # Errors
-    /// [`CalibratorError`] where there is no machine, something goes on, or the source cannot be opened.
+    /// [`CalibratorError`] without a machine, while another step runs, or if the source cannot be opened.
     pub fn begin_set_up(&self, is_dry_run: bool, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if self.plan.machine().is_none() {
@@ -379,10 +380,10 @@ impl Calibrator {
         is_free && self.plan.machine().is_some()
     }
 
-    /// Has a machine that is set up do a task.
+    /// Gives a task to the machine that is being set up.
     ///
     /// # Errors
-    /// [`CalibratorError::NotSetUp`], or [`CalibratorError::Jog`] for one that is too long.
+    /// [`CalibratorError::NotSetUp`], or [`CalibratorError::Jog`] for a jog that is too long or has length 0.
     pub fn ask_set_up(&self, task: SetUpTask) -> Result<(), CalibratorError> {
         if let SetUpTask::Jog(by_m) = &task {
             let is_short = by_m.iter().all(|by_m| by_m.abs() <= LONGEST_JOG_M);
@@ -397,7 +398,7 @@ impl Calibrator {
         Ok(())
     }
 
-    /// A run of the machine, with its tasks where it is set up; `None` where a person presses.
+    /// A run of the machine, with its tasks if it is set up; `None` if a person presses.
     fn machine_run(&self, state: &State, set_up: Option<Vec<SetUpTask>>) -> Option<MachineRun> {
         let (url, _) = self.plan.machine()?;
         Some(MachineRun {
@@ -417,7 +418,7 @@ impl Calibrator {
         Some(Stage { touch_z_m, ..stage.clone() })
     }
 
-    /// Shows readings before it begins, where a person presses and the source can be opened.
+    /// Shows readings before the calibration begins, if a person presses and the source can be opened.
     pub fn preview(&self) {
         let mut state = self.lock();
         let waits = state.phase == Phase::Ready && state.running.is_none() && state.problem.is_none();
@@ -435,10 +436,11 @@ impl Calibrator {
         }
     }
 
-    /// Has a person or the machine press at fresh places, which check the locator on disk. `free_source` ends the session that has the source.
+    /// Asks a person or the machine for presses at fresh places, which check the locator on disk. `free_source` ends the session that uses the
+    /// source.
     ///
     /// # Errors
-    /// [`CalibratorError`] where there is nothing to check, or the source cannot be opened.
+    /// [`CalibratorError`] without a locator to check, or if the source cannot be opened.
     pub fn begin_check(&self, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if !self.can_check(&state) {
@@ -465,8 +467,8 @@ impl Calibrator {
         state.phase == Phase::Done && state.running.is_none()
     }
 
-    /// Ends a check whose presses are all taken, or whose machine has ended, and measures the locator by them; false where none has come to
-    /// its end. The session may have the source again then.
+    /// Ends a check once all its presses are taken or its machine has ended, and measures the error of the locator with them. Returns false if no
+    /// check has come to its end. The session may use the source again afterwards.
     pub fn finish_check(&self) -> bool {
         let mut state = locked(&self.state);
         let is_over = |running: &Running| {
@@ -502,7 +504,7 @@ impl Calibrator {
         Ok(check.map(|check| CheckRecord::new(&name, &check, statements.placement_sd_m, extent)))
     }
 
-    /// Opens the source, and begins a thread that takes what it brings.
+    /// Opens the source, and starts a thread that processes its arrivals.
     fn run(
         &self,
         purpose: Purpose,
@@ -536,10 +538,10 @@ impl Calibrator {
         Ok(Running { shared, inputs, thread, purpose, by_machine, _source: source })
     }
 
-    /// Stops the machine at once, whatever it does and whatever is waited for.
+    /// Stops the machine at once, during any move or wait.
     ///
     /// # Errors
-    /// [`CalibratorError::NoMachine`] where none is to press.
+    /// [`CalibratorError::NoMachine`] if a person presses.
     pub fn halt(&self) -> Result<(), CalibratorError> {
         if self.plan.machine.is_none() {
             return Err(CalibratorError::NoMachine);
@@ -554,10 +556,10 @@ impl Calibrator {
         stop
     }
 
-    /// Takes back the last press, which is asked for again.
+    /// Takes back the last press, which is then requested again.
     ///
     /// # Errors
-    /// [`CalibratorError`] where none was taken since it began.
+    /// [`CalibratorError`] if no press was taken since the calibration began.
     pub fn redo(&self) -> Result<(), CalibratorError> {
         self.with_hand(|calibration| match calibration.redo()? {
             true => Ok(()),
@@ -565,7 +567,7 @@ impl Calibrator {
         })
     }
 
-    /// Learns the untouched reading anew: the operator says that nothing touches.
+    /// Learns the untouched reading again, after the operator has stated that the surface is untouched.
     ///
     /// # Errors
     /// [`CalibratorError::NotBegun`], or [`CalibratorError::MachinePresses`].
@@ -576,7 +578,7 @@ impl Calibrator {
         })
     }
 
-    /// Leaves out the press that is next.
+    /// Leaves out the next press.
     ///
     /// # Errors
     /// [`CalibratorError::NotBegun`], or [`CalibratorError::MachinePresses`].
@@ -601,10 +603,10 @@ impl Calibrator {
         })
     }
 
-    /// Strikes out a press, counted from 1, which is asked for again.
+    /// Strikes out a press, counted from 1; it is then requested again.
     ///
     /// # Errors
-    /// [`CalibratorError::NoSuchPress`], or where a machine presses, a fit or a check goes on, or the file cannot be written.
+    /// [`CalibratorError::NoSuchPress`], or another error if a machine presses, a fit or a check runs, or the file cannot be written.
     pub fn strike(&self, press: usize) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if state.machine_presses() {
@@ -642,7 +644,7 @@ impl Calibrator {
         Ok(())
     }
 
-    /// The presses so far, each with its trace and how it agrees with the others.
+    /// The presses so far, each with its trace and its agreement with the others.
     pub fn presses(&self) -> Vec<PressRecord> {
         let state = self.lock();
         let extent = self.plan.rig.setup.surface().extent();
@@ -656,7 +658,7 @@ impl Calibrator {
         }
     }
 
-    /// Acts where a person presses: a machine is on its way to the press that was next.
+    /// Runs `act` on the calibration of a person. A machine is refused, because it is already on its way to the next press.
     fn with_hand(
         &self,
         act: impl FnOnce(&mut Calibration) -> Result<(), CalibratorError>,
@@ -677,10 +679,10 @@ impl Calibrator {
         act(&mut locked(&running.shared).calibration)
     }
 
-    /// Ends the presses, which are to be fitted.
+    /// Ends the presses, so that they can be fitted.
     ///
     /// # Errors
-    /// [`CalibratorError::NoPress`], or [`CalibratorError::GoesOn`] where they are fitted already.
+    /// [`CalibratorError::NoPress`], or [`CalibratorError::GoesOn`] if they are being fitted already.
     pub fn begin_fit(&self) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if matches!(state.phase(), Phase::Fitting | Phase::Assessing | Phase::Checking | Phase::SettingUp) {
@@ -698,7 +700,7 @@ impl Calibrator {
         Ok(())
     }
 
-    /// Fits the presses on disk, writes the locator, has a session `begin` with it, and assesses it.
+    /// Fits the presses on disk, writes the locator, starts a session with it by `begin`, and assesses it.
     pub fn fit(&self, begin: impl FnOnce(Locator) -> Result<(), String>) {
         let outcome = self.try_to_fit(begin);
         let mut state = self.lock();
@@ -746,7 +748,8 @@ impl Calibrator {
         Ok((outcome, assessment.errors_m))
     }
 
-    /// Ends it, where it runs; its presses are on disk. A machine is stopped at once. Returns the fault of a source that brought no reading.
+    /// Ends the calibration if it runs; its presses are on disk. A machine is stopped at once. Returns the fault of a source that delivered no
+    /// reading.
     pub fn end(&self) -> Option<String> {
         locked(&self.stop).store(true, Ordering::Relaxed);
         let mut state = self.lock();
@@ -756,7 +759,7 @@ impl Calibrator {
         calibration.fault().filter(|_| calibration.readings() == 0)
     }
 
-    /// State.
+    /// State as a record of JSON.
     pub fn record(&self) -> CalibrationRecord {
         let state = self.lock();
         let extent = self.plan.rig.setup.surface().extent();
@@ -813,7 +816,7 @@ impl Calibrator {
         let next = guide.next_press();
         let left = next.map_or(guide.plan().len(), |(number, _)| number);
         let (rows, to_come) = match running.purpose {
-            // Nothing is pressed now: the presses of the calibration that follows.
+            // Nothing is pressed during set-up: these are the presses of the calibration that follows.
             Purpose::SetUp => {
                 let to_come = self.plan.to_come(&state.statements, &state.rows).unwrap_or_default();
                 (state.rows.as_slice(), Cow::Owned(to_come))
@@ -852,7 +855,7 @@ impl Calibrator {
         Some(MachineRecord::new(url, &stage, &places, state.touch_z_m))
     }
 
-    /// The state, in which a machine that has ended is no more; [`Self::finish_check`] ends that of a check.
+    /// The locked state, without a machine's run that has ended. The run of a check remains, because [`Self::finish_check`] ends it.
     fn lock(&self) -> MutexGuard<'_, State> {
         let mut state = locked(&self.state);
         let has_ended = |running: &Running| {
@@ -866,7 +869,7 @@ impl Calibrator {
 }
 
 impl State {
-    /// The phase, that of a calibration that runs.
+    /// The phase; that of the active run, if there is one.
     fn phase(&self) -> Phase {
         let Some(running) = &self.running else { return self.phase };
         match running.purpose {
@@ -881,7 +884,7 @@ impl State {
         }
     }
 
-    /// Takes what the operator states; what he leaves out stays.
+    /// Stores the statements of the operator; those that are missing in `stated` keep their values.
     fn state(&mut self, stated: Statements) {
         let now = &mut self.statements;
         now.placement_sd_m = stated.placement_sd_m.or(now.placement_sd_m);
@@ -893,14 +896,14 @@ impl State {
         self.running.as_ref().is_some_and(|running| running.by_machine)
     }
 
-    /// Ends the thread and the source, and keeps the rows and what is wrong.
+    /// Ends the thread and the source, and keeps the rows and the problem.
     fn end_running(&mut self) {
         let Some(Running { shared, inputs, thread, purpose, _source: source, .. }) = self.running.take()
         else {
             return;
         };
         drop(source);
-        // Refused only by a thread that has ended.
+        // Only a thread that has ended refuses this.
         let _ = inputs.send(Input::Stop);
         let _ = thread.join();
         let shared = locked(&shared);

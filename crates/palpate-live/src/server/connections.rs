@@ -1,8 +1,8 @@
-//! Connections of the server: how long each may take to ask, and how many are open at once.
+//! Connections of the server: the time limits of their requests, and the limit on their number.
 //!
-//! Who opens connections and asks nothing must not shut out the others, least of all the request that stops a machine. A request has its
-//! time; and where as many connections are open as may be, the next one is taken all the same, and another is closed for it: the oldest that
-//! has not brought a whole request yet. A WebSocket is none of them any more, as it has a place of its own (`stream.rs`).
+//! A client that opens connections without sending requests must not block the others, least of all the request that stops a machine. Every request
+//! has a time limit. At the limit on the number of connections, the next one is accepted, and another is closed for it: the oldest that has not
+//! delivered a whole request yet. A WebSocket no longer counts as a connection, because streams have their own limit (`stream.rs`).
 
 use axum::Router;
 use axum::extract::Request;
@@ -19,18 +19,18 @@ use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::AbortHandle;
 
-/// Time in which the head of a request must come, and for which a connection may stay open between two requests. A head is a packet or two; on a
-/// network that carries the stream they come within a second, also where one is lost and sent again.
+/// Time limit for the head of a request, and for an idle connection between two requests. A head is a packet or two. On a network that carries the
+/// stream they arrive within a second, even if one is lost and sent again.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
-/// Time in which the body of a request must come: at most 64 kB, a second at 0.5 Mbit/s.
+/// Time limit for the body of a request: at most 64 kB, which take a second at 0.5 Mbit/s.
 const BODY_WITHIN: Duration = Duration::from_secs(10);
-/// Most connections that are open at once, and most streams: more than the browsers of a bench need, which open six each.
+/// Largest number of simultaneous connections, and of streams. The browsers of a bench need fewer, at six each.
 const MOST: usize = 256;
-/// Wait after a connection that could not be taken as no file descriptor was left, until those of a connection that is closed for it are.
+/// Wait after a connection could not be accepted for lack of file descriptors, until those of the connection that was closed for it are free.
 const TAKE_AGAIN: Duration = Duration::from_millis(20);
 
-/// Most connections that are open at once, and most streams beside them: each has at most a quarter of the files that the process may have open, so
-/// that sources, recordings and locators always have some.
+/// Largest number of simultaneous connections, and of streams in addition. Each is at most a quarter of the process's limit on files, so that
+/// sources, recordings and locators can always open some.
 pub fn most_open() -> usize {
     (most_files() / 4).clamp(1, MOST)
 }
@@ -64,9 +64,9 @@ impl Default for Bounds {
 /// Connection of a request, which carries it as an extension.
 #[derive(Clone, Debug)]
 pub struct Connection {
-    /// Time in which a body must come.
+    /// Time limit for a body.
     pub body_within: Duration,
-    /// True once a whole request has come on it.
+    /// True once a whole request has arrived on this connection.
     has_asked: Arc<AtomicBool>,
 }
 
@@ -77,7 +77,7 @@ impl Connection {
     }
 }
 
-/// Takes connections and answers their requests, for ever.
+/// Accepts connections and answers their requests, for ever.
 pub async fn serve(listener: TcpListener, router: Router, bounds: Bounds) -> Infallible {
     let mut open = Open::default();
     loop {
@@ -85,12 +85,12 @@ pub async fn serve(listener: TcpListener, router: Router, bounds: Bounds) -> Inf
             Ok((stream, _)) => {
                 open.make_room(bounds.most);
                 open.take(stream, router.clone(), bounds);
-                // It is read before the next one is taken, lest many that come at once close it unread.
+                // This connection is read before the next one is accepted. Otherwise many simultaneous connections could close it unread.
                 tokio::task::yield_now().await;
             }
-            // The other end has gone before it was taken.
+            // The other end closed the connection before it was accepted.
             Err(error) if is_of_the_other_end(error.kind()) => {}
-            // Tried at once it would fail again, for ever and as fast as the machine can.
+            // An immediate retry would fail again, in an endless busy loop.
             Err(_) => {
                 open.close_one();
                 tokio::time::sleep(TAKE_AGAIN).await;
@@ -103,12 +103,12 @@ fn is_of_the_other_end(kind: ErrorKind) -> bool {
     matches!(kind, ErrorKind::ConnectionAborted | ErrorKind::ConnectionReset | ErrorKind::ConnectionRefused)
 }
 
-/// Connections that are open, the oldest first.
+/// Active connections, the oldest first.
 #[derive(Default)]
 struct Open(Vec<(AbortHandle, Connection)>);
 
 impl Open {
-    /// Forgets connections that have ended, and closes one where `most` are open.
+    /// Removes connections that have ended, and closes one if `most` are active.
     fn make_room(&mut self, most: usize) {
         self.0.retain(|(task, _)| !task.is_finished());
         if self.0.len() >= most {
@@ -116,7 +116,7 @@ impl Open {
         }
     }
 
-    /// Closes the oldest connection that has not brought a whole request; where all have, the oldest.
+    /// Closes the oldest connection that has not delivered a whole request; if all have, the oldest one.
     fn close_one(&mut self) {
         let asks = |(_, connection): &(_, Connection)| !connection.has_asked.load(Ordering::Relaxed);
         let oldest = self.0.iter().position(asks).unwrap_or(0);
@@ -126,7 +126,7 @@ impl Open {
     }
 
     fn take(&mut self, stream: TcpStream, router: Router, bounds: Bounds) {
-        // A message leaves at once, whatever the one before it became of.
+        // A message leaves at once, without waiting for the acknowledgement of the previous one.
         let _ = stream.set_nodelay(true);
         let connection =
             Connection { body_within: bounds.body_within, has_asked: Arc::new(AtomicBool::new(false)) };
@@ -147,7 +147,7 @@ async fn answer(stream: TcpStream, router: Router, head_within: Duration, connec
     });
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(head_within);
-    // What ends a connection is nothing that anybody could be told of.
+    // An error that ends a connection has no recipient.
     let _ = http.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
 }
 
@@ -163,7 +163,7 @@ mod tests {
 
     const GET: &str = "GET / HTTP/1.1\r\nHost: here\r\n\r\n";
 
-    /// A server of these bounds in a thread that ends with the test, and its address.
+    /// A server with these bounds in a thread that ends with the test, and its address.
     fn served(bounds: Bounds) -> SocketAddr {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         listener.set_nonblocking(true).unwrap();
@@ -191,10 +191,10 @@ mod tests {
         stream
     }
 
-    /// Bytes that come until the connection is closed, and the time until then.
+    /// Bytes that arrive until the connection is closed, and the time until then.
     fn until_closed(mut stream: std::net::TcpStream) -> (String, Duration) {
         let (start, mut answer) = (Instant::now(), Vec::new());
-        // An end that is closed with bytes unread is a reset.
+        // A connection that is closed with unread bytes is reset.
         let ended = stream.read_to_end(&mut answer);
         assert!(ended.is_ok() || start.elapsed() < Duration::from_secs(9), "it is still open");
         (String::from_utf8(answer).unwrap(), start.elapsed())
@@ -207,7 +207,7 @@ mod tests {
             ("", ""),
             ("GET / HTTP/1.1\r\nHost:", ""),
             ("POST /body HTTP/1.1\r\nHost: here\r\nContent-Length: 9\r\n\r\n[1,", "HTTP/1.1 408"),
-            // One that was answered and asks nothing more.
+            // An idle connection after an answered request.
             (GET, "HTTP/1.1 200"),
         ] {
             let (told, elapsed) = until_closed(asked(address, request));
@@ -232,7 +232,7 @@ mod tests {
         let mut fifth = asked(address, GET);
         whole(&mut fifth).unwrap();
         assert_eq!(until_closed(third).0, "");
-        // All that are open have asked: the oldest goes.
+        // All connections have delivered a request: the oldest is closed.
         let mut sixth = asked(address, GET);
         whole(&mut sixth).unwrap();
         until_closed(first);

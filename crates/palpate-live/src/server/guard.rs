@@ -1,4 +1,4 @@
-//! Guard of the server: who may ask.
+//! Guard of the server: permissions of requests.
 
 use super::body::Refusal;
 use super::lock::locked;
@@ -12,10 +12,10 @@ use std::time::{Duration, Instant};
 
 /// Shortest token.
 const SHORTEST_TOKEN: usize = 16;
-/// Requests that change something, a second, of all browsers together.
+/// Limit on requests with an effect, a second, of all browsers together.
 const POSTS_A_SECOND: u32 = 50;
 
-/// Path of the request that stops a machine, which is never one too many.
+/// Path of the request that stops a machine; the limit on requests does not apply to it.
 pub const EMERGENCY_STOP: &str = "/api/emergency-stop";
 
 /// Headers of every answer.
@@ -30,18 +30,18 @@ const HEADERS: [(HeaderName, &str); 5] = [
     (header::CACHE_CONTROL, "no-cache"),
 ];
 
-/// Access that cannot be granted.
+/// Error of a forbidden access.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AccessError {
-    /// An address that others reach, without a token.
-    #[error("{address} can be reached from other machines, and there is no token")]
+    /// The address is reachable from other machines, and the token is missing.
+    #[error("{address} can be reached from other machines, and the token is missing")]
     NoToken {
         /// The address.
         address: IpAddr,
     },
-    /// A token that is too short or has other characters.
+    /// The token is too short, or contains other characters.
     #[error(
-        "the token has {length} characters; it must have at least {SHORTEST_TOKEN}, of which each is a letter, a digit, `-`, `.`, `_` or `~`"
+        "the token has {length} characters; it must have at least {SHORTEST_TOKEN}, each a letter, a digit, `-`, `.`, `_` or `~`"
     )]
     Token {
         /// Length.
@@ -49,7 +49,7 @@ pub enum AccessError {
     },
 }
 
-/// Who may ask a server.
+/// Permissions of a server.
 #[derive(Clone, Debug, Default)]
 pub struct Access {
     token: Option<String>,
@@ -58,11 +58,11 @@ pub struct Access {
 }
 
 impl Access {
-    /// Access at an address: anybody on this machine, elsewhere whoever has the token. `host_names` are names of this machine that a
-    /// browser may call it by, beside its address.
+    /// Access at an address: anybody on this machine has access, elsewhere a client with the token. `host_names` are names by which a browser may
+    /// call this machine, in addition to its address.
     ///
     /// # Errors
-    /// [`AccessError`] for a token that is too short, or an address that others reach without one.
+    /// [`AccessError`] for a token that is too short, or a reachable address without a token.
     pub fn new(
         address: SocketAddr,
         token: Option<String>,
@@ -78,7 +78,7 @@ impl Access {
         }
     }
 
-    /// The same, of a server that listens at this address.
+    /// Sets the address that the server listens at.
     pub(super) fn listening_at(self, address: IpAddr) -> Self {
         Self { address: Some(address), ..self }
     }
@@ -87,7 +87,7 @@ impl Access {
         let headers = request.headers();
         check_single(headers)?;
         let host = text(headers, header::HOST).unwrap_or_default();
-        // A request line with a whole URL names the server, too.
+        // A request line with a whole URL also names the server.
         let authority = request.uri().authority().map(|authority| authority.as_str());
         if let Some(host) = [host].into_iter().chain(authority).find(|name| !self.is_own(name)) {
             return Err(Refusal::new(
@@ -120,14 +120,14 @@ impl Access {
         }
     }
 
-    /// True for a name of this server. A page of somebody else's name that was made to point here has that name, so it is none.
+    /// True for a name of this server. A foreign page with a name that was made to resolve to this address sends that name, which is refused.
     fn is_own(&self, host: &str) -> bool {
         let name = match host.strip_prefix('[') {
             Some(rest) => rest.split(']').next().unwrap_or_default(),
             None => host.split(':').next().unwrap_or_default(),
         };
         if let Ok(address) = name.parse::<IpAddr>() {
-            // At 0.0.0.0 it is any of the machine's addresses.
+            // A server at 0.0.0.0 has all addresses of the machine.
             let own = self.address.is_some_and(|own| own == address || own.is_unspecified());
             return own || address.is_loopback();
         }
@@ -136,7 +136,7 @@ impl Access {
     }
 }
 
-/// Refuses a request with two headers of a kind that decides on it: proxies and this server may go by different ones.
+/// Refuses a request with two headers of a kind that decides on access, because proxies and this server may use different ones.
 fn check_single(headers: &HeaderMap) -> Result<(), Refusal> {
     let decisive = [header::HOST, header::ORIGIN, header::AUTHORIZATION];
     match decisive.iter().find(|name| headers.get_all(*name).iter().count() > 1) {
@@ -161,7 +161,7 @@ fn given(request: &Request) -> Option<&str> {
     bearer.or_else(|| query.split('&').find_map(|pair| pair.strip_prefix("token=")))
 }
 
-/// Equality in a time that does not depend on where they differ.
+/// Equality in a time that is independent of the first difference.
 fn equal(given: &[u8], token: &[u8]) -> bool {
     let differ = given.iter().zip(token).fold(0, |differ, (a, b)| differ | (a ^ b));
     given.len() == token.len() && std::hint::black_box(differ) == 0
@@ -171,12 +171,12 @@ fn equal(given: &[u8], token: &[u8]) -> bool {
 #[derive(Debug)]
 pub struct Guard {
     access: Access,
-    /// Start of the second that is counted, and posts in it.
+    /// Start of the present second, and the number of posts in it.
     posts: Mutex<(Instant, u32)>,
 }
 
 impl Guard {
-    /// A guard that grants this access.
+    /// A guard with these permissions.
     pub fn new(access: Access) -> Self {
         Self { access, posts: Mutex::new((Instant::now(), 0)) }
     }
@@ -199,9 +199,9 @@ impl Guard {
     }
 }
 
-/// Lets a request through that is allowed, and puts the headers on every answer.
+/// Passes a permitted request on, and adds the headers to every answer.
 pub async fn guarded(State(guard): State<Arc<Guard>>, request: Request, next: Next) -> Response {
-    // The page's parts carry no token in their addresses, and hold nothing of the session.
+    // The parts of the page have no token in their addresses, and contain no data of the session.
     let mut response = match guard.check_for(&request) {
         Ok(()) => next.run(request).await,
         Err(refusal) => refusal.into_response(),

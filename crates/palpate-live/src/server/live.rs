@@ -1,4 +1,4 @@
-//! A locator in live use: the session that runs, and the beginning of another.
+//! A locator in live use: the session that runs, and the start of another.
 
 use super::alarm_file::AlarmFile;
 use super::bring_up::{BringUp, BringUpError, BringUpRecord};
@@ -27,7 +27,7 @@ use std::thread::JoinHandle;
 
 /// A locator in live use.
 pub struct Live {
-    /// Replaced once, where a calibration ends with a locator.
+    /// Replaced once, when a calibration ends with a locator.
     subject: Mutex<Arc<Subject>>,
     /// Set from the start, or once a rig was made for a board without one.
     calibrator: OnceLock<Calibrator>,
@@ -36,24 +36,24 @@ pub struct Live {
     simulated: Option<(Rig, BoardConfig)>,
     /// Folder that paths in URLs of sources are relative to.
     folder: PathBuf,
-    /// Folder of recordings, where sessions may be recorded.
+    /// Folder of recordings; `None` if sessions are not recorded.
     recordings: Option<PathBuf>,
-    /// Configuration of its sessions.
+    /// Configuration of the sessions.
     config: SessionConfig,
-    /// Rules whose commands go to the board.
+    /// Rules that send commands to the board.
     commands: Rules,
-    /// Rules that raise alarms, which browsers set.
+    /// Rules that raise alarms, set by browsers.
     alarms: Alarms,
-    /// Text of these rules, as it was set, and the file that keeps it.
+    /// Text of these rules as it was set, and the file that stores it.
     alarm_text: Mutex<(String, Option<AlarmFile>)>,
-    /// Sinks of each session beside browsers and recordings.
+    /// Sinks of each session, in addition to browsers and recordings.
     sinks: Vec<OpenSink>,
     clock: HostClock,
     hub: Hub,
     running: Mutex<Option<Running>>,
 }
 
-/// The locator of sessions, and what is told of it.
+/// The locator of the sessions, and its description.
 struct Subject {
     /// `None` before a calibration has ended.
     locator: Option<Arc<Locator>>,
@@ -65,35 +65,35 @@ struct Subject {
 struct Running {
     url: String,
     inputs: SyncSender<Input>,
-    /// Returns the fault of a source that brought no reading.
+    /// Returns the fault of a source that delivered no reading.
     thread: JoinHandle<Option<String>>,
     switch: RecordingSwitch,
-    /// Thread ends with it.
+    /// The thread of the source ends when this is dropped.
     _source: Source,
 }
 
-/// A wish that cannot be done.
+/// Error of a request that cannot be done.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
-    /// There is no locator yet.
-    #[error("there is no locator yet: the calibration has not ended")]
+    /// The calibration has not produced a locator yet.
+    #[error("the locator does not exist yet: the calibration has not ended")]
     NoLocator,
-    /// No calibration goes on.
+    /// The server has no calibration.
     #[error("this server does not calibrate")]
     NotCalibrating,
     /// A step of a calibration cannot be done.
     #[error(transparent)]
     Calibrator(#[from] CalibratorError),
     /// No session runs.
-    #[error("no session runs: there is no source, or it has ended")]
+    #[error("no session runs: the source is missing, or it has ended")]
     NoSession,
-    /// The session has more to do than it can.
+    /// The session cannot keep up with its source.
     #[error("the session is behind its source")]
     Behind,
-    /// There is no rig to simulate.
-    #[error("there is no simulated board: the server was started with a locator alone")]
+    /// The server has no rig to simulate.
+    #[error("the simulated board is missing: the server was started with a locator alone")]
     NotSimulated,
-    /// The source is that of the calibration.
+    /// The source belongs to the calibration.
     #[error("this server calibrates, and its readings come from {from}")]
     Calibrates {
         /// The source, as its URL.
@@ -102,22 +102,22 @@ pub enum LiveError {
     /// The source cannot be opened.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// There is no thread for the session.
+    /// The thread of the session cannot be started.
     #[error("no thread for the session: {0}")]
     Thread(#[from] std::io::Error),
-    /// The session cannot go on as it is configured with this locator.
+    /// The configuration of the session does not suit this locator.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The readings of the source have other times than the filter or the tracker needs.
+    /// The times of the source's readings do not suit the filter or the tracker.
     #[error(transparent)]
     Pace(#[from] PaceError),
-    /// The source takes no commands, and there are rules that send some.
+    /// The source accepts no commands, and some rules send commands.
     #[error("rules send commands, and {0}")]
     OneWay(#[from] SendError),
-    /// The columns of a source are not those of the locator's channels.
+    /// The columns of a source differ from the channels of the locator.
     #[error(transparent)]
     Columns(#[from] ColumnsError),
-    /// A board without a rig cannot be looked at.
+    /// A board without a rig cannot be watched.
     #[error(transparent)]
     BringUp(#[from] BringUpError),
     /// No rig can be made.
@@ -126,7 +126,7 @@ pub enum LiveError {
     /// Alarms cannot be set.
     #[error("{0}")]
     Rule(String),
-    /// Alarms cannot be kept.
+    /// The alarms cannot be saved.
     #[error("cannot keep the alarms in {path}: {error}")]
     AlarmFile {
         /// The file.
@@ -135,7 +135,7 @@ pub enum LiveError {
         error: std::io::Error,
     },
     /// Sessions are not recorded.
-    #[error("there is no folder for recordings")]
+    #[error("there is not a folder for recordings")]
     NoFolder,
     /// A recording cannot be made or read.
     #[error(transparent)]
@@ -143,14 +143,13 @@ pub enum LiveError {
 }
 
 impl Live {
-    /// A locator of this name, without a session. Where `simulated` has a rig, browsers may begin a session with a simulated board on its
-    /// bench.
+    /// A locator of this name, without a session. With a rig in `simulated`, browsers may start a session with a simulated board on its bench.
     pub fn new(locator: Locator, name: &str, simulated: Option<(Rig, BoardConfig)>, folder: PathBuf) -> Self {
         let subject = Subject::of_locator(locator, name, simulated.is_some());
         Self::of_subject(subject, simulated, folder)
     }
 
-    /// A rig without a locator, which browsers calibrate first; times are those of the clock.
+    /// A rig without a locator, which browsers calibrate first; times come from the clock.
     pub fn calibrating(plan: CalibrationPlan, folder: PathBuf, clock: HostClock) -> Self {
         let subject = Subject {
             locator: None,
@@ -158,15 +157,15 @@ impl Live {
             info: SessionInfo::of_setup(&plan.rig.setup),
         };
         let live = Self { clock, ..Self::of_subject(subject, None, folder) };
-        // It was empty.
+        // The cell was empty.
         let _ = live.calibrator.set(Calibrator::new(plan, live.folder.clone(), clock));
         live
     }
 
-    /// A board without a rig, which browsers look at and make a rig for.
+    /// A board without a rig; browsers watch it and make a rig for it.
     ///
     /// # Errors
-    /// [`LiveError::BringUp`] where the source cannot be opened.
+    /// [`LiveError::BringUp`] if the source cannot be opened.
     pub fn bringing_up(from: SourceUrl, folder: PathBuf) -> Result<Self, LiveError> {
         let subject = Subject { locator: None, channels: Vec::new(), info: SessionInfo::without_rig() };
         let live = Self::of_subject(subject, None, folder);
@@ -193,19 +192,19 @@ impl Live {
         }
     }
 
-    /// The same with a folder in which sessions may be recorded.
+    /// Sets the folder in which sessions may be recorded.
     #[must_use]
     pub fn with_recordings(self, folder: PathBuf) -> Self {
         Self { recordings: Some(folder), ..self }
     }
 
-    /// The same with sessions of this configuration. One that does not go with the locator is refused as a session begins.
+    /// Sets the configuration of sessions. A configuration that does not suit the locator is refused when a session begins.
     #[must_use]
     pub fn with_sessions(self, config: SessionConfig) -> Self {
         Self { config, ..self }
     }
 
-    /// The same with rules, whose commands go to the board of each session.
+    /// Sets rules that send commands to the board of each session.
     #[must_use]
     pub fn with_commands(self, commands: Rules) -> Self {
         Self { commands, ..self }
@@ -219,7 +218,7 @@ impl Live {
         self
     }
 
-    /// Keeps alarms in a file, whose text and rules these are.
+    /// Stores alarms in a file. `text` and `rules` are its content.
     #[must_use]
     pub fn with_alarm_file(self, file: AlarmFile, text: String, rules: Rules) -> Self {
         *locked(&self.alarm_text) = (text, Some(file));
@@ -227,15 +226,17 @@ impl Live {
         self
     }
 
-    /// Text of the rules that raise alarms, and the file that keeps it.
+    /// Text of the rules that raise alarms, and the file that stores it.
     pub(super) fn alarm_text(&self) -> (String, Option<AlarmFile>) {
         locked(&self.alarm_text).clone()
     }
 
-    /// Replaces the rules that raise alarms by those of a file's text; none for a text without rules. They are on disk afterwards, where a file keeps them.
+    /// Replaces the rules that raise alarms by those in the text of a rule file; a text without rules removes them. If a file stores the alarms, it
+    /// is written before this returns.
     ///
     /// # Errors
-    /// [`LiveError::NoLocator`], [`LiveError::AlarmFile`], or [`LiveError::Rule`] for a text that is no rule file, a rule that does something else, and a rule that would never act.
+    /// [`LiveError::NoLocator`], [`LiveError::AlarmFile`], or [`LiveError::Rule`]. The last is for a text that is not a rule file, a rule with
+    /// another action than an alarm, and a rule that would never act.
     pub(super) fn set_alarms(&self, text: &str) -> Result<(), LiveError> {
         let subject = self.subject();
         let locator = subject.locator.as_ref().ok_or(LiveError::NoLocator)?;
@@ -255,17 +256,17 @@ impl Live {
         Ok(())
     }
 
-    /// The same with sinks for each session, beside browsers and recordings.
+    /// Sets sinks for each session, in addition to browsers and recordings.
     #[must_use]
     pub fn with_sinks(self, sinks: Vec<OpenSink>) -> Self {
         Self { sinks, ..self }
     }
 
-    /// Begins a session with a source; one that runs is ended.
+    /// Begins a session with a source; a session that runs is ended.
     ///
     /// # Errors
-    /// [`LiveError`] for a source or a sink that cannot be opened, for columns that lack a channel, and for a locator that does not go with the configuration of
-    /// sessions; the session that ran goes on then.
+    /// [`LiveError`] for a source or a sink that cannot be opened, and for columns that lack a channel. It is also returned for a locator that does
+    /// not suit the configuration of sessions. The session that runs continues in these cases.
     pub fn begin(&self, url: &SourceUrl) -> Result<(), LiveError> {
         pipeline::check_pace(&self.config.estimation, url)?;
         self.begin_with(url.to_string(), url.columns(), |clock, to| {
@@ -273,17 +274,17 @@ impl Live {
         })
     }
 
-    /// Begins a session with the simulated board; one that runs is ended.
+    /// Begins a session with the simulated board; a session that runs is ended.
     ///
     /// # Errors
-    /// [`LiveError::Calibrates`], [`LiveError::NotSimulated`] without a rig, and as of [`Self::begin`].
+    /// [`LiveError::Calibrates`], [`LiveError::NotSimulated`] without a rig, and the errors of [`Self::begin`].
     pub fn begin_simulated(&self) -> Result<(), LiveError> {
         self.check_source_is_free()?;
         let (rig, config) = self.simulated.clone().ok_or(LiveError::NotSimulated)?;
         self.begin_with("simulated".to_owned(), &[], |clock, to| Source::simulated(rig, config, clock, to))
     }
 
-    /// Refuses another source than that of the calibration, where there is one.
+    /// Refuses a new source if the server has a calibration, which needs its own source.
     pub(super) fn check_source_is_free(&self) -> Result<(), LiveError> {
         match self.calibrator.get() {
             Some(calibrator) => Err(LiveError::Calibrates { from: calibrator.plan().from.to_string() }),
@@ -316,14 +317,14 @@ impl Live {
             sinks.push(open(&channels, extent, inputs.clone())?);
         }
         sinks.extend(commands.map(|commands| Box::new(commands) as Box<dyn Sink>));
-        // All that may be refused has been opened: only now the session that runs is ended.
+        // Everything that may fail has been opened, so that the running session can be ended now.
         let mut running = self.lock();
         if let Some(running) = running.take() {
             running.end();
         }
         self.hub.forget_past();
         let run = move || {
-            // What is refused was refused above.
+            // Errors were returned above.
             let mut session = Session::new(&locator, &config).ok()?;
             let _ = session.set_columns(&columns);
             let fault = pipeline::run(&mut session, clock, &received, &mut sinks);
@@ -334,7 +335,7 @@ impl Live {
         Ok(())
     }
 
-    /// Has the session do what somebody wishes.
+    /// Passes a user's command to the session.
     ///
     /// # Errors
     /// [`LiveError::NoSession`] or [`LiveError::Behind`].
@@ -348,17 +349,17 @@ impl Live {
         })
     }
 
-    /// Begins a recording of the session, under a name or one that says the time.
+    /// Begins a recording of the session, under the given name or one made from the time.
     ///
     /// # Errors
-    /// [`LiveError::NoFolder`], [`LiveError::NoSession`], or [`LiveError::Recording`] where one goes on or its file cannot be made.
+    /// [`LiveError::NoFolder`], [`LiveError::NoSession`], or [`LiveError::Recording`] if a recording is running or its file cannot be made.
     pub fn begin_recording(&self, name: Option<&str>) -> Result<RecordingStatus, LiveError> {
         let folder = self.recordings()?;
         let switch = self.switch().ok_or(LiveError::NoSession)?;
         Ok(switch.begin_in(folder, name, self.clock.now().unix_ns / 1_000_000_000)?)
     }
 
-    /// Ends the recording of the session, and waits until its file is whole; `None` where none goes on.
+    /// Ends the recording of the session, and waits until its file is complete; `None` if no recording is running.
     ///
     /// # Errors
     /// [`LiveError::NoSession`].
@@ -366,7 +367,7 @@ impl Live {
         Ok(self.switch().ok_or(LiveError::NoSession)?.end())
     }
 
-    /// Recordings in the folder, as [`recording::list`] has them.
+    /// Recordings in the folder, as listed by [`recording::list`].
     ///
     /// # Errors
     /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a folder that cannot be read.
@@ -377,7 +378,7 @@ impl Live {
     /// Part of a recording of the folder; see [`recording::read`].
     ///
     /// # Errors
-    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a name that no recording has, or a file that cannot be read.
+    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a name without a recording, or a file that cannot be read.
     pub fn read_recording(
         &self,
         name: &str,
@@ -387,10 +388,10 @@ impl Live {
         Ok(recording::read(&self.recording_path(name)?, from_s, to_s, points)?)
     }
 
-    /// Path of a recording of the folder, which need not be there.
+    /// Path of a recording of the folder; the file need not exist.
     ///
     /// # Errors
-    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a name that no recording has, or that of a link, a pipe or a folder.
+    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a name that no recording can have, or that of a link, a pipe or a folder.
     pub fn recording_path(&self, name: &str) -> Result<PathBuf, LiveError> {
         let path = self.recordings()?.join(recording::check_name(name)?);
         match path.symlink_metadata() {
@@ -405,7 +406,7 @@ impl Live {
         self.recordings.as_ref().ok_or(LiveError::NoFolder)
     }
 
-    /// The switch of the session that runs.
+    /// The recording switch of the session that runs.
     fn switch(&self) -> Option<RecordingSwitch> {
         self.lock().as_ref().map(|running| running.switch.clone())
     }
@@ -419,7 +420,7 @@ impl Live {
     /// State of a board without a rig.
     ///
     /// # Errors
-    /// [`LiveError::BringUp`] where there is a rig.
+    /// [`LiveError::BringUp`] if there is a rig.
     pub(super) fn seen(&self) -> Result<BringUpRecord, LiveError> {
         Ok(self.board()?.record())
     }
@@ -432,17 +433,17 @@ impl Live {
         Ok(self.board()?.choose(port, baud, &self.folder)?)
     }
 
-    /// Makes a rig for a board without one; once it is written, the server calibrates it.
+    /// Makes a rig for a board without one. Once the rig is written, the server calibrates it.
     ///
     /// # Errors
-    /// [`LiveError::BringUp`] where there is a rig, and [`LiveError::RigForm`].
+    /// [`LiveError::BringUp`] if there is a rig, and [`LiveError::RigForm`].
     pub(super) fn make_rig(&self, form: &RigForm) -> Result<MadeRigRecord, LiveError> {
         let board = self.board()?;
         let mut made = MadeRig::new(form, &board.from(), &board.channels(), &self.folder)?;
         if !form.write {
             return Ok(made.record);
         }
-        // One request at a time makes the rig.
+        // The lock lets one request at a time make the rig.
         let mut subject = locked(&self.subject);
         self.board()?;
         made.write(form.overwrite)?;
@@ -465,12 +466,12 @@ impl Live {
             before: Vec::new(),
             seed: 0,
         };
-        // It was empty: the board had no rig.
+        // The cell was empty, because the board had no rig.
         let _ = self.calibrator.set(Calibrator::new(plan, self.folder.clone(), self.clock));
         Ok(made.record)
     }
 
-    /// The calibration, where there is one.
+    /// The calibration, if there is one.
     ///
     /// # Errors
     /// [`LiveError::NotCalibrating`].
@@ -487,46 +488,46 @@ impl Live {
         self.calibrator.get().ok_or(LiveError::NotCalibrating)
     }
 
-    /// Notes that somebody watches, who could stop a machine.
+    /// Notes that somebody watches who could stop a machine.
     pub(super) fn attend(&self) {
         if let Some(calibrator) = self.calibrator.get() {
             calibrator.attendance().note();
         }
     }
 
-    /// True while a machine needs somebody who watches it.
+    /// True while a machine needs to be watched.
     pub(super) fn needs_attendance(&self) -> bool {
         self.calibrator.get().is_some_and(|calibrator| calibrator.attendance().is_needed())
     }
 
-    /// Begins the calibration, or goes on with one that was ended early.
+    /// Begins the calibration, or continues one that was ended early.
     ///
     /// # Errors
-    /// [`LiveError`] where the source cannot be opened, or the presses cannot be kept.
+    /// [`LiveError`] if the source cannot be opened, or the presses cannot be recorded.
     pub(super) fn begin_calibration(&self, stated: Statements) -> Result<(), LiveError> {
         Ok(self.calibrator()?.begin(stated, || drop(self.end_session()))?)
     }
 
-    /// Asks for presses at fresh places, which check the locator.
+    /// Requests presses at fresh places, which check the locator.
     ///
     /// # Errors
-    /// [`LiveError`] where there is nothing to check, or the source cannot be opened.
+    /// [`LiveError`] without a locator to check, or if the source cannot be opened.
     pub(super) fn begin_check(&self) -> Result<(), LiveError> {
         Ok(self.calibrator()?.begin_check(|| drop(self.end_session()))?)
     }
 
-    /// Connects to the machine of the calibration, to set it up.
+    /// Connects to the machine of the calibration to set it up.
     ///
     /// # Errors
-    /// [`LiveError`] where there is none, something goes on, or the source cannot be opened.
+    /// [`LiveError`] without a machine, while another step runs, or if the source cannot be opened.
     pub(super) fn begin_set_up(&self, is_dry_run: bool) -> Result<(), LiveError> {
         Ok(self.calibrator()?.begin_set_up(is_dry_run, || drop(self.end_session()))?)
     }
 
-    /// Fits the presses in a thread of its own; a session with the locator begins as soon as there is one.
+    /// Fits the presses in a separate thread; a session with the locator begins as soon as the locator exists.
     ///
     /// # Errors
-    /// [`LiveError`] where no press was taken, or a fit goes on already.
+    /// [`LiveError`] if no press was taken, or a fit is running already.
     pub(super) fn finish_calibration(self: &Arc<Self>) -> Result<(), LiveError> {
         let calibrator = self.calibrator()?;
         calibrator.begin_fit()?;
@@ -544,7 +545,7 @@ impl Live {
         Ok(())
     }
 
-    /// Ends the session and the calibration, where they run; returns the fault of a source that brought no reading.
+    /// Ends the session and the calibration if they run; returns the fault of a source that delivered no reading.
     pub fn end(&self) -> Option<String> {
         let of_calibration = self.calibrator.get().and_then(Calibrator::end);
         let of_board = self.bring_up.as_ref().and_then(BringUp::end);
@@ -584,7 +585,7 @@ impl Live {
 
     /// The last minutes of the session as a record of JSON.
     pub(super) fn past(&self) -> String {
-        // The session waits for the lock: it is free again before the text is put together.
+        // The session waits for this lock, so that it is released before the text is assembled.
         let past = locked(&self.hub.past).clone();
         past.to_json()
     }
@@ -616,7 +617,7 @@ impl Running {
     fn end(self) -> Option<String> {
         let Self { inputs, thread, switch, _source: source, .. } = self;
         drop(source);
-        // Refused only by a session that has ended.
+        // Only a session that has ended refuses this.
         let _ = inputs.send(Input::Stop);
         let fault = thread.join().ok().flatten();
         switch.end();

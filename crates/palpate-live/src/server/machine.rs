@@ -10,40 +10,40 @@ use serde::Serialize;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Time without an open page after which a machine lifts its finger and ends.
+/// Time without a connected page after which a machine lifts its finger and ends.
 pub const UNWATCHED: Duration = Duration::from_secs(5);
 
-/// Attendance of the people who can stop a machine: the last sign of a page.
+/// Attendance of people who can stop a machine: the time of the last signal from a page.
 #[derive(Debug)]
 pub struct Attendance {
     clock: HostClock,
     seen_ms: AtomicU64,
-    /// True while a machine needs somebody.
+    /// True while a machine needs to be watched.
     is_needed: AtomicBool,
 }
 
 impl Attendance {
-    /// Attendance without a sign so far. It runs in real time, as persons do, however fast a simulated machine is.
+    /// Attendance without a signal so far. It uses real time at any speed of a simulated machine, because people act in real time.
     pub fn new() -> Self {
         Self { clock: HostClock::new(), seen_ms: AtomicU64::new(0), is_needed: AtomicBool::new(false) }
     }
 
-    /// Notes a sign of somebody.
+    /// Notes a signal of a person.
     pub fn note(&self) {
         self.seen_ms.store(self.now_ms(), Ordering::Relaxed);
     }
 
-    /// True while a machine needs somebody.
+    /// True while a machine needs to be watched.
     pub fn is_needed(&self) -> bool {
         self.is_needed.load(Ordering::Relaxed)
     }
 
-    /// Says whether a machine needs somebody from now on.
+    /// Sets whether a machine needs to be watched.
     pub fn set_needed(&self, is_needed: bool) {
         self.is_needed.store(is_needed, Ordering::Relaxed);
     }
 
-    /// True once there was no sign of anybody for long.
+    /// True after a long time without a signal of a person.
     pub fn is_absent(&self) -> bool {
         self.now_ms().saturating_sub(self.seen_ms.load(Ordering::Relaxed)) > UNWATCHED.as_millis() as u64
     }
@@ -53,7 +53,7 @@ impl Attendance {
     }
 }
 
-/// State of a machine as far as others see it.
+/// State of a machine, as visible to other threads.
 #[derive(Clone, Debug, Default)]
 pub struct MachineState {
     pub firmware: Option<&'static str>,
@@ -61,7 +61,7 @@ pub struct MachineState {
     pub motion: Option<Motion>,
     position: Option<Position>,
     depth_m: Option<f64>,
-    /// The instant of its first press, the present one, and the presses taken since.
+    /// The instant of the first press, the present instant, and the number of presses since then.
     pressing_since: Option<Duration>,
     now: Duration,
     taken: usize,
@@ -72,7 +72,7 @@ pub struct MachineState {
 }
 
 impl MachineState {
-    /// Takes the machine's motion, and what came of it.
+    /// Updates the state from the motion of the machine and the resulting notes.
     pub fn take(&mut self, now: Duration, machine: &Machine, notes: &[Note]) {
         self.now = now;
         self.motion = Some(machine.motion());
@@ -91,11 +91,11 @@ impl MachineState {
 pub struct MachineRecord {
     url: String,
     firmware: Option<&'static str>,
-    /// The way in which a stop acts, where that is not at once.
+    /// The way in which a stop acts, if it is not immediate.
     stopping: Option<String>,
-    /// True while it runs: from its greeting until its finger is lifted for good.
+    /// True while the machine runs: from the connection until its finger is lifted for good.
     runs: bool,
-    /// `None` while it is greeted.
+    /// `None` while the connection is established.
     motion: Option<Motion>,
     x_mm: Option<f64>,
     y_mm: Option<f64>,
@@ -103,7 +103,7 @@ pub struct MachineRecord {
     /// Force at the load cell.
     force_n: Option<f64>,
     left_s: Option<f64>,
-    /// Position after the last move by the machine's own axes; `None` before homing, and while it does not run.
+    /// Position after the last move in machine coordinates; `None` before homing, and while it does not run.
     at_mm: Option<[f64; 3]>,
     /// Height of the touch that a touch-off found.
     found_touch_mm: Option<f64>,
@@ -125,8 +125,7 @@ struct MovesRecord {
 }
 
 impl MachineRecord {
-    /// A machine that does not run, over places of a surface.
-    /// `found_touch_m` is the height of its stage, where a touch-off found it.
+    /// A machine that does not run, over places of a surface. `found_touch_m` is the height of the touch, if a touch-off found it.
     pub fn new(url: &StageUrl, stage: &Stage, places: &[Position], found_touch_m: Option<f64>) -> Self {
         let (from_x_m, from_y_m) = stage.origin_m;
         let span_mm = |at_m: &dyn Fn(Position) -> f64| {
@@ -163,7 +162,7 @@ impl MachineRecord {
         }
     }
 
-    /// The record of a machine that runs with `left` presses to come.
+    /// The record of a machine that runs with `left` remaining presses.
     pub fn running(
         self,
         state: &MachineState,

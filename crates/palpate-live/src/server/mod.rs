@@ -1,7 +1,7 @@
 //! The web server: a page, a stream of the session, and its controls.
 //!
-//! One thread runs all of it. A browser costs a task and its place in bounded queues: one that is too slow loses the oldest messages,
-//! which are counted, and the session never waits for it.
+//! One thread runs the whole server. A browser costs a task and its place in bounded queues. A slow browser loses the oldest messages, which are
+//! counted, and the session never waits for it.
 
 mod alarm_file;
 mod body;
@@ -40,7 +40,7 @@ use tokio::sync::oneshot;
 /// A server that cannot be started.
 #[derive(Debug, thiserror::Error)]
 pub enum ServerError {
-    /// The address cannot be listened at.
+    /// The server cannot listen at the address.
     #[error("cannot listen at {address}: {error}")]
     Listen {
         /// The address.
@@ -48,7 +48,7 @@ pub enum ServerError {
         /// Why.
         error: std::io::Error,
     },
-    /// There is no thread, or no event queue, for it.
+    /// The thread or the event queue of the server cannot be created.
     #[error("cannot run a web server: {0}")]
     Run(#[from] std::io::Error),
 }
@@ -62,10 +62,10 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts a server of a live session at an address; port 0 takes any that is free.
+    /// Starts a server of a live session at an address; port 0 selects any free port.
     ///
     /// # Errors
-    /// [`ServerError`] where the address cannot be listened at.
+    /// [`ServerError`] if the server cannot listen at the address.
     pub fn start(address: SocketAddr, access: Access, live: Arc<Live>) -> Result<Self, ServerError> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let listener = runtime.block_on(TcpListener::bind(address));
@@ -86,7 +86,7 @@ impl Server {
         Ok(Self { address, stop: Some(stop), thread: Some(thread) })
     }
 
-    /// The address that it listens at.
+    /// The address that the server listens at.
     pub fn address(&self) -> SocketAddr {
         self.address
     }

@@ -1,4 +1,4 @@
-//! The dashboard's files, as far as they were built.
+//! The dashboard's files, if they were built.
 
 use axum::http::{Method, StatusCode, Uri, header};
 use axum::response::{Html, IntoResponse, Response};
@@ -10,7 +10,7 @@ use rust_embed::RustEmbed;
 #[allow_missing = true]
 struct Dashboard;
 
-/// A file of the dashboard; without the dashboard a page that says how to get it.
+/// A file of the dashboard; if it was not built, a page with instructions to obtain it.
 pub async fn page(method: Method, uri: Uri) -> Response {
     let path = match uri.path() {
         "/" => "index.html",
@@ -19,13 +19,13 @@ pub async fn page(method: Method, uri: Uri) -> Response {
     let file = Dashboard::get(path);
     let is_there = file.is_some() || path == "index.html";
     if is_there && method != Method::GET && method != Method::HEAD {
-        let words = "a page can be got, and nothing else";
+        let words = "only pages can be got";
         return (StatusCode::METHOD_NOT_ALLOWED, [(header::ALLOW, "GET, HEAD")], words).into_response();
     }
     match file {
         Some(file) => ([(header::CONTENT_TYPE, content_type(path))], file.data).into_response(),
         None if path == "index.html" => Html(include_str!("without_dashboard.html")).into_response(),
-        None => (StatusCode::NOT_FOUND, "there is no such page").into_response(),
+        None => (StatusCode::NOT_FOUND, "this page does not exist").into_response(),
     }
 }
 

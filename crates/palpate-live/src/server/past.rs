@@ -4,15 +4,15 @@ use crate::event::{Event, EventRecord};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Seconds of samples that are kept.
+/// Seconds of stored samples.
 const KEPT_S: f64 = 600.0;
-/// Samples of a second that are kept.
+/// Stored samples a second.
 const PER_S: f64 = 10.0;
-/// Most samples: as many as fit into the time.
+/// Largest number of samples: as many as fit into the time.
 const MOST_SAMPLES: usize = (KEPT_S * PER_S) as usize;
-/// Most events; moves are not among them.
+/// Largest number of events; moves are not among them.
 const MOST_EVENTS: usize = 1000;
-/// Most bytes of the samples as text, which many channels reach first.
+/// Largest number of bytes of the samples as text, a limit that many channels reach first.
 const MOST_BYTES: usize = 16 << 20;
 
 /// Ten samples a second of the last ten minutes, and the last events, each as text of JSON.
@@ -29,7 +29,7 @@ impl Past {
         self.samples.back().is_none_or(|(last_s, _)| (time_s * PER_S).floor() > (last_s * PER_S).floor())
     }
 
-    /// Keeps a sample; the oldest ones give way.
+    /// Stores a sample, and removes the oldest ones beyond the limits.
     pub fn push_sample(&mut self, time_s: f64, text: &str) {
         self.sample_bytes += text.len();
         self.samples.push_back((time_s, Arc::from(text)));
@@ -43,7 +43,7 @@ impl Past {
         }
     }
 
-    /// Keeps an event; the oldest gives way.
+    /// Stores an event, and removes the oldest one beyond the limit.
     pub fn push_event(&mut self, event: &EventRecord) {
         if matches!(event.event, Event::Move { .. }) {
             return;
@@ -55,7 +55,7 @@ impl Past {
         }
     }
 
-    /// All of it as a record of JSON: `samples` and `events`, the oldest first.
+    /// All samples and events as a record of JSON: `samples` and `events`, the oldest first.
     pub fn to_json(&self) -> String {
         let mut json = String::with_capacity(self.sample_bytes + 64);
         json.push_str("{\"samples\":[");
@@ -100,7 +100,7 @@ mod tests {
             "{first_s} to {last_s}"
         );
         assert!((5400..=MOST_SAMPLES).contains(&past.samples.len()), "{}", past.samples.len());
-        // A board that is slower than that loses no sample.
+        // A slower board loses no sample.
         assert_eq!(filled(4.0, 100.0).samples.len(), 400);
     }
 

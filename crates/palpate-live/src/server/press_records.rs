@@ -6,7 +6,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 
-/// A press that was taken.
+/// A recorded press.
 #[derive(Clone, Debug, Serialize)]
 pub struct PressRecord {
     /// Number, from 1.
@@ -15,15 +15,15 @@ pub struct PressRecord {
     #[serde(skip_serializing_if = "Option::is_none")]
     y_mm: Option<f64>,
     force_n: Option<f64>,
-    /// Deviation from the others of its place and force, in %.
+    /// Deviation from the others at its place and force, in %.
     deviation_percent: Option<f64>,
-    /// Error of a locator that was fitted without its place.
+    /// Error of a locator that was fitted without the place of the press.
     held_out_mm: Option<f64>,
-    /// Seconds before it was taken, and the distance from the untouched reading in %.
+    /// Seconds before it was recorded, and the distance from the untouched reading in %.
     trace: Vec<(f64, f64)>,
 }
 
-/// Records of the presses among rows with their traces; errors are those of the last fit, a press each.
+/// Records of the presses among rows with their traces; `errors_m` contains the errors of the last fit, one per press.
 pub fn press_records(
     rows: &[Row],
     traces: &[Option<Trace>],
@@ -53,7 +53,7 @@ pub struct CheckRecord {
     places: Vec<CheckedPlaceRecord>,
     median_mm: f64,
     mean_mm: f64,
-    /// Places that the 95 % intervals cover.
+    /// Number of places that the 95 % intervals cover.
     covered: Option<usize>,
     placement_mm: Option<f64>,
 }
@@ -71,7 +71,7 @@ struct CheckedPlaceRecord {
 }
 
 impl CheckRecord {
-    /// The record of a check whose presses are in a file of this name.
+    /// The record of a check with its presses in a file of this name.
     pub fn new(presses: &str, check: &Check, placement_sd_m: Option<f64>, extent: Extent) -> Self {
         let places = check.places.iter().map(|place| {
             let (x_mm, y_mm) = place_mm(place.position, extent);

@@ -1,4 +1,4 @@
-//! The threads of a calibration that runs: readings to a person's presses, or to a machine's.
+//! The threads of a calibration in progress: readings for the presses of a person, or of a machine.
 
 use super::lock::locked;
 use super::machine::{Attendance, UNWATCHED};
@@ -13,12 +13,12 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// Longest wait between two looks at the machine and its stop.
+/// Longest time between two checks of the machine and of its stop.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Takes the arrivals of the source until a stop arrives.
+/// Processes the arrivals of the source until a stop arrives.
 pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
-    /// Longest wait for what is next.
+    /// Longest wait for an arrival.
     const LOOK: Duration = Duration::from_millis(100);
     loop {
         let arrived = match inputs.recv_timeout(LOOK) {
@@ -38,21 +38,21 @@ pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
 pub struct MachineRun {
     pub url: StageUrl,
     pub stage: Stage,
-    /// First tasks of a machine that is set up; `None` of one that presses.
+    /// First tasks of a machine that is set up; `None` for one that presses.
     pub set_up: Option<Vec<SetUpTask>>,
-    /// Setting it stops the machine at any time.
+    /// Setting this flag stops the machine at any time.
     pub stop: Arc<AtomicBool>,
     pub attendance: Arc<Attendance>,
     pub clock: HostClock,
 }
 
 impl MachineRun {
-    /// Has the machine work until all is done or it ends; what ended it early is the problem of `shared`.
+    /// Runs the machine until its work is done or it fails; a failure becomes the problem of `shared`.
     pub fn run(self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
         self.attendance.note();
         self.attendance.set_needed(true);
         let outcome = self.try_to_run(inputs, shared).map_err(|error| match error {
-            // Its thread may heed the stop first.
+            // The machine's thread may react to the stop first.
             MachineError::Stage(StageError::Stopped) if self.stop.load(Ordering::Relaxed) => {
                 MachineError::ByHand
             }

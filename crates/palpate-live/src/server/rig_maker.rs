@@ -1,4 +1,4 @@
-//! A first rig for a board whose surface has no model, made from what a person fills in.
+//! A first rig for a board, made from a user's form, for a surface without a model.
 
 use crate::calibration::{PlanError, Statements, Weights, plan};
 use crate::source::{SourceUrl, SourceUrlError};
@@ -9,55 +9,55 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Most characters of a file's name.
+/// Largest number of characters of a file name.
 const LONGEST_NAME: usize = 100;
 
-/// Most places of a calibration, and presses of a place, as in the rig's file.
+/// Largest number of places of a calibration, and of presses of a place, as in the rig's file.
 const MOST_COUNT: usize = 100_000;
 
-/// What a person fills in.
+/// Form that a user fills in.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RigForm {
-    /// Name of the rig's file, in the folder that the server was started in.
+    /// Name of the rig's file, in the folder in which the server was started.
     pub file: String,
-    /// Names of the channels, in the order in which the board sends them; an empty one is left out.
+    /// Names of the channels, in the order of the board's values; a channel with an empty name is left out.
     pub channels: Vec<String>,
     /// Length of the surface.
     pub length_mm: f64,
-    /// Width of a surface that is located in two directions.
+    /// Width of a surface with two directions.
     #[serde(default)]
     pub width_mm: Option<f64>,
-    /// Places to press: along the length and, of two directions, across it.
+    /// Numbers of places to press: along the length and, for two directions, across it.
     pub places: Vec<usize>,
-    /// Presses of each place.
+    /// Number of presses of each place.
     pub repeats: usize,
-    /// Force of every press; unknown where it is not said.
+    /// Force of every press; unknown if it is missing.
     #[serde(default)]
     pub force_n: Option<f64>,
-    /// Second force, with which every other place is pressed too.
+    /// Second force, with which every other place is also pressed.
     #[serde(default)]
     pub second_force_n: Option<f64>,
-    /// How far off the asked place a person presses, as a standard deviation.
+    /// Distance of the pressed place from the requested one, as a standard deviation.
     #[serde(default)]
     pub placement_mm: Option<f64>,
-    /// Place of each sensor, in the order of the channels: along the length and, of two directions, across it.
+    /// Place of each sensor, in the order of the channels: along the length and, for two directions, across it.
     #[serde(default)]
     pub sensor_places_mm: Option<Vec<Vec<f64>>>,
-    /// True where contacts in use press with this force too.
+    /// True if contacts in use have this force too.
     pub force_is_known: bool,
-    /// Replaces files that are there.
+    /// Replaces existing files.
     #[serde(default)]
     pub overwrite: bool,
-    /// Writes the file; without it the text alone is made.
+    /// Writes the file; without it only the text is made.
     #[serde(default)]
     pub write: bool,
 }
 
-/// A form that gives no rig.
+/// Error of a form that does not result in a rig.
 #[derive(Debug, thiserror::Error)]
 pub enum RigFormError {
-    /// A field that cannot be.
+    /// A field has an invalid value.
     #[error("{problem}")]
     Field {
         /// Name of the field in the form.
@@ -65,13 +65,13 @@ pub enum RigFormError {
         /// Problem and bound.
         problem: String,
     },
-    /// A name that is not a plain file name.
+    /// The name is not a plain file name.
     #[error("`{name}` cannot name a rig: use letters, digits, `-`, `_`, and `.toml` at the end")]
     Name {
         /// The name.
         name: String,
     },
-    /// Another number of channels than the board sends.
+    /// The number of channels differs from that of the board.
     #[error("{given} channels, and the board sends {sent} values")]
     Channels {
         /// Channels of the form.
@@ -79,7 +79,7 @@ pub enum RigFormError {
         /// Values of the board.
         sent: usize,
     },
-    /// The board names its values, and the form names another one.
+    /// The board names its values, and the form has another name.
     #[error("channel `{given}`: the board calls it `{sent}`")]
     Renamed {
         /// Name of the form.
@@ -87,7 +87,7 @@ pub enum RigFormError {
         /// Name of the board.
         sent: String,
     },
-    /// Another number of places than directions.
+    /// The number of entries for places differs from the number of directions.
     #[error("{given} numbers of places, and the surface has {directions} directions")]
     Places {
         /// Numbers of the form.
@@ -95,28 +95,28 @@ pub enum RigFormError {
         /// Directions of the surface.
         directions: usize,
     },
-    /// Values without names cannot be left out of this source.
+    /// This source cannot leave out values without names.
     #[error("the source {from} cannot leave unnamed values out")]
     LeftOut {
         /// The source.
         from: String,
     },
-    /// The rig has something that cannot be.
+    /// The rig has an invalid entry.
     #[error("{0}")]
     Rig(#[from] RigError),
-    /// There is nowhere to press.
+    /// The rig has no place to press.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// Names that the URL of the source cannot have.
+    /// The URL of the source cannot contain these names.
     #[error("{0}")]
     Columns(#[from] SourceUrlError),
-    /// A file is there already.
+    /// A file exists already.
     #[error("{path} is there already")]
     Exists {
         /// The file.
         path: String,
     },
-    /// Presses of an earlier calibration are there, which are not replaced.
+    /// The presses of an earlier calibration exist, and are not replaced.
     #[error("{path} has presses of an earlier calibration: choose another name for the rig")]
     Presses {
         /// The file.
@@ -133,7 +133,7 @@ pub enum RigFormError {
 }
 
 impl RigFormError {
-    /// Name of the field of the form that is to be corrected, where it is one.
+    /// Name of the form field that must be corrected, if the error is in one.
     pub fn field(&self) -> Option<&'static str> {
         match self {
             Self::Field { field, .. } => Some(field),
@@ -173,19 +173,19 @@ pub struct MadeRigRecord {
     pub file: String,
     /// Text.
     pub text: String,
-    /// The command that calibrates it later.
+    /// Command that calibrates the rig later.
     pub command: String,
-    /// True where it is on the disk.
+    /// True if the rig is on disk.
     pub written: bool,
     /// Files that would be replaced.
     pub exists: Vec<String>,
 }
 
 impl MadeRig {
-    /// The rig of a form, for a board that sends these values.
+    /// The rig of a form, for a board with these values.
     ///
     /// # Errors
-    /// [`RigFormError`] for a form that gives no rig.
+    /// [`RigFormError`] for a form that does not result in a rig.
     pub fn new(
         form: &RigForm,
         from: &SourceUrl,
@@ -222,7 +222,7 @@ impl MadeRig {
     /// Writes the rig's file.
     ///
     /// # Errors
-    /// [`RigFormError::Exists`] for a file that is there, unless it is to be replaced; [`RigFormError::Presses`], [`RigFormError::Write`].
+    /// [`RigFormError::Exists`] for an existing file, unless it may be replaced; [`RigFormError::Presses`], [`RigFormError::Write`].
     pub fn write(&mut self, overwrite: bool) -> Result<(), RigFormError> {
         let name = |path: &Path| path.display().to_string();
         if is_there(&self.presses) {
@@ -242,13 +242,13 @@ fn is_there(path: &Path) -> bool {
     path.symlink_metadata().is_ok()
 }
 
-/// The command that calibrates a rig later, from a source into these files.
+/// Command that later calibrates a rig, from a source into these files.
 fn command(form: &RigForm, from: &SourceUrl, [rig, presses, out]: [&str; 3]) -> String {
     let second = form.second_force_n.map_or(String::new(), |n| format!(" --second-force '{n} N'"));
     format!("palpate serve {rig} --calibrate --from '{from}' --presses {presses} --out {out}{second}")
 }
 
-/// Refuses numbers that no surface and no press has.
+/// Refuses numbers that are impossible for a surface or a press.
 fn check_numbers(form: &RigForm) -> Result<(), RigFormError> {
     let refuse = |field, problem| Err(RigFormError::Field { field, problem });
     let positive = [
@@ -288,7 +288,7 @@ fn check_numbers(form: &RigForm) -> Result<(), RigFormError> {
     if form.force_is_known && form.force_n.is_none() {
         return refuse(
             "force_n",
-            "contacts in use have the force of the presses, which is not said".to_owned(),
+            "contacts in use have the force of the presses, which is missing".to_owned(),
         );
     }
     check_sensor_places(form, &sides_mm)
@@ -326,7 +326,7 @@ fn checked_stem(name: &str) -> Result<&str, RigFormError> {
     stem.ok_or_else(|| RigFormError::Name { name: name.chars().take(LONGEST_NAME).collect() })
 }
 
-/// Channels of the form that are used; those of a board that names its values keep their names.
+/// Channels of the form that are used. If the board names its values, they keep these names.
 fn used_channels(form: &RigForm, sent: &[String], named: bool) -> Result<Vec<String>, RigFormError> {
     if form.channels.len() != sent.len() {
         return Err(RigFormError::Channels { given: form.channels.len(), sent: sent.len() });
@@ -338,7 +338,7 @@ fn used_channels(form: &RigForm, sent: &[String], named: bool) -> Result<Vec<Str
     Ok(pairs.map(|(given, _)| given.clone()).collect())
 }
 
-/// The source with names for its values, those that are left out among them.
+/// The source with names for its values, including those that are left out.
 fn with_columns(from: &SourceUrl, form: &RigForm) -> Result<SourceUrl, RigFormError> {
     let left_out = form.channels.iter().any(String::is_empty);
     let mut named = from.clone();
@@ -356,7 +356,7 @@ fn with_columns(from: &SourceUrl, form: &RigForm) -> Result<SourceUrl, RigFormEr
         _ if left_out => return Err(RigFormError::LeftOut { from: from.to_string() }),
         _ => {}
     }
-    // Names that the URL would take apart are refused.
+    // Names that the URL would split are refused.
     let text = named.to_string();
     let again: SourceUrl = text.parse()?;
     if again == named {
@@ -366,7 +366,7 @@ fn with_columns(from: &SourceUrl, form: &RigForm) -> Result<SourceUrl, RigFormEr
     Err(SourceUrlError::Parameter { text, problem }.into())
 }
 
-/// A place as the rig's file has it: a length, on a plane a list of two.
+/// A place in the notation of the rig's file: a length, or a list of two on a plane.
 fn point(place_mm: &[f64]) -> String {
     let lengths: Vec<String> =
         place_mm.iter().map(|at_mm| toml::Value::from(format!("{at_mm} mm")).to_string()).collect();
@@ -376,7 +376,7 @@ fn point(place_mm: &[f64]) -> String {
     }
 }
 
-/// Range of forces that contacts have by the presses alone, as the rig's file has it.
+/// Range of forces of contacts that follows from the presses alone, in the notation of the rig's file.
 fn pressed_range(form: &RigForm) -> Option<String> {
     let forces_n = form.force_n.into_iter().chain(form.second_force_n);
     let (least_n, greatest_n) = ForceRange::of_presses(forces_n)?.ends_n();
@@ -391,7 +391,7 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
     let names: Vec<String> = channels.iter().map(|name| quoted(name)).collect();
     let mut text = String::from("# Made on the dashboard's page for a board without a rig.\n\n[surface]\n");
     let mut line = |line: String| {
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(text, "{line}");
     };
     line("kind = \"measured\"  # no model: the influence functions come from the presses".to_owned());
@@ -399,7 +399,7 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
     if let Some(width_mm) = form.width_mm {
         line(format!("width = {}", mm(width_mm)));
     }
-    line("\n[sensors]\nmeasure = \"raw\"  # whatever the channels read: counts, volts".to_owned());
+    line("\n[sensors]\nmeasure = \"raw\"  # readings of the channels: counts, volts".to_owned());
     if let Some(places) = &form.sensor_places_mm {
         let used = places.iter().zip(&form.channels).filter(|(_, channel)| !channel.is_empty());
         let places: Vec<String> = used.map(|(place_mm, _)| point(place_mm)).collect();
@@ -507,9 +507,9 @@ mod tests {
         let placement_sd_m = made.rig.training.as_ref().unwrap().placement_sd_m;
         assert_eq!((placement_sd_m, made.statements.placement_sd_m), (Some(2e-3), Some(2e-3)));
         assert!(made.record.command.ends_with("--second-force '4 N'"), "{}", made.record.command);
-        // Every other of the 10 places is pressed with the second weight too.
+        // Every other place among the 10 is also pressed with the second weight.
         assert_eq!(plan(&made.rig, made.statements.weights(None), &[], &[]).unwrap().len(), 20 + 10);
-        // Forces in use are a decade either side of these, unless the comment is made a line.
+        // Forces in use extend a decade to either side of these, unless the comment in the text becomes a line.
         assert_eq!(made.rig.setup.force_range(), None);
         let stated =
             made.record.text.replace("# [contact]", "[contact]").replace("# force_range", "force_range");

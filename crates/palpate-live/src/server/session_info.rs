@@ -1,4 +1,4 @@
-//! Description of a session: what it locates with, on which surface, and how well that can be done.
+//! Description of a session: its locator, its surface, and the attainable accuracy.
 
 use super::calibration::Calibrator;
 use crate::frame::Channel;
@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 
 /// Longest time that the limit over the surface may take to compute, in seconds.
 const LIMIT_S: f64 = 5.0;
-/// Force of the limit where the setup knows none.
+/// Force of the limit if the setup has no known force.
 const FORCE_N: f64 = 1.0;
 
 /// Description of a session as a record of JSON.
@@ -23,7 +23,7 @@ const FORCE_N: f64 = 1.0;
 pub struct SessionInfo {
     version: &'static str,
     locator: Option<Value>,
-    /// Null where there is no rig.
+    /// Null without a rig.
     surface: Option<Value>,
     channels: Vec<Value>,
     force: Value,
@@ -33,14 +33,14 @@ pub struct SessionInfo {
     source: Option<String>,
     recording: Option<Value>,
     has_simulated: bool,
-    /// True where the server has a calibration, which `/api/calibration` tells.
+    /// True if the server has a calibration, which `/api/calibration` describes.
     calibrates: bool,
-    /// True where there is a board without a rig, which `/api/bring-up` shows.
+    /// True if there is a board without a rig, which `/api/bring-up` shows.
     brings_up: bool,
 }
 
 impl SessionInfo {
-    /// The description of sessions of a locator of this name.
+    /// The description of sessions with a locator of this name.
     pub fn new(locator: &Locator, name: &str, has_simulated: bool) -> Self {
         let description = description::locator(locator);
         Self {
@@ -55,10 +55,10 @@ impl SessionInfo {
         }
     }
 
-    /// The description of a bench that has no locator yet.
+    /// The description of a bench without a locator.
     pub fn of_setup(setup: &Setup) -> Self {
         let known_n = setup.force_n();
-        let why = "there is no locator yet: the calibration has not ended";
+        let why = "the locator does not exist yet: the calibration has not ended";
         Self {
             version: env!("CARGO_PKG_VERSION"),
             locator: None,
@@ -84,7 +84,7 @@ impl SessionInfo {
             surface: None,
             channels: Vec::new(),
             force: json!({ "known_n": null, "unknown": true }),
-            tare: json!({ "available": false, "follows": false, "why": "there is no rig yet" }),
+            tare: json!({ "available": false, "follows": false, "why": "the rig does not exist yet" }),
             limit: None,
             estimation: Estimation::default(),
             source: None,
@@ -95,27 +95,27 @@ impl SessionInfo {
         }
     }
 
-    /// The same, while a session of this source runs.
+    /// Sets the source of the session that runs.
     pub fn with_source(self, source: Option<String>) -> Self {
         Self { source, ..self }
     }
 
-    /// The same, of sessions that come to estimates in this way.
+    /// Sets the estimation method of the sessions.
     pub fn with_estimation(self, estimation: Estimation) -> Self {
         Self { estimation, ..self }
     }
 
-    /// The same, where there is a calibration.
+    /// Sets whether there is a calibration.
     pub fn with_calibration(self, calibrator: Option<&Calibrator>) -> Self {
         Self { calibrates: calibrator.is_some(), ..self }
     }
 
-    /// Says whether there is a board without a rig.
+    /// Sets whether there is a board without a rig.
     pub fn with_bring_up(self, brings_up: bool) -> Self {
         Self { brings_up, ..self }
     }
 
-    /// The same, where sessions are recorded in a folder: its name, and the state of the recording that goes on.
+    /// Sets the folder of recordings, and the state of the recording in progress; `None` if sessions are not recorded.
     pub fn with_recording(self, recording: Option<(String, Option<RecordingStatus>)>) -> Self {
         let recording = recording.map(|(folder, status)| match status {
             Some(RecordingStatus { name, bytes, seconds, problem, .. }) => {
@@ -172,7 +172,7 @@ fn channels(setup: &Setup) -> Vec<Value> {
         .collect()
 }
 
-/// The limit over the surface; `None` where there is none, or it takes too long.
+/// The limit over the surface; `None` if there is none, or the computation takes too long.
 fn limit(locator: &Locator) -> Option<Value> {
     let setup = locator.learnt_setup().ok()?;
     let extent = setup.surface().extent();
@@ -180,7 +180,7 @@ fn limit(locator: &Locator) -> Option<Value> {
         Some(linear) => linear.cramer_rao_bound(extent),
         None => {
             let cost = CramerRaoBound::cost(setup.surface().model()?, setup.layout(), 0);
-            // At least, since no search for contacts that read alike is made.
+            // This is a lower bound on the time, because no search for contacts with equal readings is made.
             if cost.seconds[0] > LIMIT_S {
                 return None;
             }

@@ -1,4 +1,4 @@
-//! A calibration that runs, between the thread that presses and the requests that look at it.
+//! A calibration in progress, shared by the thread that presses and the requests that read its state.
 
 use super::machine::MachineState;
 use crate::calibration::{Calibration, CalibrationError, Note, SetUpNote, SetUpTask, last_deviation_percent};
@@ -7,7 +7,7 @@ use crate::input::Arrived;
 use crate::stamp::HostClock;
 use std::collections::VecDeque;
 
-/// A calibration that runs, as its thread leaves it for others to see.
+/// State of a calibration in progress, for other threads to read.
 pub struct Shared {
     pub calibration: Calibration,
     /// Clock of the arrivals.
@@ -15,15 +15,15 @@ pub struct Shared {
     pub source: Option<String>,
     pub last_percent: Option<f64>,
     pub problem: Option<String>,
-    /// Why a press is asked for again, or what a step that takes long waits for.
+    /// Reason for requesting a press again, or what a long step waits for.
     pub hint: Option<String>,
     pub machine: MachineState,
-    /// Tasks of a machine that is set up, which its thread has not taken yet.
+    /// Tasks of a machine that is set up, which its thread has not started yet.
     pub tasks: VecDeque<SetUpTask>,
 }
 
 impl Shared {
-    /// Takes what the source brought; gives what follows from it.
+    /// Processes an arrival from the source; returns the resulting notes.
     pub fn receive(&mut self, arrived: &Arrived) -> Vec<Note> {
         let mut notes = Vec::new();
         let received = self.calibration.receive(arrived, &mut notes);
@@ -34,7 +34,7 @@ impl Shared {
         notes
     }
 
-    /// Looks at the source while nothing arrives; returns what follows from it.
+    /// Checks the source during a silence; returns the resulting notes.
     pub fn look(&mut self) -> Vec<Note> {
         let mut notes = Vec::new();
         self.calibration.check_feed(self.clock.now().elapsed, &mut notes);
@@ -71,7 +71,7 @@ impl Shared {
         }
     }
 
-    /// Takes what a task of the set-up brought.
+    /// Stores the result of a task of the set-up.
     pub fn take_set_up(&mut self, note: SetUpNote) {
         if let SetUpNote::Touch(z_m) = note {
             self.machine.touch_z_m = Some(z_m);
@@ -79,14 +79,14 @@ impl Shared {
         self.hint = Some(sentence(&note.to_string()));
     }
 
-    /// A press that is not on disk: the guide must not go on from it.
+    /// Stops after a press that is not on disk: the guide must not continue.
     fn fail(&mut self, error: &CalibrationError) {
         self.calibration.stop();
         self.problem = Some(error.to_string());
     }
 }
 
-/// Words as a sentence: with a capital letter and a full stop.
+/// Formats words as a sentence: with a capital letter and a full stop.
 fn sentence(words: &str) -> String {
     let mut letters = words.chars();
     let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();

@@ -17,14 +17,14 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::broadcast::{Receiver, error::RecvError};
 
-/// Most bytes of a message from a browser.
+/// Largest number of bytes of a message from a browser.
 const MOST_BYTES: usize = 4096;
-/// Most bytes that wait to be written to a browser, beside the message that is being written.
+/// Largest number of bytes that wait for a browser, in addition to the message that is being written.
 const MOST_WAITING: usize = 1 << 20;
-/// A browser that takes nothing for so long is let go.
+/// Time after which a browser that does not read is disconnected.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Query of a browser that follows the stream.
+/// Query of a browser that opens the stream.
 #[derive(Debug, Deserialize)]
 pub struct Wish {
     #[serde(default)]
@@ -93,10 +93,11 @@ async fn follow(mut socket: WebSocket, hub: &Hub, wish: &Wish, live: &Live) {
     }
 }
 
-/// Time between two pings to a page while a machine needs somebody who watches.
+/// Time between two pings to a page while a machine needs to be watched.
 const PING_EVERY: Duration = Duration::from_secs(1);
 
-/// Sends what comes, until the browser goes, sends too much, or takes nothing any more. A `page_of` a calibration is asked whether it is there while a machine presses.
+/// Sends messages until the browser disconnects, sends too much, or stops reading. If `page_of` is given, the page receives pings while a machine
+/// needs to be watched.
 async fn send_all<T: Clone>(
     socket: &mut WebSocket,
     mut messages: Receiver<T>,
@@ -119,9 +120,9 @@ async fn send_all<T: Clone>(
                 Err(RecvError::Lagged(count)) => missed += count,
                 Err(RecvError::Closed) => return,
             },
-            // Nothing that a browser sends means anything; pings are answered by the socket.
+            // Messages from a browser are ignored; the socket answers pings.
             received = socket.recv() => match received {
-                // The answer to it goes out with the next read, which is the last.
+                // The answer to a close message is sent with the next read, which is the last.
                 Some(Ok(Message::Close(_))) => {
                     let _ = tokio::time::timeout(PATIENCE, socket.recv()).await;
                     return;

@@ -1,4 +1,4 @@
-//! The sink that browsers read: each message is encoded once, and its bytes are shared by all of them.
+//! The sink that browsers read: each message is encoded once, and all browsers share its bytes.
 
 use super::connections::most_open;
 use super::lock::locked;
@@ -16,16 +16,16 @@ use serde::Serialize;
 use std::sync::{Arc, Mutex};
 use tokio::sync::{Semaphore, broadcast};
 
-/// Messages that wait for a browser at 60 Hz: about a second.
+/// Number of messages that wait for a browser at 60 Hz: about a second.
 const STATES: usize = 64;
-/// Messages that wait for a browser that takes every sample.
+/// Number of messages that wait for a browser that receives every sample.
 const BATCHES: usize = 512;
-/// Most samples of a message at 60 Hz.
+/// Largest number of samples of a message at 60 Hz.
 const MOST_SAMPLES: usize = 64;
-/// End of a message at 60 Hz of which none was missed.
+/// End of a message at 60 Hz without missed messages before it.
 const NONE_MISSED: &str = "\"missed\":0}";
 
-/// Meeting place of a session and its browsers.
+/// Connection between a session and its browsers.
 #[derive(Clone, Debug)]
 pub struct Hub {
     pub(super) states: broadcast::Sender<Utf8Bytes>,
@@ -49,7 +49,7 @@ impl Default for Hub {
 }
 
 impl Hub {
-    /// Leaves out the past of a session that has ended.
+    /// Removes the past of a session that has ended.
     pub(super) fn forget_past(&self) {
         *locked(&self.past) = Past::default();
     }
@@ -85,7 +85,7 @@ impl WebSink {
         Self { hub, channels: channels.to_vec(), extent, recent: Vec::new() }
     }
 
-    /// Keeps the samples and events of a batch for browsers that come later.
+    /// Stores the samples and events of a batch for browsers that connect later.
     fn keep(&self, batch: &Batch) {
         let mut past = locked(&self.hub.past);
         for output in &batch.outputs {
@@ -117,7 +117,7 @@ impl Sink for WebSink {
         if self.hub.json.receiver_count() > 0 {
             let samples = batch.samples().map(|sample| self.record(sample)).collect();
             if let Ok(text) = serde_json::to_string(&Batched { samples, events: batch.events().collect() }) {
-                // Nobody may be there any more.
+                // There may be no browser any more.
                 let _ = self.hub.json.send(text.into());
             }
         }
@@ -143,7 +143,7 @@ impl Sink for WebSink {
     }
 }
 
-/// At most so many, evenly, the last always.
+/// At most `MOST_SAMPLES` of these samples, evenly spaced, always with the last one.
 fn thinned<'a>(samples: &[&'a Sample]) -> Vec<&'a Sample> {
     let every = samples.len().div_ceil(MOST_SAMPLES).max(1);
     let mut thinned: Vec<&Sample> = samples.iter().rev().step_by(every).copied().collect();
@@ -151,7 +151,7 @@ fn thinned<'a>(samples: &[&'a Sample]) -> Vec<&'a Sample> {
     thinned
 }
 
-/// A message at 60 Hz for a browser that has missed some before it.
+/// A message at 60 Hz for a browser that has missed messages before it.
 pub fn with_missed(message: &Utf8Bytes, missed: u64) -> Utf8Bytes {
     match message.strip_suffix(NONE_MISSED) {
         Some(rest) if missed > 0 => format!("{rest}\"missed\":{missed}}}").into(),
@@ -166,7 +166,7 @@ const HEAD_BYTES: usize = 8;
 /// Bytes of a sample before its reading.
 const SAMPLE_BYTES: usize = 48;
 
-/// The samples of a batch as a packet, which docs/live-server.md describes; empty where there are none.
+/// The samples of a batch as a packet, described in docs/live-server.md; empty without samples.
 fn packet(batch: &Batch, channels: &[Channel]) -> Vec<u8> {
     let count = batch.samples().count();
     if count == 0 {
@@ -231,7 +231,7 @@ mod tests {
         let message = slow.try_recv().unwrap();
         let told: serde_json::Value = serde_json::from_str(&with_missed(&message, 136)).unwrap();
         assert_eq!((&told["missed"], &told["state"]["counters"]["readings"]), (&136.into(), &136.into()));
-        // Without any missed, its bytes are those of all others.
+        // Without missed messages, the bytes are shared with all others.
         assert_eq!(with_missed(&message, 0).as_ptr(), message.as_ptr());
     }
 }

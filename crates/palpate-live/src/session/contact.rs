@@ -1,4 +1,4 @@
-//! Touch-down, move, lift-off: what the estimates say in their course.
+//! Touch-down, move and lift-off events from a sequence of estimates.
 
 use super::touches;
 use crate::event::Event;
@@ -7,23 +7,23 @@ use palpate_estimators::estimate_record::ContactRecord;
 use palpate_mechanics::surface::Extent;
 use std::time::Duration;
 
-/// Readings in a row that it takes for a change: of noise one in a thousand is taken for a contact.
+/// Consecutive readings that count as a change: one noise reading in a thousand is mistaken for a contact.
 const IN_A_ROW: u32 = 2;
-/// The same for `outside_model`, which about three readings of a contact in a thousand are.
+/// Consecutive readings that count as a change to `outside_model`: about three readings of a contact in a thousand have this status.
 const DOUBTS_IN_A_ROW: u32 = 3;
-/// Shortest way that is a move, as a share of the length.
+/// Shortest distance that counts as a move, as a share of the length.
 const MOVE: f64 = 0.01;
-/// Least time between two moves that are told.
+/// Shortest time between two reported moves.
 const BETWEEN_MOVES: Duration = Duration::from_millis(50);
 
-/// Watch over the contact.
+/// Detector of contact events.
 #[derive(Debug)]
 pub struct ContactWatch {
     extent: Extent,
     state: State,
-    /// State that the last estimates have had, and how many in a row.
+    /// State of the last estimates, and the number of consecutive ones.
     recent: (State, u32),
-    /// When the touch began; `None` before its touch-down and after its lift-off.
+    /// Time of the touch-down; `None` before it and after the lift-off.
     since: Option<Duration>,
     told: (Position, Duration),
 }
@@ -37,7 +37,7 @@ enum State {
 }
 
 impl ContactWatch {
-    /// Watch over an untouched surface.
+    /// A detector for an untouched surface.
     pub fn new(extent: Extent) -> Self {
         Self {
             extent,
@@ -48,12 +48,12 @@ impl ContactWatch {
         }
     }
 
-    /// True while something touches.
+    /// True while the surface is touched.
     pub fn is_touched(&self) -> bool {
         self.state != State::Untouched
     }
 
-    /// Takes the next estimate.
+    /// Processes the next estimate.
     pub fn add(&mut self, now: Duration, estimate: &Estimate, mut tell: impl FnMut(Event)) {
         let next = match estimate.status {
             status if touches(status) => State::Touched { contacts: 1 + estimate.further.as_slice().len() },
@@ -73,7 +73,7 @@ impl ContactWatch {
         let before = std::mem::replace(&mut self.state, next);
         match next {
             State::Untouched => {
-                // What no contact explains has no touch-down, and no lift-off.
+                // A signal that no contact explains has neither a touch-down nor a lift-off.
                 if let Some(since) = self.since.take() {
                     tell(Event::LiftOff { seconds: now.saturating_sub(since).as_secs_f64() });
                 }

@@ -1,4 +1,4 @@
-//! How a session comes from tared readings to estimates.
+//! Estimation methods of a session, from tared readings to estimates.
 
 use super::follower::Follower;
 use super::low_pass::LowPass;
@@ -8,57 +8,57 @@ use palpate_mechanics::surface::modal::ModalBeam;
 use palpate_numerics::OutOfRange;
 use serde::{Deserialize, Serialize};
 
-/// How a session comes from tared readings to estimates.
+/// Estimation method of a session, from tared readings to estimates.
 ///
-/// Filtered readings are not followed: a tracker takes the noise of each reading for its own, and would be too sure.
+/// Filtered readings are not tracked: a tracker assumes independent noise in each reading, and its intervals would be too narrow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Estimation {
     /// Each reading is located by itself.
     #[default]
     Single,
-    /// Each reading is located by itself after a low-pass filter of the first order.
+    /// Each reading is located by itself, after a first-order low-pass filter.
     LowPass {
         /// Cut-off frequency in hertz: 1e-6 to 1e9.
         cutoff_hz: f64,
     },
-    /// Contacts are followed by a tracker.
+    /// A tracker follows the contacts.
     Track {
-        /// First natural frequency of a beam on two simple supports, in hertz, whose inertia is reckoned with at the usual damping; without it the surface
-        /// is in balance at every reading.
+        /// First natural frequency of a beam on two simple supports, in hertz. With it, the inertia of the beam is modelled at the usual damping;
+        /// without it, the surface is in balance at every reading.
         frequency_hz: Option<f64>,
-        /// Creep of the surface that is taken off; none by default.
+        /// Creep of the surface that is compensated; none by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         creep: Option<CreepConfig>,
     },
 }
 
-/// Creep of a soft surface under a load that is held.
+/// Creep of a soft surface under a constant load.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CreepConfig {
-    /// Growth of a reading that is held for long, as a share of that of a fresh press: 0 to 1.
+    /// Growth of a reading under a long constant load, as a share of the reading of a fresh press: 0 to 1.
     pub share: f64,
-    /// Time in which all but an e-th of it has come, in seconds: 0.001 to 1,000,000.
+    /// Time constant of the growth, in seconds: 0.001 to 1,000,000. After it, a share of 1/e of the growth is still to come.
     pub time_s: f64,
 }
 
-/// A session that cannot be had.
+/// Error of a session that cannot be created.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SessionError {
-    /// Contacts cannot be followed by this locator.
+    /// The tracker cannot use this locator.
     #[error(transparent)]
     NotTrackable(#[from] NotTrackable),
-    /// A frequency that is out of its range.
+    /// A frequency is out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
 }
 
 impl Estimation {
-    /// A follower where contacts are followed, as the session has one.
+    /// A tracker as the session uses it, if the method tracks contacts.
     ///
     /// # Errors
-    /// [`SessionError`] for a locator by which contacts cannot be followed, or a frequency out of its range.
+    /// [`SessionError`] for a locator that the tracker cannot use, or a frequency out of range.
     pub fn follower(&self, locator: &Locator) -> Result<Option<Follower>, SessionError> {
         let Self::Track { frequency_hz, creep } = self else { return Ok(None) };
         let range = "at least 0.000001 Hz and at most 1000000000 Hz";
@@ -80,7 +80,7 @@ impl Estimation {
     }
 }
 
-/// State of an estimation in the course of a session.
+/// State of an estimation during a session.
 pub(super) enum EstimationState {
     /// Each reading by itself.
     Single,
@@ -91,7 +91,7 @@ pub(super) enum EstimationState {
 }
 
 impl EstimationState {
-    /// The estimation at its start.
+    /// The estimation in its initial state.
     ///
     /// # Errors
     /// [`SessionError`].
@@ -102,15 +102,16 @@ impl EstimationState {
         Ok(estimation.follower(locator)?.map_or(Self::Single, |follower| Self::Track(Box::new(follower))))
     }
 
-    /// Forgets the readings from before a silence, or from another connection. A tracker's state goes on: time alone makes it uncertain.
+    /// Discards the readings from before a silence, or from another connection. The state of a tracker is kept: it becomes uncertain with time
+    /// anyway.
     pub fn interrupt(&mut self) {
         if let Self::LowPass(filter) = self {
             filter.reset();
         }
     }
 
-    /// The estimate after a reading that was taken at `unix_ns`, of which `single` is that of the tared reading by itself. `tared` is the reading that was
-    /// located afterwards. `None` for a filtered reading beyond numbers.
+    /// The estimate after a reading at time `unix_ns`. `single` is the estimate of the tared reading by itself. `tared` is replaced by the reading
+    /// that was located. `None` for a filtered reading that is not finite.
     pub fn estimate(
         &mut self,
         locator: &Locator,
@@ -122,7 +123,7 @@ impl EstimationState {
         match self {
             Self::Single => Some(single),
             Self::LowPass(filter) => {
-                // Readings are filtered as they come, and tared afterwards: the outcome is that of the other order, and a new baseline counts at once.
+                // Filtering before taring gives the same result as the other order, and a new baseline takes effect at once.
                 let filtered = filter.filter(unix_ns, reading);
                 for ((tared, value), filtered) in tared.iter_mut().zip(reading).zip(filtered) {
                     *tared = filtered + (*tared - value);

@@ -1,4 +1,4 @@
-//! Contacts followed from reading to reading by the tracker, as estimates.
+//! Estimates of contacts that the tracker follows from reading to reading.
 
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_estimators::estimator::{
@@ -7,23 +7,23 @@ use palpate_estimators::estimator::{
 use palpate_estimators::status::PLACE_LEFT_OPEN;
 use palpate_mechanics::surface::Extent;
 
-/// A tracker whose state is told as estimates.
+/// A tracker that reports its state as estimates.
 pub struct Follower {
     tracking: Tracking,
     config: TrackerConfig,
     tracker: Tracker,
     extent: Extent,
-    /// Time of the first reading, from which the tracker's seconds count: those since 1970 leave no digits for microseconds.
+    /// Time of the first reading, from which the tracker's seconds count: seconds since 1970 have too few digits for microseconds.
     first_ns: Option<u64>,
-    /// Difference of the last reading and the tared one.
+    /// Difference between the last reading and its tared reading.
     baseline: Vec<f64>,
 }
 
 impl Follower {
-    /// A follower that has seen nothing.
+    /// A follower in its initial state.
     ///
     /// # Errors
-    /// [`NotTrackable`] for a locator by which contacts cannot be followed, or a surface whose modes are not known.
+    /// [`NotTrackable`] for a locator that the tracker cannot use, or a surface with unknown modes.
     pub fn new(locator: &Locator, config: TrackerConfig) -> Result<Self, NotTrackable> {
         let tracking = locator.tracking(&config)?;
         Ok(Self {
@@ -36,16 +36,17 @@ impl Follower {
         })
     }
 
-    /// The estimate after the next reading and what the tare made of it, which was taken at `unix_ns` nanoseconds since 1970; `single` is that of the reading alone.
+    /// The estimate after the next reading. `tared` is its tared reading, `unix_ns` its time in nanoseconds since 1970, and `single` its estimate
+    /// by itself.
     ///
-    /// A reading that leaves the tracker's state without numbers, as one of 1e300 does, makes it begin anew, and its estimate is `single`; so is that of a
-    /// reading that is not later than the one before.
+    /// A reading of 1e300, for example, makes the tracker's state non-finite. The tracker then restarts, and the estimate is `single`. A reading
+    /// that is not later than the previous one also gives `single`.
     pub fn follow(&mut self, unix_ns: u64, reading: &[f64], tared: &[f64], single: Estimate) -> Estimate {
         let time_s = unix_ns.saturating_sub(*self.first_ns.get_or_insert(unix_ns)) as f64 * 1e-9;
         self.follow_baseline(reading, tared);
         let Ok(track) = self.tracker.follow(time_s, tared) else { return single };
         let estimate = self.estimate(&track, track.single);
-        // Weights of hypotheses that are no numbers leave no probability to anything, for good.
+        // Weights that are not finite leave no probability to any hypothesis, in all later steps too.
         let has_probability = (track.numbers.iter().sum::<f64>() - 1.0).abs() < 1e-6;
         if has_probability && estimate.is_in_numbers() {
             return estimate;
@@ -54,7 +55,7 @@ impl Follower {
         single
     }
 
-    /// Tells the tracker how far the tare's baseline has moved since the last reading.
+    /// Passes the change of the tare's baseline since the last reading to the tracker.
     fn follow_baseline(&mut self, reading: &[f64], tared: &[f64]) {
         let moved: Vec<f64> = reading.iter().zip(tared).map(|(reading, tared)| reading - tared).collect();
         if self.baseline.len() == moved.len() {
@@ -66,11 +67,11 @@ impl Follower {
         self.baseline = moved;
     }
 
-    /// The tracker's contacts, as many as are most probable, each in its place while it is followed.
+    /// The tracker's contacts, in the most probable number. Each keeps its place in the list while it is tracked.
     ///
-    /// - `no_contact`: most probably nothing touches.
-    /// - `outside_model`: the reading by itself is, unless the surface swings, which no single reading reckons with.
-    /// - `ambiguous`: the 95 % interval leaves the place open. Other places that were held possible are within the interval.
+    /// - `no_contact`: the most probable state is an untouched surface.
+    /// - `outside_model`: the reading by itself has this status, and the tracker has no model of swing. A single reading cannot account for swing.
+    /// - `ambiguous`: the 95 % interval leaves the place undetermined. Other possible places are within the interval.
     fn estimate(&self, track: &Track, single: Estimate) -> Estimate {
         let is_outside = single.status == Status::OutsideModel && self.config.swing.is_none();
         let mut contacts = track.contacts.iter().map(Tracked::estimate);
@@ -87,13 +88,13 @@ impl Follower {
         };
         let mut estimate = Estimate::of_contact(first, status);
         for further in contacts {
-            // The tracker follows two, and the list has room for both.
+            // The tracker has at most two contacts, and the list has room for both.
             estimate.further.push(further);
         }
         estimate
     }
 
-    /// True where the 95 % intervals have nearly all of every side of the surface.
+    /// True if the 95 % intervals cover nearly the full extent in every direction.
     fn leaves_place_open(&self, contact: &ContactEstimate) -> bool {
         let Some(uncertainty) = &contact.uncertainty else { return false };
         let is_open = |(low_m, high_m): (f64, f64), side_m: f64| high_m - low_m >= PLACE_LEFT_OPEN * side_m;

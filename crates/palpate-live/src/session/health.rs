@@ -4,25 +4,26 @@ use crate::event::{ChannelState, Event};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use serde::Serialize;
 
-/// Readings in a row of one and the same value after which a channel is dead, where others change.
+/// Consecutive equal readings after which a channel counts as dead, if other channels change.
 const DEAD: u32 = 100;
-/// Readings in a row at the end of its range after which a channel is saturated.
+/// Consecutive readings at the end of the range after which a channel is saturated.
 const SATURATED: u32 = 5;
 
 /// Health of a channel.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelHealth {
-    /// Name of its sensor.
+    /// Name of the sensor.
     pub name: String,
     /// State.
     pub state: ChannelState,
     /// Lowest and highest value so far, in its SI unit or raw.
     pub range: [f64; 2],
-    /// Standard deviation of the noise of a reading, from untouched readings that follow one another, in its SI unit or raw; 0 before there were two.
+    /// Standard deviation of the noise of a reading, from pairs of successive untouched readings, in its SI unit or raw; 0 before the first pair.
     pub noise_sd: f64,
 }
 
-/// True for an end of the range of a converter of 10 to 32 bits, with a sign or without: 2ⁿ − 1 or −2ⁿ. It is an end only as long as no channel reads beyond it.
+/// True for an end of the range of a converter of 10 to 32 bits, signed or unsigned: 2ⁿ − 1 or −2ⁿ. The value counts as an end only while no
+/// channel reads beyond it.
 fn is_converter_end(value: f64) -> bool {
     (9..=32).any(|bits| {
         let range = 2_f64.powi(bits);
@@ -30,27 +31,27 @@ fn is_converter_end(value: f64) -> bool {
     })
 }
 
-/// Watch over the health of channels.
+/// Monitor of the health of channels.
 #[derive(Debug)]
 pub struct HealthWatch {
     channels: Vec<ChannelHealth>,
-    /// Ends of the range of each, where they are known.
+    /// Ends of the range of each channel, where they are known.
     limits: Vec<Option<(f64, f64)>>,
-    /// True for a channel whose values are the numbers of a converter.
+    /// True for a channel with raw converter values.
     is_raw: Vec<bool>,
     /// Least and greatest value of all raw channels so far.
     raw_range: [f64; 2],
     last: Vec<f64>,
-    /// The reading before the last.
+    /// The second to last reading.
     before: Vec<f64>,
     same: Vec<u32>,
     at_end: Vec<u32>,
-    /// Pairs of readings that the noise was learnt from.
+    /// Number of pairs of readings that contributed to the noise.
     pairs: u64,
 }
 
 impl HealthWatch {
-    /// Watch over the channels of a layout.
+    /// A monitor of the channels of a layout.
     pub fn new(layout: &Layout) -> Self {
         let health = |name: &String| ChannelHealth {
             name: name.clone(),
@@ -77,8 +78,8 @@ impl HealthWatch {
         &self.channels
     }
 
-    /// Learns the noise from the last two readings, of which nothing touched: their difference has twice the variance of one. A mean over the last few
-    /// hundred.
+    /// Updates the noise from the last two readings, both untouched: their difference has twice the variance of one reading. The estimate is a mean
+    /// over the last few hundred pairs.
     pub fn learn_noise(&mut self) {
         self.pairs += 1;
         let weight = 1.0 / self.pairs.min(300) as f64;
@@ -89,7 +90,7 @@ impl HealthWatch {
         }
     }
 
-    /// Takes the next reading.
+    /// Processes the next reading.
     pub fn add(&mut self, reading: &[f64], mut tell: impl FnMut(Event)) {
         self.before.clone_from(&self.last);
         for (value, _) in reading.iter().zip(&self.is_raw).filter(|(_, is_raw)| **is_raw) {
@@ -130,7 +131,7 @@ impl HealthWatch {
 mod tests {
     use super::*;
 
-    /// States of the first of two raw channels after each reading.
+    /// Final state of the first of two raw channels after these readings.
     fn last_state(readings: impl IntoIterator<Item = [f64; 2]>) -> ChannelState {
         let mut watch = HealthWatch::new(&Layout::even(SensorKind::Raw, 2, 0.1));
         readings.into_iter().for_each(|reading| watch.add(&reading, |_| {}));

@@ -5,23 +5,23 @@ use std::f64::consts::TAU;
 
 /// Range of cut-off frequencies, in hertz.
 const RANGE_HZ: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
-/// The range in words.
+/// The range in text.
 const RANGE_IN_WORDS: &str = "at least 0.000001 Hz and at most 1000000000 Hz";
 
-/// A low-pass filter of the first order, as a resistor and a capacitor are one.
+/// A first-order low-pass filter, like a resistor and a capacitor.
 ///
-/// With τ = 1/(2π·f), f the cut-off frequency, T the time since the reading before and x the reading, the filtered reading is
-/// y ← x + (y − x)·exp(−T/τ): exact for readings that hold from one instant to the next, however far apart these are. Of
-/// independent noise of readings at a steady rate it leaves √(α/(2 − α)) of the standard deviation, α = 1 − exp(−T/τ).
+/// With τ = 1/(2π·f), f the cut-off frequency, T the time since the previous reading and x the reading, the filtered reading is
+/// y ← x + (y − x)·exp(−T/τ). This is exact for readings that stay constant between two instants, for any time between them.
+/// For independent noise of readings at a steady rate, the standard deviation is multiplied by √(α/(2 − α)), α = 1 − exp(−T/τ).
 #[derive(Clone, Debug)]
 pub struct LowPass {
     time_constant_s: f64,
-    /// The filtered reading, and the time of the last one in ns since 1970; `None` before there was one.
+    /// The filtered reading, and the time of the last reading in ns since 1970; `None` before the first.
     state: Option<(Vec<f64>, u64)>,
 }
 
 impl LowPass {
-    /// A filter that has seen nothing, of this cut-off frequency in hertz: 1e-6 to 1e9.
+    /// A filter in its initial state, with this cut-off frequency in hertz: 1e-6 to 1e9.
     ///
     /// # Errors
     /// [`OutOfRange`].
@@ -31,19 +31,19 @@ impl LowPass {
         Ok(Self { time_constant_s: 1.0 / (TAU * cutoff_hz), state: None })
     }
 
-    /// Forgets all readings: the next one passes as it is.
+    /// Discards all readings: the next one passes unchanged.
     pub fn reset(&mut self) {
         self.state = None;
     }
 
-    /// The filtered reading after the next one, taken at `unix_ns` nanoseconds since 1970, later than the one before; finite values in the order of the
-    /// channels.
+    /// The filtered reading after the next one. The values of `reading` are finite, in the order of the channels. The time `unix_ns` is in
+    /// nanoseconds since 1970, and later than that of the previous reading.
     pub fn filter(&mut self, unix_ns: u64, reading: &[f64]) -> &[f64] {
         let (filtered, last_ns) = self.state.get_or_insert_with(|| (reading.to_vec(), unix_ns));
         let step_s = unix_ns.saturating_sub(*last_ns) as f64 * 1e-9;
         let kept = (-step_s / self.time_constant_s).exp();
         for (filtered, value) in filtered.iter_mut().zip(reading) {
-            // Shares of both, as the difference of immense values may be infinite.
+            // The sum is weighted, because the difference of very large values may be infinite.
             *filtered = kept * *filtered + (1.0 - kept) * value;
         }
         *last_ns = unix_ns;

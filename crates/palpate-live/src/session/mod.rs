@@ -1,4 +1,4 @@
-//! A session: bytes and instants in; readings, estimates and events out.
+//! A session: bytes with instants in; readings, estimates and events out.
 
 mod contact;
 mod estimation;
@@ -34,17 +34,17 @@ use timeline::{GapKind, Timeline};
 pub struct SessionConfig {
     /// Treatment of offsets that have moved since calibration.
     pub tare: TareMode,
-    /// How it comes from tared readings to estimates.
+    /// Estimation method, from tared readings to estimates.
     pub estimation: Estimation,
 }
 
 /// Treatment of offsets that have moved since calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TareMode {
-    /// The baseline is found, and followed while the surface is untouched, where the locator tells untouched readings.
+    /// The baseline is estimated, and followed while the surface is untouched, if the locator can detect untouched readings.
     #[default]
     Auto,
-    /// The baseline stays, until somebody tares.
+    /// The baseline stays until the user tares.
     Manual,
 }
 
@@ -57,14 +57,14 @@ pub enum Output {
     Event(EventRecord),
 }
 
-/// Numbers of what arrived.
+/// Numbers of arrived readings and frames.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counters {
     /// Readings that were located.
     pub readings: u64,
-    /// Frames that were no reading, by cause.
+    /// Frames that contained no valid reading, by cause.
     pub bad_frames: BTreeMap<BadFrame, u64>,
-    /// Frames that the board sent and nobody got, where it counts them.
+    /// Frames that the board sent but that did not arrive, if the board numbers its frames.
     pub lost_frames: u64,
     /// Stretches without readings.
     pub gaps: u64,
@@ -91,10 +91,10 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// A session that has seen nothing.
+    /// A session in its initial state.
     ///
     /// # Errors
-    /// [`SessionError`] for a locator by which contacts cannot be followed, where they are to be, or a frequency out of its range.
+    /// [`SessionError`] for a locator that the tracker cannot use, if the session tracks, or a frequency out of range.
     pub fn new(locator: &'a Locator, config: &SessionConfig) -> Result<Self, SessionError> {
         let channels = Channel::all_of(&locator.setup);
         let extent = locator.setup.surface().extent();
@@ -116,8 +116,7 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// Names the values of frames that have no names: every channel, time (`t`, `ms`, `us`), number of the frame (`n`), and others, which are left
-    /// out.
+    /// Sets the columns of frames without names: every channel, time (`t`, `ms`, `us`), number of the frame (`n`), and others, which are ignored.
     ///
     /// # Errors
     /// [`ColumnsError`] unless every channel is named once.
@@ -125,12 +124,12 @@ impl<'a> Session<'a> {
         self.frames.set_columns(columns)
     }
 
-    /// Channels of its frames.
+    /// Channels of the frames.
     pub fn channels(&self) -> &[Channel] {
         &self.channels
     }
 
-    /// Numbers of what arrived.
+    /// Numbers of arrived readings and frames.
     pub fn counters(&self) -> Counters {
         Counters {
             readings: self.frames.readings(),
@@ -140,7 +139,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Reader of its frames.
+    /// Reader of the frames.
     pub fn frames(&self) -> &FrameReader {
         &self.frames
     }
@@ -150,12 +149,12 @@ impl<'a> Session<'a> {
         self.health.channels()
     }
 
-    /// Readings a second, over the last second that had some.
+    /// Readings a second, over the last second with readings.
     pub fn rate_hz(&self) -> f64 {
         self.timeline.rate_hz()
     }
 
-    /// Takes what a source brought.
+    /// Processes an arrival from a source.
     pub fn receive(&mut self, arrived: &Arrived, out: &mut Vec<Output>) {
         let at = arrived.at;
         if let Some(by_s) = self.timeline.look_at_clock(at) {
@@ -180,7 +179,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Does what a user wishes.
+    /// Executes a user's command.
     pub fn command(&mut self, at: Stamp, command: Command, out: &mut Vec<Output>) {
         match command {
             Command::Tare => self.taring.begin(),
@@ -190,7 +189,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// A reading's way: time, health, tare, filter or none, estimate, events. `behind` more readings have arrived with it.
+    /// Processes a reading: time, health, tare, optional filter, estimate, events. `behind` more readings have arrived with it.
     fn take(&mut self, at: Stamp, frame: Frame, behind: usize, out: &mut Vec<Output>) {
         let at = self.timeline.board_stamp(at, frame.device_time);
         let (unix_ns, gap) = self.timeline.next(at, &frame, behind);
@@ -207,7 +206,7 @@ impl<'a> Session<'a> {
         let is_repeat = self.watch_repeats(time_s, &frame.reading, out);
         let mut tared = frame.reading.clone();
         self.taring.note_time(time_s);
-        // The baseline follows single readings, whatever becomes of them afterwards: a filtered reading would be late to show a contact.
+        // The baseline follows unfiltered readings in every estimation method, because a filtered reading would show a contact late.
         let single = if is_repeat {
             let single = self.taring.locate_repeat(self.locator, &frame.reading, &mut tared);
             single.map(|single| (single, false))
@@ -220,7 +219,7 @@ impl<'a> Session<'a> {
             Some((estimate, tares, single.status == Status::NoContact))
         });
         let Some((estimate, tares, is_untouched)) = located else {
-            // Immense values whose difference is no number.
+            // Very large values have a difference that is not finite.
             self.frames.refuse(BadFrame::NotANumber);
             return;
         };
@@ -246,7 +245,7 @@ impl<'a> Session<'a> {
         })));
     }
 
-    /// True for a reading that a board repeats because it sends faster than it measures; says so once.
+    /// True for a reading that a board repeats because it sends faster than it measures. The first detection adds an event.
     fn watch_repeats(&mut self, time_s: f64, reading: &[f64], out: &mut Vec<Output>) -> bool {
         let before = self.repeats.is_sample_and_hold();
         let is_repeat = self.repeats.add(reading, self.was_untouched);
@@ -262,7 +261,7 @@ impl<'a> Session<'a> {
         out.push(Output::Event(EventRecord { time_s, event }));
     }
 
-    /// True while something touches, by the last readings.
+    /// True while the last readings show a touch.
     pub fn is_touched(&self) -> bool {
         self.contact.is_touched()
     }
@@ -273,7 +272,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// True for the status of an estimate that says where something touches.
+/// True for a status with the place of a contact.
 fn touches(status: Status) -> bool {
     matches!(status, Status::Located | Status::Ambiguous)
 }

@@ -1,18 +1,18 @@
-//! The baseline of a session, and estimates by it.
+//! The baseline of a session, and estimates relative to it.
 
 use super::{Estimation, TareMode};
 use palpate_core::Estimate;
 use palpate_core::Tare;
 use palpate_estimators::estimator::Locator;
 
-/// Time and number of the readings that make a baseline when a user tares, at least.
+/// Least time, and least number of readings, for a baseline that the user requests.
 const BASELINE_S: f64 = Tare::<[f64; 0]>::MOMENT_S;
 const BASELINE_READINGS: u32 = Tare::<[f64; 0]>::SETTLED;
 
 /// The baseline of a session.
 #[derive(Debug)]
 pub struct Taring {
-    /// The tare; `None` where the locator has not learnt what its channels read untouched.
+    /// The tare; `None` if the locator does not contain the untouched reading of its channels.
     tare: Option<Tare<Vec<f64>>>,
     follows: bool,
     /// Time of the next reading, in seconds.
@@ -20,21 +20,21 @@ pub struct Taring {
     taken: Option<Taken>,
 }
 
-/// A baseline that is being taken.
+/// A baseline in progress.
 #[derive(Debug)]
 struct Taken {
     tare: Tare<Vec<f64>>,
-    /// Time of its first reading, in seconds.
+    /// Time of the first reading, in seconds.
     since_s: Option<f64>,
     readings: u32,
 }
 
 impl Taring {
-    /// The tare of a session that begins.
+    /// The tare of a new session.
     pub fn new(locator: &Locator, mode: TareMode, estimation: &Estimation) -> Self {
         let follows = mode == TareMode::Auto && locator.false_alarm_rate().is_some();
         let tare = locator.tare().ok().map(|tare| match estimation {
-            // The tracker takes creep off.
+            // The tracker compensates creep.
             Estimation::Track { creep: Some(_), .. } => tare.without_rests(),
             _ => tare,
         });
@@ -49,14 +49,14 @@ impl Taring {
         }
     }
 
-    /// Begins to take a baseline.
+    /// Begins a new baseline.
     pub fn begin(&mut self) {
         let taken = |tare: &Tare<Vec<f64>>| Taken { tare: tare.restarted(), since_s: None, readings: 0 };
         self.taken = self.tare.as_ref().map(taken);
     }
 
-    /// The estimate of a reading, and whether a baseline is complete with it; `tared` holds the tared reading afterwards. `None` for a reading
-    /// beyond numbers.
+    /// The estimate of a reading, and whether the reading completes a baseline; `tared` contains the tared reading afterwards. `None` for a reading
+    /// that is not finite.
     pub fn locate(
         &mut self,
         locator: &Locator,
@@ -72,7 +72,7 @@ impl Taring {
         Some((locator.locate(tared).ok()?, tares))
     }
 
-    /// The estimate of a repeat of the reading before, which changes no baseline.
+    /// The estimate of a reading that repeats the previous one; the baseline stays unchanged.
     pub fn locate_repeat(&self, locator: &Locator, reading: &[f64], tared: &mut [f64]) -> Option<Estimate> {
         match &self.tare {
             Some(tare) => {
@@ -83,7 +83,7 @@ impl Taring {
         }
     }
 
-    /// Adds a reading to a baseline that is being taken; true when that is complete, and the one that holds.
+    /// Adds a reading to the baseline in progress. True if this completes it; it then replaces the present baseline.
     fn take(&mut self, reading: &[f64]) -> bool {
         let Some(Taken { tare, since_s, readings }) = &mut self.taken else { return false };
         if tare.add_untouched(reading).is_err() {

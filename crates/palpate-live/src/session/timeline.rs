@@ -1,4 +1,4 @@
-//! Times of readings, and stretches without any.
+//! Times of readings, and gaps.
 
 use crate::device_clock::{self, DeviceClock};
 use crate::frame::Frame;
@@ -8,44 +8,44 @@ use std::time::Duration;
 /// Times of the readings of a session.
 #[derive(Debug, Default)]
 pub struct Timeline {
-    /// Wall clock at the start, less the monotonic one, in ns: later times are reckoned from it, so that they never go back.
+    /// Wall clock at the start, less the monotonic clock, in ns. Later times are relative to it, so that they never go back.
     base_ns: Option<i128>,
-    /// The same by the last look.
+    /// Wall clock less the monotonic clock at the last call of `look_at_clock`, in ns.
     seen_ns: i128,
     last_ns: u64,
-    /// When the last reading was taken, as far as is known.
+    /// Time at which the last reading was taken, if it is known.
     last_taken: Option<Duration>,
     last_arrival: Option<Duration>,
     last_sequence: Option<u32>,
     device_clock: DeviceClock,
-    /// Clock of the board of a stream whose pace says nothing; `None` for other streams.
+    /// Clock of the board, for a stream with an arbitrary pace; `None` for other streams.
     board: Option<BoardPace>,
-    /// Arrival from which a second is counted, and readings since.
+    /// Arrival at which the present second began, and the number of readings since.
     second: Option<(Duration, u32)>,
     rate_hz: f64,
 }
 
-/// A stretch without readings.
+/// Gap: a time without readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gap {
     /// Length in seconds.
     pub seconds: f64,
-    /// Frames that the board sent in it, where it counts them.
+    /// Frames that the board sent in it, if it numbers its frames.
     pub lost_frames: Option<u32>,
-    /// Kind of the stretch.
+    /// Kind of the gap.
     pub kind: GapKind,
 }
 
-/// Kind of a stretch without readings.
+/// Kind of a gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GapKind {
-    /// Frames of a stream that went on were lost.
+    /// Frames of a continuing stream were lost.
     LostFrames,
-    /// Nothing came for longer than [`GAP_S`] and [`GAP_PERIODS`].
+    /// No reading for longer than [`GAP_S`] and [`GAP_PERIODS`].
     Silence,
 }
 
-/// A wall clock that is off by more was set, in ns: it is slewed by less.
+/// A larger change of the wall clock, in ns, means that the clock was set; slewing changes it by less.
 const SET_NS: i128 = 500_000_000;
 /// Shortest silence that is a gap, in seconds, and its length in periods of the readings.
 const GAP_S: f64 = 0.5;
@@ -58,7 +58,7 @@ impl Timeline {
         u64::try_from(base_ns + at.elapsed.as_nanos() as i128).unwrap_or(0)
     }
 
-    /// Seconds by which the wall clock was set since the last look, where it was.
+    /// Seconds by which the wall clock was set since the last call; `None` if it was not set.
     pub fn look_at_clock(&mut self, at: Stamp) -> Option<f64> {
         let offset_ns = offset_ns(at);
         if self.base_ns.is_none() {
@@ -70,12 +70,13 @@ impl Timeline {
         (by_ns.abs() > SET_NS).then_some(by_ns as f64 * 1e-9)
     }
 
-    /// Takes times from the board's clock from now on, where it tells them: the stream comes at any pace.
+    /// Uses the time of the board's clock from now on, if frames contain it: the stream may have any pace.
     pub fn follow_board(&mut self) {
         self.board = Some(BoardPace::default());
     }
 
-    /// The instant of a reading with such a time by the board's clock: that of its arrival, but for a stream whose pace says nothing.
+    /// The instant of a reading with this time of the board's clock. It is the arrival, or follows from the board's clock for a stream with an
+    /// arbitrary pace.
     pub fn board_stamp(&mut self, at: Stamp, device_time: Option<Duration>) -> Stamp {
         match (&mut self.board, device_time) {
             (Some(board), Some(device)) => {
@@ -88,11 +89,12 @@ impl Timeline {
         }
     }
 
-    /// Time of the next reading in ns since 1970, later than that of the one before it, and the gap before it; `behind` more frames have arrived with it.
+    /// Time of the next reading in ns since 1970, later than that of the previous one, and the gap before it; `behind` more frames have arrived
+    /// with it.
     pub fn next(&mut self, at: Stamp, frame: &Frame, behind: usize) -> (u64, Option<Gap>) {
         let gap = self.gap(at.elapsed, frame.sequence);
         if gap.is_some_and(|gap| gap.kind == GapKind::Silence) {
-            // A rate over a silence is none.
+            // A silence interrupts the measurement of the rate.
             self.second = None;
         }
         let taken = match frame.device_time {
@@ -108,8 +110,8 @@ impl Timeline {
         (self.last_ns, gap)
     }
 
-    /// Time between frames that arrived together and tell no time, this one and `behind` more, as through USB: evenly over the time since the last reading,
-    /// but no further apart than is usual.
+    /// Time between frames without time stamps that arrived together, as through USB: this one and `behind` more. They are distributed evenly over
+    /// the time since the last reading, but no further apart than usual.
     fn period(&self, at: Duration, behind: usize) -> Duration {
         let since = self.last_taken.map_or(Duration::ZERO, |last| at.saturating_sub(last));
         let even = since.div_f64(behind as f64 + 1.0);
@@ -123,7 +125,7 @@ impl Timeline {
 
     fn gap(&self, now: Duration, sequence: Option<u32>) -> Option<Gap> {
         let seconds = now.saturating_sub(self.last_arrival?).as_secs_f64();
-        // A number that goes back is that of a board that has begun anew.
+        // A number that decreases comes from a board that has restarted.
         let lost_frames = self
             .last_sequence
             .zip(sequence)
@@ -140,14 +142,14 @@ impl Timeline {
         })
     }
 
-    /// Readings a second since the second that is counted began: infinite where all of several came at once, and 0 of one.
+    /// Readings a second since the present second began: infinite if several arrived at one instant, and 0 for one reading.
     fn rate_so_far_hz(&self) -> f64 {
         let Some(((start, count), last)) = self.second.zip(self.last_arrival) else { return 0.0 };
         if count == 0 { 0.0 } else { f64::from(count) / last.saturating_sub(start).as_secs_f64() }
     }
 
     fn count(&mut self, now: Duration) {
-        // The first reading begins a second, and is not in it.
+        // The first reading begins a second, and is not counted in it.
         let Some((start, count)) = &mut self.second else {
             self.second = Some((now, 0));
             return;
@@ -161,10 +163,10 @@ impl Timeline {
     }
 }
 
-/// Clock of the board of a stream that comes at any pace: the first reading has the time of its arrival, and further ones are reckoned from it.
+/// Clock of the board of a stream with an arbitrary pace. The first reading has the time of its arrival, and later ones are relative to it.
 #[derive(Debug, Default)]
 struct BoardPace {
-    /// Time by the board's clock and instant of the last reading.
+    /// Board time and instant of the last reading.
     last: Option<(Duration, Duration)>,
 }
 
@@ -172,7 +174,7 @@ impl BoardPace {
     fn elapsed(&mut self, device: Duration, arrival: Duration) -> Duration {
         let elapsed = match self.last {
             None => arrival,
-            // A clock that goes back was set, as by a reset, or has wrapped around.
+            // A clock that goes back was set, for example by a reset, or has wrapped around.
             Some((last_device, last)) => last + device_clock::step(last_device, device).unwrap_or_default(),
         };
         self.last = Some((device, elapsed));
@@ -196,7 +198,7 @@ mod tests {
         timeline.next(at, &Frame { reading: vec![], sequence: Some(sequence), device_time }, 0)
     }
 
-    /// The times, in ms after the start, of frames without a time that arrive in bursts: (ms of the arrival, frames in it).
+    /// The times, in ms after the start, of frames without time stamps that arrive in bursts: (ms of the arrival, number of frames).
     fn burst_times_ms(bursts: impl IntoIterator<Item = (u64, usize)>) -> Vec<f64> {
         let mut timeline = Timeline::default();
         let mut times_ms = Vec::new();
@@ -222,7 +224,7 @@ mod tests {
         for (i, time_ms) in times_ms[4..1596].iter().enumerate() {
             assert!((time_ms - (8.0 + 2.0 * (i + 1) as f64)).abs() < 0.1, "{i}: {time_ms}");
         }
-        // After a silence they are as far apart as is usual, not spread over it.
+        // After a silence they have the usual distance, and are not distributed over the silence.
         for (last, expected_ms) in times_ms[1596..].iter().zip([9994.0, 9996.0, 9998.0, 10_000.0]) {
             assert!((last - expected_ms).abs() < 0.1, "{last}");
         }
@@ -232,7 +234,7 @@ mod tests {
     fn times_are_those_of_the_board() {
         let mut timeline = Timeline::default();
         let start_ns = next(&mut timeline, 1000, 0, 50).0;
-        // Late by 7 ms, then at its time, then late again: of the lateness a tenth is left at most, by the drift that the clock may have.
+        // Late by 7 ms, then on time, then late again: at most a tenth of the delay remains, because the clock may drift.
         for (arrived_ms, number) in [(1017, 1), (1020, 2), (1037, 3)] {
             let device_ms = 50 + 10 * number;
             let at_ns = next(&mut timeline, arrived_ms, number as u32, device_ms).0;
@@ -255,12 +257,12 @@ mod tests {
 
     #[test]
     fn silences_are_gaps_from_the_second_reading_on() {
-        // The first reading comes 7 s after the start, which is no gap.
+        // The first reading arrives 7 s after the start, which does not count as a gap.
         assert_eq!(gaps_s([7000, 7010, 7910]), [0.9]);
         assert_eq!(gaps_s((0..59).map(|i| 7000 + 10 * i).chain([9000, 9010, 9020])), [1.42]);
-        // A silence does not lower the rate by which the next one is found.
+        // A silence does not lower the rate that detects the next silence.
         assert_eq!(gaps_s((0..300).map(|i| 10 * i).chain([12_990, 13_000, 13_600])), [10.0, 0.6]);
-        // A board of a reading each 2 s, and one that sends many at once.
+        // A board with a reading every 2 s, and one that sends many at once.
         assert!(gaps_s((0..20).map(|i| 2000 * i)).is_empty());
         assert!(gaps_s([100, 100, 100, 500]).is_empty());
     }
@@ -271,7 +273,7 @@ mod tests {
         timeline.follow_board();
         let at = Stamp { elapsed: Duration::from_secs(5), unix_ns: 1_800_000_000_000_000_000 };
         let mut times_ns = Vec::new();
-        // Around the end of microseconds of 32 bits, and with a reset.
+        // Around the overflow of 32-bit microseconds, and with a reset.
         let wrap_us = 1_u64 << 32;
         for device_us in [wrap_us - 2000, wrap_us - 1000, 0, 1000, 701_000, 0, 1000] {
             let device_time = Some(Duration::from_micros(device_us));

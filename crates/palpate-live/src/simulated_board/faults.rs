@@ -1,4 +1,4 @@
-//! Faults of a simulated board: the configuration of all of them, and frames that are lost or torn.
+//! Faults of a simulated board: their configuration, and the loss and tearing of frames.
 
 use palpate_estimators::imperfections::Imperfections;
 use palpate_estimators::setup::Setup;
@@ -6,21 +6,21 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::Range;
 
-/// Configuration of a simulated board's faults; none by default.
+/// Configuration of the faults of a simulated board; without faults by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FaultConfig {
-    /// Share of frames that are left out, 0 to 1.
+    /// Share of frames that are dropped, 0 to 1.
     pub dropped: f64,
-    /// Share of frames of which a part is missing, 0 to 1.
+    /// Share of frames with a missing part, 0 to 1.
     pub torn: f64,
-    /// Step of the channels' converters, in their SI unit or raw, in the place of the resolution of the sensors.
+    /// Step of the channels' converters, in their SI unit or raw; replaces the resolution of the sensors.
     pub converter_step: Option<f64>,
-    /// Imperfections of the bench. Their schedule has no meaning for a board, which sends all the time.
+    /// Imperfections of the bench. Their schedule is not used, because a board sends all the time.
     pub imperfections: Imperfections,
 }
 
 impl FaultConfig {
-    /// Imperfections of a setup, and no faults of the way from the board.
+    /// Imperfections of a setup, without faults of the transmission.
     pub fn of_setup(setup: &Setup) -> Self {
         let imperfections = setup.imperfections().copied().unwrap_or_default();
         Self { imperfections, ..Self::default() }
@@ -30,32 +30,32 @@ impl FaultConfig {
 /// Fate of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fate {
-    /// It is sent as it is.
+    /// The frame is sent whole.
     Whole,
-    /// A part of its bytes is missing.
+    /// A part of the bytes of the frame is missing.
     Torn {
-        /// Those bytes.
+        /// Range of the missing bytes.
         lost: Range<usize>,
     },
-    /// It is not sent.
+    /// The frame is not sent.
     Dropped,
 }
 
-/// Faults of the way from the board.
+/// Faults of the transmission from the board.
 pub struct Faults {
-    /// Their configuration.
+    /// Configuration of the faults.
     pub config: FaultConfig,
     rng: Xoshiro256PlusPlus,
 }
 
 impl Faults {
-    /// Faults of this configuration, drawn by a seed.
+    /// Faults of this configuration, drawn with a seed.
     pub fn new(config: FaultConfig, seed: u64) -> Self {
-        // A stream of its own, beside those of the noise and the finger.
+        // This random stream is independent of those of the noise and the finger.
         Self { config, rng: Xoshiro256PlusPlus::seed_from_u64(seed ^ 0xFA_0175) }
     }
 
-    /// The fate of a frame of so many bytes.
+    /// Draws the fate of a frame of `length` bytes.
     pub fn next(&mut self, length: usize) -> Fate {
         let FaultConfig { dropped, torn, .. } = self.config;
         if dropped <= 0.0 && torn <= 0.0 {
@@ -65,7 +65,7 @@ impl Faults {
         if drawn < dropped {
             Fate::Dropped
         } else if drawn < dropped + torn && length > 1 {
-            // At least one byte stays, and one is lost.
+            // At least one byte stays, and at least one is lost.
             let start = self.rng.random_range(0..length);
             let most = if start == 0 { length - 1 } else { length - start };
             Fate::Torn { lost: start..start + self.rng.random_range(1..=most) }

@@ -1,4 +1,4 @@
-//! The finger that touches a simulated board: at random, by a script, or where a stage has it.
+//! The finger that touches a simulated board: at random, by a script, or under the control of a stage.
 
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
@@ -15,18 +15,18 @@ pub struct Finger {
     typical_n: f64,
     touch: Touch,
     script: Option<Vec<Waypoint>>,
-    /// Held by a stage: on the surface, or lifted.
+    /// Contact set by a stage, or lifted; `None` without control by a stage.
     held: Option<Option<Contact>>,
 }
 
-/// Waypoint of a script: a time, and the contact then; lifted without one.
+/// Waypoint of a script: a time, and the contact then; lifted without a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Waypoint {
     time_s: f64,
     contact: Option<Contact>,
 }
 
-/// A line of a script that cannot be followed.
+/// An invalid line of a script.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("line {line} of the script, `{text}`: {problem}")]
 pub struct ScriptError {
@@ -38,7 +38,7 @@ pub struct ScriptError {
     pub problem: &'static str,
 }
 
-/// A touch: from a place to another.
+/// A touch that slides from one place to another.
 #[derive(Clone, Copy, Debug)]
 struct Touch {
     from: Position,
@@ -49,16 +49,16 @@ struct Touch {
 }
 
 impl Finger {
-    /// Time between touches, in seconds.
+    /// Shortest and longest time between touches, in seconds.
     const LIFTED_S: (f64, f64) = (0.8, 2.0);
-    /// Length of a touch, in seconds.
+    /// Shortest and longest duration of a touch, in seconds.
     const TOUCH_S: (f64, f64) = (1.5, 5.0);
-    /// Time in which the force comes and goes, in seconds.
+    /// Time in which the force rises, and in which it falls, in seconds.
     const PRESS_S: f64 = 0.1;
     /// Share of the side at either edge that is not touched.
     const MARGIN: f64 = 0.05;
 
-    /// A finger on the surface of a rig, with the rig's force where that is known, else around that of its presses.
+    /// A finger on the surface of a rig, with the force of the rig if it is known, else with forces around that of its calibration rows.
     pub fn random(rig: &Rig, seed: u64) -> Self {
         let typical_n = rig.training.as_ref().and_then(|training| training.force_n).unwrap_or(1.0);
         let nowhere = Position::default();
@@ -66,7 +66,7 @@ impl Finger {
         let mut finger = Self {
             script: None,
             held: None,
-            // A stream of its own, beside that of the noise.
+            // This random stream is independent of that of the noise.
             rng: Xoshiro256PlusPlus::seed_from_u64(seed ^ 0xF1_46E2),
             extent: rig.setup.surface().extent(),
             force_n: rig.setup.force_n(),
@@ -77,7 +77,7 @@ impl Finger {
         finger
     }
 
-    /// The contact at a time in seconds, which never goes back; `None` while nothing touches.
+    /// The contact at a time in seconds, which must not decrease; `None` while the surface is untouched.
     pub fn contact_at(&mut self, time_s: f64) -> Option<Contact> {
         if let Some(held) = self.held {
             return held;
@@ -94,7 +94,7 @@ impl Finger {
         }
         let share = smooth((time_s - start_s) / (end_s - start_s));
         let pressed = match self.force_n {
-            // Of a surface whose force is known, nothing less presses.
+            // A surface with a known force is never touched with less.
             Some(_) => 1.0,
             None => smooth((time_s - start_s).min(end_s - time_s) / Self::PRESS_S),
         };
@@ -103,11 +103,11 @@ impl Finger {
         Some(Contact { position, force_n: force_n * pressed.max(1e-3) })
     }
 
-    /// The same finger, which follows a script: lines of `time,x,y,force` in s, mm and N, between which it moves evenly. A force of 0 is lifted, and a line that
-    /// does not begin with a number, such as a heading, is passed over where it is the first.
+    /// Makes the finger follow a script: lines of `time,x,y,force` in s, mm and N. The finger moves evenly from line to line. A force of 0 lifts it. A
+    /// first line without numbers, such as a heading, is skipped.
     ///
     /// # Errors
-    /// [`ScriptError`] for the first line that is none, or whose time is not after that before it, or that is off the surface.
+    /// [`ScriptError`] for the first line that does not have this form, has a time that does not increase, or is off the surface.
     pub fn with_script(mut self, text: &str) -> Result<Self, ScriptError> {
         let mut script: Vec<Waypoint> = Vec::new();
         for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
@@ -132,15 +132,16 @@ impl Finger {
         Ok(self)
     }
 
-    /// True for a line that is meant for a finger: one that begins with `finger`, `lift` or `reset`.
+    /// True for a command to the finger: a line that begins with `finger`, `lift` or `reset`.
     pub fn knows(line: &str) -> bool {
         matches!(line.split_whitespace().next(), Some("finger" | "lift" | "reset"))
     }
 
-    /// Does what a line of a stage says: `finger x y force` in mm and N holds it there, `lift` lifts it, `reset` lets it go its own way again.
+    /// Executes a command of a stage: `finger x y force` in mm and N presses there until the next command, `lift` lifts the finger, `reset` ends the
+    /// control by the stage.
     ///
     /// # Errors
-    /// Its problem, in words.
+    /// The problem of the command, in words.
     pub fn obey(&mut self, line: &str) -> Result<(), &'static str> {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words.as_slice() {
@@ -158,12 +159,12 @@ impl Finger {
         Ok(())
     }
 
-    /// Usual force of its touches, in newtons.
+    /// Typical force of a touch, in newtons.
     pub fn typical_n(&self) -> f64 {
         self.force_n.unwrap_or(self.typical_n)
     }
 
-    /// Holds it where a stage has it, or lifted.
+    /// Sets the contact by a stage, or lifts the finger.
     pub fn hold(&mut self, contact: Option<Contact>) {
         self.held = Some(contact);
     }
@@ -203,7 +204,7 @@ impl Finger {
     }
 }
 
-/// Contact of a script at a time: between two waypoints on the surface evenly on the way, else that of the last one.
+/// Contact of a script at a time: linearly interpolated between two waypoints on the surface, else that of the last waypoint.
 fn scripted(script: &[Waypoint], time_s: f64) -> Option<Contact> {
     let next = script.partition_point(|waypoint| waypoint.time_s <= time_s);
     let last = script.get(next.checked_sub(1)?)?;
@@ -220,7 +221,7 @@ fn scripted(script: &[Waypoint], time_s: f64) -> Option<Contact> {
     Some(Contact { position, force_n: between(from.force_n, to.force_n) })
 }
 
-/// A rise from 0 to 1 without a kink.
+/// Smooth rise from 0 to 1.
 fn smooth(share: f64) -> f64 {
     let share = share.clamp(0.0, 1.0);
     share * share * (3.0 - 2.0 * share)

@@ -1,4 +1,4 @@
-//! A hand that does what a guided calibration asks for, as people do it: beside the place, slowly, hovering, tapping, lifting early.
+//! A hand that follows a guided calibration with human imperfections: it misses the place, presses slowly, hovers, taps and lifts early.
 
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
@@ -11,30 +11,30 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 pub enum Instruction {
     /// Press here, with this force.
     Press(Contact),
-    /// Go on as it is.
+    /// Keep the present state.
     Hold,
-    /// Let go.
+    /// Lift the hand.
     Lift,
 }
 
 /// Manner in which a hand presses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandStyle {
-    /// Standard deviation of its place on either axis, in metres.
+    /// Standard deviation of the place on either axis, in metres.
     pub placement_m: f64,
-    /// Time in which the force comes, in seconds.
+    /// Time in which the force rises, in seconds.
     pub press_s: f64,
-    /// Time in which the force goes, in seconds.
+    /// Time in which the force falls, in seconds.
     pub lift_s: f64,
-    /// Time of its reaction to an instruction, in seconds.
+    /// Reaction time to an instruction, in seconds.
     pub reaction_s: f64,
-    /// Share of the force with which it hovers before each press and after it, 0 for none.
+    /// Share of the force with which the hand hovers before and after each press; 0 without hovering.
     pub hover_share: f64,
-    /// Time for which it hovers, in seconds.
+    /// Duration of hovering, in seconds.
     pub hover_s: f64,
-    /// Quick taps before each press.
+    /// Number of quick taps before each press.
     pub taps: u32,
-    /// Share of presses that it lifts before their reading is at rest, 0 to 1.
+    /// Share of presses that the hand lifts before their reading is at rest, 0 to 1.
     pub early_lift: f64,
 }
 
@@ -54,7 +54,7 @@ impl Default for HandStyle {
     }
 }
 
-/// Time of a tap, and of the pause after it, in seconds.
+/// Duration of a tap, and of the pause after it, in seconds.
 const TAP_S: f64 = 0.12;
 /// Time after the onset at which an early lift begins, in seconds.
 const EARLY_LIFT_S: f64 = 0.15;
@@ -72,7 +72,7 @@ pub struct Hand {
     presses: bool,
 }
 
-/// A part of a motion: the share of the force goes to `share` within `for_s`.
+/// A part of a motion: the share of the force changes to `share` within `for_s`.
 #[derive(Clone, Copy, Debug)]
 struct Leg {
     for_s: f64,
@@ -94,7 +94,7 @@ impl Hand {
         }
     }
 
-    /// Contact at a time in seconds, which never goes back, of a hand that has this instruction.
+    /// Contact of a hand with this instruction at a time in seconds, which must not decrease.
     pub fn contact_at(&mut self, time_s: f64, instruction: Instruction) -> Option<Contact> {
         if self.is_over(time_s) {
             let share = self.share_at(time_s);
@@ -106,7 +106,7 @@ impl Hand {
                     self.force_n = contact.force_n;
                     self.motion = self.pressing();
                 }
-                // A hand that lifted early is asked for the press again.
+                // After an early lift the press is requested again.
                 Instruction::Press(_) if share <= 0.0 => self.presses = false,
                 Instruction::Lift if self.presses => {
                     self.presses = false;
@@ -173,7 +173,7 @@ impl Hand {
         from
     }
 
-    /// A place beside the one that is asked for, on the surface.
+    /// A place on the surface near the requested one.
     fn beside(&mut self, position: Position) -> Position {
         let mut off = |at_m: f64, side_m: f64| {
             let drawn: f64 = StandardNormal.sample(&mut self.rng);

@@ -1,4 +1,4 @@
-//! A board without hardware: sensors under a surface that a finger touches, and the frames that firmware would send.
+//! A board without hardware: simulates sensors under a surface, a finger that touches it, and the frames of the firmware.
 
 mod faults;
 mod finger;
@@ -24,17 +24,17 @@ use std::time::Duration;
 /// Configuration of a simulated board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardConfig {
-    /// Readings a second, greater than 0.
+    /// Readings per second, greater than 0.
     pub rate_hz: f64,
     /// Seed of the sensors' faults and noise.
     pub seed: u64,
-    /// A load cell under the finger, the last value of every frame.
+    /// A load cell under the finger; its force is the last value of every frame.
     pub load_cell: Option<LoadCell>,
-    /// Form of its frames.
+    /// Form of the frames.
     pub frames: FrameForm,
 }
 
-/// Form of a simulated board's frames.
+/// Form of the frames of a simulated board.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum FrameForm {
     /// Lines of text.
@@ -42,7 +42,7 @@ pub enum FrameForm {
     Text,
     /// Binary frames, with the number of the frame and the time by the board's clock.
     Binary {
-        /// Millionths of the time by which its clock is fast.
+        /// Relative error by which the clock is fast, in millionths.
         clock_ppm: f64,
     },
 }
@@ -50,9 +50,9 @@ pub enum FrameForm {
 /// Load cell of a simulated machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadCell {
-    /// Name of its values.
+    /// Name of the values.
     pub name: String,
-    /// Standard deviation of its noise in newtons.
+    /// Standard deviation of the noise in newtons.
     pub noise_n: f64,
 }
 
@@ -62,7 +62,7 @@ impl Default for BoardConfig {
     }
 }
 
-/// A simulated board: time in, bytes out.
+/// A simulated board, which makes the bytes of its frames from the time.
 pub struct SimulatedBoard<'a> {
     bench: SimulatedBench<'a>,
     extent: Extent,
@@ -72,21 +72,21 @@ pub struct SimulatedBoard<'a> {
     rate_hz: f64,
     load_cell: Option<(LoadCell, Xoshiro256PlusPlus)>,
     frames: FrameForm,
-    /// Reading and force at the load cell that frames repeat.
+    /// Last reading and force at the load cell, which frames can repeat.
     measured: (Vec<f64>, f64),
-    /// Frames that were taken.
+    /// Number of frames so far.
     count: u64,
     sent: Sent,
 }
 
-/// Numbers of what a board did with its frames.
+/// Numbers of frames of a board by their fate.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sent {
     /// Frames that were sent whole.
     pub whole: u64,
-    /// Frames that were left out.
+    /// Frames that were dropped.
     pub dropped: u64,
-    /// Frames of which a part is missing.
+    /// Frames with a missing part.
     pub torn: u64,
 }
 
@@ -94,7 +94,7 @@ impl<'a> SimulatedBoard<'a> {
     /// A board on the bench of a setup, with the imperfections of the setup, touched by a finger.
     ///
     /// # Errors
-    /// [`SimulateError`] for a surface without a model, or one whose equations are not solved.
+    /// [`SimulateError`] for a surface without a model, or one with equations that are not solved.
     pub fn new(setup: &'a Setup, config: &BoardConfig, finger: Finger) -> Result<Self, SimulateError> {
         let faults = FaultConfig::of_setup(setup);
         let bench = SimulatedBench::perfect_watched(setup, config.seed, Watch::NONE)?;
@@ -109,7 +109,7 @@ impl<'a> SimulatedBoard<'a> {
             faults,
             rate_hz: config.rate_hz,
             frames: config.frames,
-            // A stream of its own, beside those of noise and finger.
+            // This random stream is independent of those of the noise and the finger.
             load_cell: config
                 .load_cell
                 .clone()
@@ -120,10 +120,10 @@ impl<'a> SimulatedBoard<'a> {
         })
     }
 
-    /// The same board with these faults, in the place of those of its setup; the seed draws lost and torn frames.
+    /// Replaces the faults of the setup with these; the seed draws dropped and torn frames.
     ///
     /// # Errors
-    /// [`SimulateError`] for a number out of its range.
+    /// [`SimulateError`] for a number out of range.
     pub fn with_faults(mut self, config: FaultConfig, seed: u64) -> Result<Self, SimulateError> {
         config.imperfections.check(self.extent)?;
         if let Some(step) = config.converter_step {
@@ -139,7 +139,7 @@ impl<'a> SimulatedBoard<'a> {
         Duration::from_secs_f64(self.count as f64 / self.rate_hz)
     }
 
-    /// Numbers of what it did with its frames so far.
+    /// Numbers of frames so far, by their fate.
     pub fn sent(&self) -> &Sent {
         &self.sent
     }
@@ -158,7 +158,7 @@ impl<'a> SimulatedBoard<'a> {
         bytes
     }
 
-    /// The bytes of the next frame, whole or torn; `None` for one that is left out.
+    /// The bytes of the next frame, whole or torn; `None` for a dropped frame.
     pub fn next_frame(&mut self) -> Option<Vec<u8>> {
         let time_s = self.next_at().as_secs_f64();
         let contact = self.finger.contact_at(time_s);
@@ -193,8 +193,8 @@ impl<'a> SimulatedBoard<'a> {
         (reading, contact.map_or(0.0, |contact| contact.force_n) + noise_n)
     }
 
-    /// The bytes of the reading in the units of the channels, to seven digits; the load cell is the last value, where there is one. Text has names
-    /// then, so that those who want the channels only find them.
+    /// The bytes of the reading in the units of the channels, to seven digits. With a load cell, its force is the last value, and lines of text have
+    /// names, so readers of the channels alone can find them.
     fn frame(&mut self, time_s: f64) -> Vec<u8> {
         let (reading, force_n) = &self.measured;
         let mut values: Vec<f32> = reading
@@ -205,7 +205,7 @@ impl<'a> SimulatedBoard<'a> {
         values.extend(self.load_cell.as_ref().map(|_| *force_n as f32));
         if let FrameForm::Binary { clock_ppm } = self.frames {
             let mut bytes = Vec::new();
-            // Both wrap around, as those of a microcontroller do.
+            // Number and time wrap around, as on a microcontroller.
             let time_us = (time_s * (1e6 + clock_ppm)) as u64 as u32;
             frame::encode_into(&mut bytes, self.count as u32, time_us, &values);
             return bytes;

@@ -1,4 +1,4 @@
-//! Alarms by rules, which can be replaced while a session runs.
+//! Alarms by rules, which can be replaced during a session.
 
 use super::{Batch, Sink};
 use crate::event::Event;
@@ -8,7 +8,7 @@ use crate::session::Output;
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Rules of alarms, shared by sessions and by who sets them.
+/// Alarm rules, shared by the sessions and the code that sets the rules.
 #[derive(Clone, Debug)]
 pub struct Alarms(Arc<Mutex<RuleWatch>>);
 
@@ -19,7 +19,7 @@ impl Default for Alarms {
 }
 
 impl Alarms {
-    /// Replaces the rules; none of them has acted yet.
+    /// Replaces the rules, and resets their states.
     pub fn set(&self, rules: Rules) {
         *self.lock() = RuleWatch::new(rules);
     }
@@ -29,14 +29,14 @@ impl Alarms {
     }
 }
 
-/// Raises alarms: events of the session.
+/// Sink that raises alarms as events of the session.
 pub struct AlarmSink {
     alarms: Alarms,
     reports: SyncSender<Input>,
 }
 
 impl AlarmSink {
-    /// A sink whose alarms go to the session through `reports`.
+    /// A sink that sends its alarms to the session through `reports`.
     pub fn new(alarms: Alarms, reports: SyncSender<Input>) -> Self {
         Self { alarms, reports }
     }
@@ -48,13 +48,13 @@ impl Sink for AlarmSink {
         if watch.rules().as_slice().is_empty() {
             return;
         }
-        // An alarm raises no alarm.
+        // Alarm events must not raise further alarms.
         let is_alarm = |output: &&Output| matches!(output, Output::Event(record) if matches!(record.event, Event::Alarm { .. }));
         for output in batch.outputs.iter().filter(|output| !is_alarm(output)) {
             watch.add(output, |rule| {
                 if let Action::Alarm(text) = &rule.action {
                     let alarm = Command::Alarm { name: rule.name.clone(), text: text.clone() };
-                    // A session that is behind its source has no room for it; its counters say that it is.
+                    // The queue of a session that is behind its source is full; the counters of the session show this.
                     let _ = self.reports.try_send(Input::Command(alarm));
                 }
             });
@@ -82,7 +82,7 @@ mod tests {
         let batch =
             |event| Arc::new(Batch { outputs: vec![Output::Event(EventRecord { time_s: 0.0, event })] });
         sink.batch(&batch(Event::Tared));
-        assert!(told.try_recv().is_err(), "there are no rules");
+        assert!(told.try_recv().is_err(), "rules are missing");
         alarms.set(rules("tared"));
         sink.batch(&batch(Event::Tared));
         let expected = Command::Alarm { name: "r".to_owned(), text: "look".to_owned() };

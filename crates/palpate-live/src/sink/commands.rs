@@ -1,4 +1,4 @@
-//! Commands to the board that the readings come from, by rules.
+//! Commands of rules to the board of the session.
 
 use super::{Batch, Sink};
 use crate::commander::{Commander, SendError};
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
-/// Most commands of a stretch of time, and its length: what is beyond is left out, so that a rule that flickers neither drowns a board nor fills its line.
+/// Most commands per period, and the length of the period. Further commands are not sent, so a rule that acts too often cannot overload the board.
 const MOST: u32 = 50;
 const STRETCH: Duration = Duration::from_secs(1);
 
@@ -18,13 +18,13 @@ pub struct CommandSink {
     rules: RuleWatch,
     to: Commander,
     reports: SyncSender<Input>,
-    /// Start of the stretch that is counted, and commands in it.
+    /// Start of the present period, and number of its commands.
     stretch: (Instant, u32),
-    /// Why the last command was not sent, where it was not.
+    /// Cause for which the last command was not sent; `None` if it was sent.
     trouble: Option<Unsent>,
 }
 
-/// Why a command was not sent.
+/// Cause for which a command was not sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 enum Unsent {
     #[error(transparent)]
@@ -34,8 +34,8 @@ enum Unsent {
 }
 
 impl CommandSink {
-    /// A sink of rules, of which those that publish do nothing here. What is not sent is told to the session through `reports`: once, until a
-    /// command is sent again.
+    /// A sink for rules that send commands; other rules have no effect. An unsent command is reported to the session through `reports`. A repeated
+    /// cause is reported once, until a command is sent again.
     pub fn new(rules: Rules, to: Commander, reports: SyncSender<Input>) -> Self {
         Self { rules: RuleWatch::new(rules), to, reports, stretch: (Instant::now(), 0), trouble: None }
     }
@@ -51,7 +51,7 @@ impl CommandSink {
             let unsent = self.send(&line).err();
             if let Some(unsent) = unsent.filter(|unsent| self.trouble != Some(*unsent)) {
                 let text = format!("command `{line}` of rule `{rule}`: {unsent}");
-                // A session that is too busy to hear of it has other troubles.
+                // The report is lost if the queue of the session is full.
                 let _ = self.reports.try_send(Input::Command(Command::Trouble(text)));
             }
             self.trouble = unsent;

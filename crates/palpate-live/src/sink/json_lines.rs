@@ -10,24 +10,24 @@ use std::io::{self, Write};
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, OnceLock};
 
-/// Writes samples and events as lines of JSON, as they come.
+/// Writes samples and events as lines of JSON immediately.
 #[derive(Debug)]
 pub struct JsonLines<W> {
     out: W,
     channels: Vec<Channel>,
     extent: Extent,
     reports: SyncSender<Input>,
-    /// The first error of writing; nothing is written after it.
+    /// The first write error; the sink does not write after it.
     failed: Arc<OnceLock<io::Error>>,
 }
 
 impl<W: Write> JsonLines<W> {
-    /// A writer of samples of these channels; that no more can be written is told to the session through `reports`.
+    /// A writer of samples of these channels. A write error is reported to the session through `reports`.
     pub fn new(out: W, channels: &[Channel], extent: Extent, reports: SyncSender<Input>) -> Self {
         Self { out, channels: channels.to_vec(), extent, reports, failed: Arc::default() }
     }
 
-    /// The first error of writing, as soon as there is one.
+    /// The first write error; empty before it.
     pub fn failed(&self) -> Arc<OnceLock<io::Error>> {
         Arc::clone(&self.failed)
     }
@@ -55,7 +55,7 @@ impl<W: Write + Send> Sink for JsonLines<W> {
             return;
         }
         if let Err(error) = self.write(batch) {
-            // A reader that has gone wants no more, which is no trouble.
+            // It is not a problem if the reader has gone.
             if error.kind() != io::ErrorKind::BrokenPipe {
                 let text = format!("samples are printed no more: {error}");
                 let _ = self.reports.try_send(Input::Command(Command::Trouble(text)));

@@ -1,4 +1,4 @@
-//! Sinks: where the outputs of a session go.
+//! Sinks of the outputs of a session.
 
 mod alarms;
 mod commands;
@@ -23,7 +23,7 @@ use serde::Serialize;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 
-/// Outputs that follow from one arrival, in their order; shared by all sinks.
+/// Outputs from one arrival, in their order; shared by all sinks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Batch {
     /// The outputs.
@@ -48,22 +48,22 @@ impl Batch {
     }
 }
 
-/// State of a session, some sixty times a second.
+/// State of a session, sent about sixty times per second.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StateRecord {
-    /// Name of the source, while it is there.
+    /// Name of the source, while it is available.
     pub source: Option<String>,
-    /// Readings a second.
+    /// Readings per second.
     pub rate_hz: f64,
-    /// True while something touches.
+    /// True while the surface is touched.
     pub touched: bool,
-    /// Numbers of what arrived.
+    /// Numbers of readings, frames and losses.
     pub counters: Counters,
     /// State of each channel, in the order of a reading.
     pub channels: Vec<ChannelRecord>,
 }
 
-/// State of a channel as a record, in the unit of its board.
+/// State of a channel as a record, in the unit of the board.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelRecord {
     /// State.
@@ -74,7 +74,7 @@ pub struct ChannelRecord {
     pub noise_sd: f64,
 }
 
-/// A sink. It must not block: what it cannot take at once it keeps within bounds, or counts as lost.
+/// A sink. It must not block: outputs that it cannot take at once go into a bounded queue, or are counted as lost.
 pub trait Sink: Send {
     /// Takes a batch, which is not empty.
     fn batch(&mut self, batch: &Arc<Batch>);
@@ -85,9 +85,9 @@ pub trait Sink: Send {
     }
 }
 
-/// Opens a sink for each session that begins: of samples of these channels on a surface of this extent; troubles are told to the session.
+/// Opens a sink for each new session, for samples of these channels on a surface of this extent. Problems are reported to the session.
 ///
 /// # Errors
-/// No thread for it.
+/// The system gives no thread for the sink.
 pub type OpenSink =
     Box<dyn Fn(&[Channel], Extent, SyncSender<Input>) -> std::io::Result<Box<dyn Sink>> + Send + Sync>;

@@ -1,4 +1,4 @@
-//! Estimates and events as messages of MQTT.
+//! Estimates and events as MQTT messages.
 
 use super::{Batch, Sink};
 use crate::address::Address;
@@ -20,20 +20,20 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// A broker, and the topic under which a session's messages are.
+/// A broker, and the topic of the messages of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MqttUrl {
     /// The broker.
     pub broker: Address,
-    /// User name and password, where the broker wants them.
+    /// User name and password, if the broker requires them.
     pub login: Option<Login>,
     /// The topic.
     pub topic: String,
 }
 
-/// Text that is no URL of a broker.
+/// Text that is not the URL of a broker with a topic.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{text}` is no broker with a topic, as in `mqtt://user@host:1883/bench/contact`: {problem}")]
+#[error("`{text}` is not a broker with a topic, as in `mqtt://user@host:1883/bench/contact`: {problem}")]
 pub struct MqttUrlError {
     /// The text.
     pub text: String,
@@ -52,7 +52,7 @@ impl FromStr for MqttUrl {
         let (server, topic) = rest.split_once('/').ok_or_else(|| error("it has no topic"))?;
         let topic = topic.trim_end_matches('/');
         if topic.is_empty() || topic.len() > 1000 || topic.contains(['+', '#', '\0']) {
-            return Err(error("a topic has 1 to 1000 bytes, and none of + and #"));
+            return Err(error("a topic has 1 to 1000 bytes, without + and #"));
         }
         let file = match query.strip_prefix("password-file=") {
             _ if query.is_empty() => None,
@@ -72,7 +72,7 @@ impl fmt::Display for MqttUrl {
 }
 
 impl MqttUrl {
-    /// Options of a client with an identity of its own.
+    /// Options of a client with a unique identity.
     pub(crate) fn options(&self, role: &str) -> Result<MqttOptions, LoginError> {
         static NUMBER: AtomicU64 = AtomicU64::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
@@ -87,17 +87,17 @@ impl MqttUrl {
     }
 }
 
-/// Batches that wait for the broker's thread at most.
+/// Most batches that wait for the thread of the sink.
 const WAITING: usize = 1024;
-/// Messages that wait for the broker at most; those beyond are counted as lost.
+/// Most messages that wait for the broker; further ones are counted as lost.
 const MESSAGES: usize = 1024;
-/// Time before it is tried again to reach a broker.
+/// Time between two attempts to reach a broker.
 const AGAIN_AFTER: Duration = Duration::from_millis(500);
-/// Longest wait at the end for the broker to take the last message.
+/// Longest wait at the end until the broker has taken the last message.
 const PATIENCE: Duration = Duration::from_millis(150);
 
-/// Publishes samples to `TOPIC/estimate`, events to `TOPIC/event`, and to `TOPIC/status` what is kept there: `online`, or `offline` once the session has ended
-/// or died.
+/// Publishes samples to `TOPIC/estimate` and events to `TOPIC/event`. The retained message of `TOPIC/status` is `online`, or `offline` once the
+/// session has ended or died.
 pub struct MqttSink {
     to: Option<SyncSender<Arc<Batch>>>,
     lost: Arc<AtomicU64>,
@@ -105,10 +105,11 @@ pub struct MqttSink {
 }
 
 impl MqttSink {
-    /// A client of a broker, which need not be there yet. Rules publish their messages beside; troubles are told to the session through `reports`.
+    /// A client of a broker, which may become available later. It also publishes the messages of rules. Problems are reported to the session through
+    /// `reports`.
     ///
     /// # Errors
-    /// No thread for it.
+    /// The system gives no thread for the sink.
     pub fn new(
         url: &MqttUrl,
         channels: &[Channel],
@@ -126,7 +127,7 @@ impl MqttSink {
         Ok(Self { to: Some(to), lost, thread: Some(thread) })
     }
 
-    /// Messages that the broker did not take, which are counted until the sink has gone.
+    /// Number of messages that the broker did not take; counted until the sink has ended.
     pub fn lost(&self) -> Arc<AtomicU64> {
         Arc::clone(&self.lost)
     }
@@ -153,9 +154,9 @@ impl Drop for MqttSink {
 struct Publisher {
     client: Client,
     topic: String,
-    /// True while the broker is there.
+    /// True while the broker is connected.
     online: Arc<AtomicBool>,
-    /// True once the connection has ended for good.
+    /// True once the connection has ended permanently.
     done: Arc<AtomicBool>,
     lost: Arc<AtomicU64>,
 }
@@ -211,7 +212,7 @@ impl Publisher {
         }
     }
 
-    /// Publishes a rule's message: even while the broker is away, for when it comes back.
+    /// Publishes the message of a rule. While the broker is away, the message waits for its return.
     fn act(&self, rule: &Rule) {
         let Action::Publish { topic, message } = &rule.action else { return };
         if self.client.try_publish(topic, QoS::AtLeastOnce, false, message.as_bytes()).is_err() {
@@ -221,7 +222,7 @@ impl Publisher {
 
     fn say_goodbye(&self) {
         if !self.online.load(Ordering::Relaxed) {
-            // Its last will has said it; and the driver ends with the process.
+            // The broker has published the last will of this client; the driver ends with the process.
             self.done.store(true, Ordering::Relaxed);
             return;
         }
@@ -236,7 +237,7 @@ impl Publisher {
     }
 }
 
-/// Keeps the connection: in a thread of its own, as it waits for the broker.
+/// Keeps the connection in a separate thread, because it waits for the broker.
 struct Driver {
     client: Client,
     status: String,
@@ -248,7 +249,7 @@ struct Driver {
 
 impl Driver {
     fn run(self, mut connection: Connection) {
-        // Whether the broker was there at the last look; `None` before the first.
+        // True if the broker was available at the last event; `None` before the first.
         let mut was_there = None;
         for event in connection.iter() {
             match event {

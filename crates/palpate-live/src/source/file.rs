@@ -7,12 +7,12 @@ use std::fmt::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Longest sleep before it is looked whether the source is still wanted.
+/// Longest sleep between two checks that the source is still in use.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// Bytes of an arrival where nothing is waited for.
+/// Bytes of an arrival in playback without waits.
 const BURST: usize = 1 << 12;
 
-/// Opens a recording whose readings come at `speed` times the pace at which they were taken, or with 0 as fast as they are taken.
+/// Opens a recording. The readings come at `speed` times the pace of the recording, or with 0 as fast as the session processes them.
 pub fn open(outlet: Outlet, path: &Path, speed: f64) -> Result<(), SourceError> {
     let playback = Playback::open(path)?;
     let name = format!("the recording {}", path.display());
@@ -24,7 +24,7 @@ pub fn open(outlet: Outlet, path: &Path, speed: f64) -> Result<(), SourceError> 
     Ok(())
 }
 
-/// Sends what the recording holds; false once nobody wants more.
+/// Sends the content of the recording; false once the receiver is gone.
 fn run(outlet: &Outlet, mut playback: Playback, speed: f64) -> bool {
     let start = Instant::now();
     let mut first_ns = None;
@@ -58,7 +58,7 @@ fn run(outlet: &Outlet, mut playback: Playback, speed: f64) -> bool {
     }
 }
 
-/// Sleeps until so long after a start; false once nobody wants more.
+/// Sleeps until `due` after the start; false once the receiver is gone.
 fn sleep_until(outlet: &Outlet, start: Instant, due: Duration) -> bool {
     loop {
         let left = due.saturating_sub(start.elapsed());
@@ -72,7 +72,7 @@ fn sleep_until(outlet: &Outlet, start: Instant, due: Duration) -> bool {
     }
 }
 
-/// Values as a line of numbers, which are read again to the last bit.
+/// Values as a line of numbers that parse back exactly.
 pub fn line(values: &[f64]) -> String {
     let mut line = String::new();
     for value in values {

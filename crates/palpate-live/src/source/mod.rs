@@ -1,4 +1,4 @@
-//! Sources of bytes: boards, networks, files, and a board that is simulated.
+//! Sources of bytes: boards, networks, files, and a simulated board.
 
 mod file;
 mod mqtt;
@@ -26,22 +26,22 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Longest time in which a source's thread does not look for commands, or its end.
+/// Longest time between two checks of a source's thread for commands, or its end.
 const LOOK: Duration = Duration::from_millis(10);
-/// First and longest pause before a device is looked for again; each is twice the one before.
+/// First and longest pause between two attempts to open a device; each pause is twice the one before.
 const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(5)];
-/// Longest time that a host is given to take a connection.
+/// Timeout of a connection to a host.
 const CONNECT: Duration = Duration::from_secs(2);
 
-/// A source that cannot be opened at all; one that merely is not there is waited for.
+/// A source that can never be opened. A missing device is not an error: the source waits for it.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
     /// The rig of a simulated board cannot be read.
     #[error("cannot read {path}: {error}")]
     Rig {
-        /// The rig's path.
+        /// Path of the rig.
         path: String,
-        /// Why.
+        /// Cause.
         error: String,
     },
     /// The rig of a simulated board cannot be simulated.
@@ -53,12 +53,12 @@ pub enum SourceError {
     /// The password of a broker cannot be read.
     #[error(transparent)]
     Login(#[from] crate::login::LoginError),
-    /// There is no thread for it.
+    /// The system gives no thread for the source.
     #[error("no thread for the source: {0}")]
     Thread(#[from] std::io::Error),
 }
 
-/// An open source: a thread that brings arrivals until it is dropped, within 100 ms of which it ends.
+/// An open source: a thread that brings arrivals. The thread ends within 100 ms after the source is dropped.
 #[derive(Debug)]
 pub struct Source {
     stop: Arc<AtomicBool>,
@@ -85,13 +85,13 @@ impl Outlet {
         Self { to, clock, stop: Arc::default(), open: Arc::default() }
     }
 
-    /// The source whose thread has this outlet, without a way back to the device.
+    /// The source of this outlet, without a way back to the device.
     fn source(&self) -> Source {
         Source { stop: Arc::clone(&self.stop), open: Arc::clone(&self.open), commander: None }
     }
 
-    /// Hands an arrival on, stamped now; false once nobody wants more. While the session is behind it waits, and what the device sends gathers in
-    /// the buffers of the system.
+    /// Hands an arrival on with the present instant; false once the source is to end or the session has gone. While the session is behind, this waits,
+    /// and the buffers of the system keep the data of the device.
     pub(crate) fn send(&self, arrival: Arrival) -> bool {
         match arrival {
             Arrival::Opened(_) | Arrival::Joined(_) | Arrival::Piped(_) => {
@@ -127,10 +127,10 @@ impl Outlet {
 }
 
 impl Source {
-    /// Opens a source whose arrivals go to `to`; paths in the URL are relative to `folder`.
+    /// Opens a source that sends its arrivals to `to`; paths in the URL are relative to `folder`.
     ///
     /// # Errors
-    /// [`SourceError`] where it can never be opened. A device that is not there yet is waited for.
+    /// [`SourceError`] for a source that can never be opened. A missing device is not an error: the source waits for it.
     pub fn open(
         url: &SourceUrl,
         folder: &Path,
@@ -140,7 +140,7 @@ impl Source {
         let outlet = Outlet::new(to, clock);
         let mut source = outlet.source();
         let (commander, for_device) = Commander::new(Arc::clone(&source.open));
-        // End of a line of commands, where there is a way back.
+        // End of a command line, for a source with a way back.
         let mut line_end = None;
         match url.clone() {
             SourceUrl::Stdin => stdin::open(outlet)?,
@@ -167,19 +167,19 @@ impl Source {
         Ok(source)
     }
 
-    /// The way back to the device, for who sends commands beside the source.
+    /// The way back to the device, for other senders of commands.
     ///
     /// # Errors
-    /// [`SendError::OneWay`] where there is none.
+    /// [`SendError::OneWay`] for a source without a way back.
     pub fn commander(&self) -> Result<Commander, SendError> {
         self.commander.clone().ok_or(SendError::OneWay)
     }
 
-    /// Sends a command to the device: bytes to a serial port or a TCP server, a message to the topic of an MQTT board with `/command` behind it.
+    /// Sends a command to the device: bytes to a serial port or a TCP server, a message to the topic `TOPIC/command` of an MQTT board.
     /// Returns at once; the source's thread sends it.
     ///
     /// # Errors
-    /// [`SendError`] where the source has no way back, the device is away, or too many commands wait for it.
+    /// [`SendError`] for a source without a way back, a device that is away, or too many waiting commands.
     pub fn send(&self, command: &[u8]) -> Result<(), SendError> {
         self.commander.as_ref().ok_or(SendError::OneWay)?.send(command)
     }
@@ -187,7 +187,7 @@ impl Source {
     /// Opens a simulated board on the bench of a rig.
     ///
     /// # Errors
-    /// [`SourceError::Simulate`] for a surface without a model, or one whose equations are not solved.
+    /// [`SourceError::Simulate`] for a surface without a model, or one with equations that are not solved.
     pub fn simulated(
         rig: Rig,
         config: BoardConfig,
@@ -205,7 +205,7 @@ fn spawn(run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
     thread::Builder::new().name("source".to_owned()).spawn(run).map(|_| ())
 }
 
-/// Pauses before a device is looked for again.
+/// Pauses between attempts to open a device.
 struct BackOff(Duration);
 
 impl BackOff {
@@ -221,7 +221,7 @@ impl BackOff {
     }
 }
 
-/// Leaves out commands that were meant for a device as it was before it went away.
+/// Discards commands that were sent before the device went away.
 fn forget(commands: &Receiver<Vec<u8>>) {
     while commands.try_recv().is_ok() {}
 }

@@ -14,12 +14,12 @@ use std::pin::pin;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-/// Most bytes of a packet: all that MQTT allows, as the client drops the connection at a larger one. Of a message that is too long for a frame the start is
-/// handed on, which counts as one.
+/// Most bytes of a packet: the maximum of MQTT, because the client drops the connection at a larger packet. A message that is too long for a frame is
+/// cut, and counts as one bad frame.
 const LARGEST: usize = 256 << 20;
 /// User name and password.
 type Credentials = (String, String);
-/// Silence after which the broker is asked for a sign of life; after twice as much it is gone. The least that the client allows is 1 s.
+/// Silence after which the client pings the broker; after twice as much the broker counts as gone. The client allows at least 1 s.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
 pub fn run(
@@ -32,7 +32,7 @@ pub fn run(
     match tokio::runtime::Builder::new_current_thread().enable_all().build() {
         Ok(runtime) => {
             runtime.block_on(bring(outlet, commands, broker, login, topic));
-            // A name that is being looked up is not waited for.
+            // This does not wait for a pending name lookup.
             runtime.shutdown_background();
         }
         Err(error) => {
@@ -54,7 +54,7 @@ async fn bring(
     let mut said = String::new();
     while let Some(event) = next(outlet, &mut events, || {
         while let Ok(command) = commands.try_recv() {
-            // The client's queue is longer than that of commands.
+            // The queue of the client is longer than that of commands.
             let _ = client.try_publish(&command_topic, QoS::AtMostOnce, false, command);
         }
     })
@@ -62,7 +62,7 @@ async fn bring(
     {
         let why = match event {
             Ok(Event::Incoming(Packet::ConnAck(_))) => {
-                // A broker that has begun anew knows no subscriptions.
+                // A restarted broker has lost the subscriptions.
                 let asked = client.try_subscribe(topic, QoS::AtMostOnce);
                 asked.err().map(|error| error.to_string())
             }
@@ -91,7 +91,7 @@ async fn bring(
             Err(error) => Some(explain(&broker.to_string(), &error)),
         };
         if let Some(why) = why {
-            // One that stays away for one reason is reported once.
+            // A broker that stays away for one reason is reported once.
             if why != said && !outlet.send(Arrival::Lost(why.clone())) {
                 return;
             }
@@ -102,7 +102,7 @@ async fn bring(
 }
 
 fn connection(broker: &Address, login: Option<Credentials>) -> (AsyncClient, EventLoop) {
-    // Two clients of one name would take the connection from each other.
+    // Two clients with one name would disconnect each other.
     let name = format!("palpate-{:016x}", RandomState::new().hash_one(0));
     let mut options = MqttOptions::new(name, &broker.host, broker.port);
     options.set_keep_alive(KEEP_ALIVE).set_max_packet_size(LARGEST, LARGEST);
@@ -117,13 +117,13 @@ fn connection(broker: &Address, login: Option<Credentials>) -> (AsyncClient, Eve
     (client, events)
 }
 
-/// The broker's next packet, while `look` is called now and then; `None` once the source is to end.
+/// The next packet of the broker; `None` once the source is to end. Calls `look` repeatedly while it waits.
 async fn next(
     outlet: &Outlet,
     events: &mut EventLoop,
     look: impl Fn(),
 ) -> Option<Result<Event, ConnectionError>> {
-    // One future through all looks: a connection that is being made is lost with it.
+    // One future for all iterations: to drop it would lose a pending connection.
     let mut event = pin!(events.poll());
     loop {
         if outlet.is_stopped() {

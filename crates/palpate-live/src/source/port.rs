@@ -1,4 +1,4 @@
-//! Ports of all kinds, serial, TCP and UDP: opened, read until they go away, and opened again.
+//! Serial, TCP and UDP ports: opened, read until they go away, and opened again.
 
 use super::{BackOff, LOOK, Outlet, forget};
 use crate::input::Arrival;
@@ -8,15 +8,15 @@ use std::time::Instant;
 
 /// Most bytes of an arrival.
 pub const CHUNK: usize = 1 << 16;
-/// Longest time that a device is given to take a command.
+/// Timeout of a command to a device.
 const WRITE: std::time::Duration = std::time::Duration::from_millis(50);
 
 /// An open device.
 pub trait Port {
-    /// Waits for what comes next, for [`LOOK`] at most.
+    /// Waits for the next arrival, at most for [`LOOK`].
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<Arrival>>;
 
-    /// Bytes that wait already as it is opened; none where that is not known.
+    /// Bytes that wait already when the port is opened; empty if that is unknown.
     fn backlog(&mut self) -> io::Result<Vec<u8>> {
         Ok(Vec::new())
     }
@@ -25,7 +25,7 @@ pub trait Port {
     fn send(&mut self, command: &[u8]) -> io::Result<()>;
 }
 
-/// Opens a device again and again, and brings what it sends. `opened` is what is said once it is there.
+/// Opens a device, hands on its data, and opens it again whenever it goes away. Sends the arrival `opened` after each opening.
 pub fn run<P: Port>(
     outlet: &Outlet,
     commands: &Receiver<Vec<u8>>,
@@ -62,7 +62,7 @@ pub fn run<P: Port>(
     }
 }
 
-/// Brings what an open device sends; ends where the source is to end, with the error where the device goes away.
+/// Hands on the data of an open device until the source is to end; returns the error if the device goes away.
 fn bring(
     outlet: &Outlet,
     commands: &Receiver<Vec<u8>>,
@@ -76,7 +76,7 @@ fn bring(
         }
         match port.receive(&mut buffer) {
             Ok(Some(arrival)) => {
-                // A device that sends is there; one that is gone at once is not asked ten times a second.
+                // Only data reset the pauses, so a device that goes away at once is not opened ten times a second.
                 *back_off = BackOff::new();
                 if !outlet.send(arrival) {
                     return Ok(());
@@ -90,16 +90,16 @@ fn bring(
     Ok(())
 }
 
-/// True for the error of a read or a write that is to be tried again.
+/// True for the error of a read or write that is to be repeated.
 fn is_wait(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 
-/// A stream of bytes whose reads and writes wait for [`LOOK`] at most.
+/// A stream of bytes with reads and writes that wait at most for [`LOOK`].
 pub struct Stream<T> {
     /// The stream.
     pub stream: T,
-    /// Meaning of its end.
+    /// Error message for the end of the stream.
     pub end: &'static str,
 }
 

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::mpsc::Receiver;
 
 pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, path: &Path, baud: u32) {
-    // A board sends as long as it has power, so that its first line is the end of one.
+    // A board sends as long as it has power, so the first line can be incomplete.
     let opened = Arrival::Joined(format!("{} at {baud} baud", path.display()));
     port::run(outlet, commands, &opened, || {
         let port = serialport::new(path.to_string_lossy(), baud).timeout(LOOK).open();
@@ -26,7 +26,7 @@ impl Port for SerialStream {
     }
 
     fn backlog(&mut self) -> io::Result<Vec<u8>> {
-        /// As many as drivers keep; a board that sends without a pause is not read for ever.
+        /// Size of the buffer of drivers; limits the read for a board that sends without a pause.
         const MOST: usize = 1 << 20;
         let port = &mut self.0.stream;
         let mut bytes = Vec::new();
@@ -40,7 +40,7 @@ impl Port for SerialStream {
             let count = port.read(&mut bytes[start..])?;
             bytes.truncate(start + count);
             if count == 0 {
-                // A driver may count bytes that it does not give.
+                // A driver can report bytes that it does not deliver.
                 return Ok(bytes);
             }
         }
@@ -53,7 +53,7 @@ impl Port for SerialStream {
 
 /// An error with its remedy.
 fn complaint(path: &Path, error: serialport::Error) -> io::Error {
-    // Of a Unix system this kind stands for a port that is locked.
+    // On Unix systems this kind means that the port is locked.
     let is_busy = cfg!(unix) && error.kind == serialport::ErrorKind::NoDevice;
     let error = io::Error::from(error);
     let remedy = match error.kind() {

@@ -7,7 +7,7 @@ use palpate_rig::Rig;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Time between two arrivals at most: readings that fall into it arrive together, as they do through USB.
+/// Longest time between two arrivals. Readings within it arrive together, as through USB.
 const BURST: Duration = Duration::from_millis(1);
 
 pub fn open(outlet: Outlet, path: &Path, rate_hz: f64, seed: u64) -> Result<(), SourceError> {
@@ -20,7 +20,7 @@ pub fn open(outlet: Outlet, path: &Path, rate_hz: f64, seed: u64) -> Result<(), 
 
 /// Opens a simulated board on the bench of a rig.
 pub fn open_rig(outlet: Outlet, rig: Rig, config: BoardConfig, name: String) -> Result<(), SourceError> {
-    // Made once here so that a rig that cannot be simulated is refused before anything is begun.
+    // This trial refuses a rig that cannot be simulated before the thread starts.
     SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, config.seed))?;
     std::thread::Builder::new().name("source".to_owned()).spawn(move || run(&outlet, &rig, &config, name))?;
     Ok(())

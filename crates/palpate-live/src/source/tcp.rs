@@ -10,12 +10,12 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread;
 use std::time::Duration;
 
-/// Silence after which a server is asked for a sign of life, time between two questions, and unanswered ones after which it is gone: a board that
-/// loses its power does not say so.
+/// Keep-alive of TCP: silence before the first probe, time between two probes, and number of unanswered probes after which the server is gone. A board
+/// that loses its power does not close the connection.
 const ALIVE: (Duration, Duration, u32) = (Duration::from_secs(2), Duration::from_secs(1), 3);
 
 pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, server: &Address) {
-    // A bridge to a serial port sends on from where the board is, so that the first line may be the end of one.
+    // A bridge to a serial port can begin amid a line, so the first line can be incomplete.
     let opened = Arrival::Joined(format!("tcp://{server}"));
     port::run(outlet, commands, &opened, || {
         let stream = connect(outlet, server)?;
@@ -29,8 +29,8 @@ pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, server: &Address) {
     });
 }
 
-/// A connection to a server. Looking its name up and waiting for it is done in a thread of its own, which is left to itself where the source is to
-/// end meanwhile.
+/// Connects to a server. A separate thread looks up the name and waits for the connection. If the source is to end meanwhile, this function does not
+/// wait for the thread.
 fn connect(outlet: &Outlet, server: &Address) -> io::Result<TcpStream> {
     let (to, from) = sync_channel(1);
     let address = server.clone();

@@ -1,4 +1,4 @@
-//! `udp://:port`: datagrams, a message each.
+//! `udp://:port`: datagrams, one message each.
 
 use super::port::{self, Port};
 use super::{Address, LOOK, Outlet};

@@ -7,7 +7,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// A source, as a URL names it.
+/// URL of a source.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SourceUrl {
     /// `-`: the standard input.
@@ -16,28 +16,28 @@ pub enum SourceUrl {
     File {
         /// The recording.
         path: PathBuf,
-        /// Its pace over that at which it was recorded; 0 for as fast as can be.
+        /// Ratio of the pace of the playback to that of the recording; 0 for the fastest playback.
         speed: f64,
     },
     /// `serial:///dev/ttyACM0?baud=115200`: a serial port.
     Serial {
-        /// Path, on Windows name, of the port.
+        /// Path of the port, on Windows its name.
         port: PathBuf,
-        /// Bits a second.
+        /// Baud rate, in bits per second.
         baud: u32,
-        /// Names of the values of frames that have no names; none where they are the channels in their order.
+        /// Names of the values of frames without names; empty where the values are the channels in their order.
         columns: Vec<String>,
     },
-    /// `tcp://host:port`: a server that sends frames to whoever connects.
+    /// `tcp://host:port`: a server that sends frames to its clients.
     Tcp {
         /// The server.
         server: Address,
         /// Names of the values of frames that have no names.
         columns: Vec<String>,
     },
-    /// `udp://:port`: datagrams that come to a port of this machine.
+    /// `udp://:port`: datagrams to a port of this machine.
     Udp {
-        /// The port, and the address of this machine that it is opened at; all of IPv4 where the host is empty.
+        /// The port, and the local address to bind; all IPv4 addresses if the host is empty.
         at: Address,
         /// Names of the values of frames that have no names.
         columns: Vec<String>,
@@ -46,7 +46,7 @@ pub enum SourceUrl {
     Mqtt {
         /// The broker.
         broker: Address,
-        /// User name and password, where the broker wants them.
+        /// User name and password, if the broker requires them.
         login: Option<Login>,
         /// The topic, or a filter of topics.
         topic: String,
@@ -55,23 +55,23 @@ pub enum SourceUrl {
     },
     /// `simulated:rig.toml?rate=1000&seed=0`: a simulated board.
     Simulated {
-        /// The rig that it has on its bench.
+        /// The rig to simulate.
         rig: PathBuf,
-        /// Readings a second.
+        /// Readings per second.
         rate_hz: f64,
-        /// Seed of its noise and its finger.
+        /// Seed of the noise and the finger.
         seed: u64,
     },
 }
 
-/// Bits a second of a serial port, unless the URL says others.
+/// Default baud rate of a serial port, in bits per second.
 const BAUD: u32 = 115_200;
-/// Greatest number of bits a second.
+/// Greatest baud rate, in bits per second.
 const GREATEST_BAUD: u32 = 20_000_000;
 /// Greatest pace of a recording.
 const FASTEST: f64 = 1e6;
 
-/// Text that is no URL of a source.
+/// Text that is not the URL of a source.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SourceUrlError {
     /// A scheme that no source has.
@@ -94,7 +94,7 @@ pub enum SourceUrlError {
 }
 
 impl SourceUrl {
-    /// Names of the values of frames that have no names; none where they are the channels in their order.
+    /// Names of the values of frames without names; empty where the values are the channels in their order.
     pub fn columns(&self) -> &[String] {
         match self {
             Self::Serial { columns, .. }
@@ -152,7 +152,7 @@ impl SourceUrl {
         Ok(Some(url))
     }
 
-    /// Parameters that its kind takes.
+    /// Parameters of this kind of source.
     fn parameters(&self) -> &'static str {
         match self {
             Self::Stdin => "none",
@@ -177,11 +177,11 @@ impl FromStr for SourceUrl {
     }
 }
 
-/// Parameters that were not taken yet, as `name=value`.
+/// Remaining parameters, as `name=value`.
 struct Query<'a>(Vec<&'a str>);
 
 impl<'a> Query<'a> {
-    /// Takes a parameter that may be given once.
+    /// Removes and parses a parameter, which may be given once.
     fn take<T: FromStr>(
         &mut self,
         name: &str,
@@ -222,7 +222,7 @@ impl<'a> Query<'a> {
 
     fn end(&self, url: &SourceUrl) -> Result<(), String> {
         let known = url.parameters();
-        self.0.first().map_or(Ok(()), |pair| Err(format!("`{pair}` is no parameter; known are {known}")))
+        self.0.first().map_or(Ok(()), |pair| Err(format!("`{pair}` is not a parameter; known are {known}")))
     }
 }
 
@@ -309,7 +309,7 @@ mod tests {
             ("serial://", "write `serial:///dev/ttyACM0`"),
             ("serial:///dev/x?baud=0", "baud `0` must be a whole number of 1 to 20000000"),
             ("serial:///dev/x?baud=1&baud=2", "baud is given twice"),
-            ("serial:///dev/x?parity=odd", "`parity=odd` is no parameter; known are `baud` and `columns`"),
+            ("serial:///dev/x?parity=odd", "`parity=odd` is not a parameter; known are `baud` and `columns`"),
             ("tcp://host", "`host` has no port; write `host:5000`"),
             ("tcp://:5000", "the host is missing; write `tcp://"),
             ("tcp://host:70000", "port `70000` must be a whole number of 1 to 65535"),

@@ -1,4 +1,4 @@
-//! Errors of machines, and the words for them.
+//! Errors of machines, and their descriptions.
 
 use palpate_numerics::OutOfRange;
 use std::fmt;
@@ -7,16 +7,16 @@ use std::io;
 /// Failure of a machine.
 #[derive(Debug, thiserror::Error)]
 pub enum StageError {
-    /// The line is broken: nothing can be sent any more.
+    /// The line is broken, so that the machine can no longer be reached.
     #[error("the line to the machine is broken: {0}")]
     Line(#[from] io::Error),
     /// The firmware is unknown.
     #[error(
-        "the machine says neither that it is Marlin nor that it is GRBL; it said: {}. Is the baud rate right?",
+        "the machine is neither Marlin nor GRBL by its answer: {}. Is the baud rate right?",
         quoted(said)
     )]
     Unknown {
-        /// Words.
+        /// Text of the answer.
         said: String,
     },
     /// An answer or a position is not the expected one, so that the machine was stopped.
@@ -27,16 +27,16 @@ pub enum StageError {
         /// The finger after the stop.
         finger: Finger,
     },
-    /// A move was asked for before homing.
+    /// A move was requested before homing.
     #[error("the machine is not homed")]
     NotHomed,
-    /// Somebody, or a limit, stopped it.
+    /// A person or a limit stopped the machine.
     #[error("the machine was stopped; it needs a reset before it moves again")]
     Stopped,
-    /// A link has no reset line, which the setup asks to use.
+    /// The link has no reset line, and the setup requires one.
     #[error("`dtr_reset` needs a serial port: this link has no reset line")]
     NoResetLine,
-    /// A number of its setup is not in its range.
+    /// A number of the setup is out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
 }
@@ -44,7 +44,7 @@ pub enum StageError {
 /// Reason to trust neither the machine's answers nor its position.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Doubt {
-    /// A line that is no answer to the command.
+    /// A line that is not an answer to the command.
     #[error("the machine answered {} to `{command}`", quoted(answer))]
     Answer {
         /// The command.
@@ -52,7 +52,7 @@ pub enum Doubt {
         /// The line.
         answer: String,
     },
-    /// An `ok` without the report that the command asks for.
+    /// An `ok` without the report that the command requests.
     #[error("the machine answered `{command}` without {expected}")]
     NoReport {
         /// The command.
@@ -60,7 +60,7 @@ pub enum Doubt {
         /// The report.
         expected: &'static str,
     },
-    /// A line while nothing was asked.
+    /// A line outside of any command.
     #[error("the machine sent {} while no command was under way", quoted(line))]
     Unasked {
         /// The line.
@@ -74,13 +74,13 @@ pub enum Doubt {
         /// Seconds of waiting.
         seconds: u64,
     },
-    /// The machine started anew.
+    /// The machine restarted.
     #[error("the machine was reset: it sent {}", quoted(greeting))]
     Restart {
         /// The line.
         greeting: String,
     },
-    /// The machine is not where it was sent.
+    /// The reported position differs from the target.
     #[error("the machine reports {axis} {reported_mm:.2} mm and was sent to {axis} {target_mm:.2} mm")]
     OffPosition {
         /// `X`, `Y` or `Z`.
@@ -92,16 +92,16 @@ pub enum Doubt {
     },
 }
 
-/// The finger after a machine was stopped for a doubt.
+/// State of the finger after the machine was stopped for a `Doubt`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Finger {
-    /// Nothing was moved yet.
+    /// The machine had not moved yet.
     Unmoved,
-    /// It was lifted to the height of travel, and the machine halted.
+    /// The finger was lifted to the height of travel, and the machine was halted.
     Lifted,
-    /// It was at the height of travel or above, where the machine was halted.
+    /// The machine was halted with the finger at the height of travel or above.
     Up,
-    /// It could not be lifted: the machine was halted, and the finger may still press.
+    /// The finger could not be lifted: the machine was halted, and the finger may still press.
     Unknown,
 }
 
@@ -118,7 +118,7 @@ impl fmt::Display for Finger {
     }
 }
 
-/// Most characters of a quoted line.
+/// Largest number of characters of a quoted line.
 const QUOTED: usize = 80;
 
 /// A machine's line between backticks: control characters and quotes escaped, at most 80 characters.

@@ -1,4 +1,4 @@
-//! Firmware dialects: the lines that are sent, and the meaning of the lines that come back.
+//! Firmware dialects: the commands to a machine, and the meaning of its lines.
 
 /// Firmware of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,14 +9,14 @@ pub enum Firmware {
     Grbl,
 }
 
-/// Meaning of a line that comes before the `ok` of a command.
+/// Meaning of a line that precedes the `ok` of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Answer {
     /// The command is done.
     Ok,
-    /// A report that says nothing against the command.
+    /// A report that does not contradict the command.
     Report,
-    /// The machine started anew: it has forgotten where it is.
+    /// The machine restarted, and has lost its position.
     Greeting,
     /// Anything else.
     Unexpected,
@@ -38,7 +38,7 @@ impl Firmware {
         }
     }
 
-    /// A command whose `ok` comes when all moves before it have ended.
+    /// A command that the firmware answers with `ok` once all earlier moves have ended.
     pub(super) const fn wait(self) -> &'static str {
         match self {
             Self::Marlin => "M400",
@@ -46,7 +46,7 @@ impl Firmware {
         }
     }
 
-    /// Settings that moves rely on: millimetres, absolute positions; of GRBL also the first work coordinates and feeds in mm a minute.
+    /// Settings that moves rely on: millimetres and absolute positions; for GRBL also the first work coordinates and feeds in mm a minute.
     pub(super) const fn settings(self) -> &'static [&'static str] {
         match self {
             Self::Marlin => &["G21", "G90"],
@@ -54,7 +54,7 @@ impl Firmware {
         }
     }
 
-    /// Bytes that halt a machine until it is reset; GRBL reads them also between the bytes of a line.
+    /// Bytes that halt a machine until it is reset; GRBL reads them even between the bytes of a line.
     pub(super) const fn halt(self) -> &'static [u8] {
         match self {
             Self::Marlin => b"M112\n",
@@ -62,7 +62,7 @@ impl Firmware {
         }
     }
 
-    /// Meaning of a line that comes before the `ok` of a command.
+    /// Meaning of a line that precedes the `ok` of a command.
     pub(super) fn classify(self, line: &str) -> Answer {
         if is_ok(line) {
             return Answer::Ok;
@@ -82,7 +82,7 @@ impl Firmware {
         if is_report { Answer::Report } else { Answer::Unexpected }
     }
 
-    /// True where a machine says that it does not know a command which it quotes as it was sent: it was received whole.
+    /// True if the machine reports `command` as unknown and quotes it exactly as it was sent, so that it arrived whole.
     pub(super) fn does_not_know(self, command: &str, answer: &str) -> bool {
         self == Self::Marlin && answer == format!("echo:Unknown command: \"{command}\"")
     }
@@ -92,7 +92,7 @@ pub(super) fn is_ok(line: &str) -> bool {
     line == "ok" || line.starts_with("ok ")
 }
 
-/// Words with which boards begin: Marlin's `start`, GRBL's and its relatives' name, causes of a reset.
+/// First words of boards: Marlin's `start`, the names of GRBL and its relatives, and causes of a reset.
 fn is_greeting(line: &str) -> bool {
     let lower = line.to_ascii_lowercase();
     let words = lower.trim_start_matches("echo:").trim();
@@ -123,7 +123,7 @@ pub(super) fn position_mm(line: &str) -> Option<[f64; 3]> {
 pub(super) struct Status<'a> {
     /// State, without the number behind a colon.
     pub state: &'a str,
-    /// True for a hold whose deceleration has ended.
+    /// True for a feed hold after the deceleration has ended.
     pub is_held: bool,
     /// Position in the machine's own coordinates, in mm.
     pub machine_mm: Option<[f64; 3]>,
@@ -133,7 +133,7 @@ pub(super) struct Status<'a> {
     pub offset_mm: Option<[f64; 3]>,
 }
 
-/// The status report that a line is; `None` for other lines.
+/// The status report in a line; `None` for other lines.
 pub(super) fn status(line: &str) -> Option<Status<'_>> {
     let inner = line.strip_prefix('<')?.strip_suffix('>')?;
     let mut fields = inner.split('|');

@@ -1,9 +1,9 @@
 //! Machines of Marlin or GRBL firmware.
 //!
-//! Both take lines of G-code (ISO 6983-1) and answer each with `ok` or an error. A move is answered when it has been understood, not when it is
-//! done, so that each is followed by a line that waits: `M400` (Marlin), a dwell `G4` (GRBL, which finishes its moves before one). Marlin answers
-//! `ok` also to lines that it did not execute, so that an `ok` counts only where nothing unexpected came before it and the reported position is
-//! the target.
+//! Both accept lines of G-code (ISO 6983-1) and answer each with `ok` or an error. A move is answered when it has been parsed, not when it has
+//! ended. Each move is therefore followed by a line that waits: `M400` (Marlin), or a dwell `G4` (GRBL, which finishes earlier moves before a
+//! dwell). Marlin answers `ok` even to lines that it did not execute. An `ok` therefore counts only if no unexpected line precedes it and the
+//! reported position is the target.
 
 use super::error::{Doubt, StageError};
 use super::firmware::{Answer, Firmware, position_mm, status};
@@ -22,9 +22,9 @@ use std::time::Duration;
 pub enum Stopping {
     /// In the middle of any move.
     AtOnce,
-    /// By a reset of the board over DTR: its firmware reads no stop during a move.
+    /// By a reset of the board over DTR: its firmware does not read a stop during a move.
     ByReset,
-    /// Between two moves: its firmware reads no stop during one.
+    /// Between two moves: its firmware does not read a stop during a move.
     BetweenMoves,
 }
 
@@ -33,7 +33,7 @@ impl fmt::Display for Stopping {
         match self {
             Self::AtOnce => f.write_str("a stop acts at once"),
             Self::ByReset => f.write_str(
-                "its firmware has no emergency parser: a stop resets the board by DTR, and the motors lose their hold",
+                "its firmware has no emergency parser: a stop resets the board by DTR, and the motors lose their torque",
             ),
             Self::BetweenMoves => write!(
                 f,
@@ -44,34 +44,34 @@ impl fmt::Display for Stopping {
     }
 }
 
-/// Time for the first words of a board: one with a boot loader and a memory card takes 10 s.
+/// Time for the first output of a board: one with a boot loader and a memory card takes 10 s.
 const IDENTIFY: Duration = Duration::from_secs(15);
-/// Time after which a silent board is asked.
+/// Time after which a silent board is queried.
 const GREETING: Duration = Duration::from_secs(3);
-/// Time for an answer that needs no move.
+/// Time for an answer that does not depend on a move.
 pub(super) const ANSWER: Duration = Duration::from_secs(5);
 /// Time for homing: the slowest printers take two minutes.
 const HOMING: Duration = Duration::from_secs(300);
-/// Time for a move beyond twice its computed duration, which covers acceleration and what is planned before it.
+/// Time limit of a move, in addition to twice its computed duration. It covers acceleration and the moves planned before it.
 const MOVE_MARGIN: Duration = Duration::from_secs(10);
 const LONGEST_MOVE: Duration = Duration::from_secs(3600);
-/// Duration of a piece of a move, where a stop waits for its end.
+/// Duration of one piece of a move, if a stop takes effect only at the end of a piece.
 const PIECE: Duration = Duration::from_millis(40);
 const MOST_PIECES: f64 = 1e6;
-/// Time for what a machine says after a stop.
+/// Time for the last output of a machine after a stop.
 const LAST_WORDS: Duration = Duration::from_millis(100);
 /// Silence after which no answer is outstanding.
 const QUIET: Duration = Duration::from_millis(500);
-/// Time beyond its end for which a line without an end is read.
+/// Extra time after the time limit, in which a line without an end is still read.
 const UNENDING: Duration = Duration::from_millis(100);
-/// Most bytes of a line that is kept, and of words that are quoted.
+/// Largest number of bytes of a line that is stored, and of text that is quoted.
 const LONGEST: usize = 1024;
-/// Reports of GRBL within which it names the origin of its work coordinates (`REPORT_WCO_REFRESH_IDLE_COUNT` is 10).
+/// Number of GRBL's status reports within which one contains the origin of the work coordinates (`REPORT_WCO_REFRESH_IDLE_COUNT` is 10).
 const OFFSET_REPORTS: usize = 11;
 /// Largest distance between a target and the reported position: `M114` has two decimals, and a step of a belt is 0.0125 mm.
 pub(super) const TOLERANCE_MM: f64 = 0.05;
 
-/// A reason to leave the order of work.
+/// Reason to interrupt the sequence of work.
 #[derive(Debug)]
 pub(super) enum Fault {
     Line(io::Error),
@@ -95,13 +95,13 @@ pub struct GcodeStage<L> {
     stop: Arc<AtomicBool>,
     stopping: Stopping,
     received: VecDeque<u8>,
-    /// Origin of GRBL's work coordinates in its own.
+    /// Origin of GRBL's work coordinates in machine coordinates.
     work_offset_mm: [f64; 3],
-    /// Position that was reported last; `None` before homing and after a halt.
+    /// Last reported position; `None` before homing and after a halt.
     pub(super) at_mm: Option<[f64; 3]>,
     /// Target of the last move.
     pub(super) target_mm: [f64; 3],
-    /// Numbers of the echoes that were asked for.
+    /// Number of echoes requested so far.
     echoes: u32,
     /// True from homing on.
     pub(super) has_moved: bool,
@@ -109,10 +109,10 @@ pub struct GcodeStage<L> {
 }
 
 impl<L: StageLink> GcodeStage<L> {
-    /// Connects to a machine, and matches its answers to commands; nothing moves. Setting `stop` stops the machine whatever it does.
+    /// Connects to a machine, and matches its answers to commands. The machine does not move. Setting `stop` stops it at any time.
     ///
     /// # Errors
-    /// [`StageError`] where its firmware is unknown, an answer is not the expected one, or a number of the setup is not in its range.
+    /// [`StageError`] if the firmware is unknown, an answer is not the expected one, or a number of the setup is out of range.
     pub fn connect(link: L, setup: Stage, stop: Arc<AtomicBool>) -> Result<Self, StageError> {
         setup.check()?;
         if setup.dtr_reset && !link.has_dtr() {
@@ -153,10 +153,10 @@ impl<L: StageLink> GcodeStage<L> {
         self.stopping
     }
 
-    /// Moves to its end stops, by which it learns where it is, and lifts the finger to the height of travel.
+    /// Moves to the end stops, which determine the position, and lifts the finger to the height of travel.
     ///
     /// # Errors
-    /// [`StageError`], also of the other steps.
+    /// [`StageError`], including those of its steps.
     pub fn home(&mut self) -> Result<(), StageError> {
         let homed = self.try_to_home();
         self.end_of(homed)?;
@@ -177,7 +177,7 @@ impl<L: StageLink> GcodeStage<L> {
         self.end_of(gone)
     }
 
-    /// Presses where it is, to a depth in metres.
+    /// Presses at the current position, to a depth in metres.
     ///
     /// # Errors
     /// [`StageError`].
@@ -187,7 +187,7 @@ impl<L: StageLink> GcodeStage<L> {
         self.end_of(gone)
     }
 
-    /// Moves by distances along x, y and z, in metres, at the height of travel or above: what would lead below it ends there.
+    /// Moves by distances along x, y and z, in metres, at the height of travel or above. A move that would end below that height ends there.
     ///
     /// # Errors
     /// [`StageError`].
@@ -204,7 +204,7 @@ impl<L: StageLink> GcodeStage<L> {
         self.end_of(gone)
     }
 
-    /// Goes down where it is, to a z in metres of the machine, but never lower than the deepest press.
+    /// Lowers the finger at the current position, to a z in metres of the machine, but never below the deepest press.
     ///
     /// # Errors
     /// [`StageError`].
@@ -228,25 +228,25 @@ impl<L: StageLink> GcodeStage<L> {
         self.end_of(gone)
     }
 
-    /// Reads what came while nothing was asked, as long as a read takes: a greeting, say, of a board that was reset.
+    /// Reads lines that arrive outside of any command, for the duration of one read. An example is the greeting of a board that was reset.
     ///
     /// # Errors
-    /// [`StageError`] for any line but a report, and where it was stopped.
+    /// [`StageError`] for any line except a report, and if the machine was stopped.
     pub fn watch(&mut self) -> Result<(), StageError> {
         let watched = self.reject_unasked();
         self.end_of(watched)
     }
 
-    /// Halts the machine, where that was asked for.
+    /// Halts the machine if a stop was requested.
     ///
     /// # Errors
-    /// [`StageError::Stopped`] where it was; [`StageError::Line`].
+    /// [`StageError::Stopped`] if it was requested; [`StageError::Line`].
     pub fn heed_stop(&mut self) -> Result<(), StageError> {
         let heeded = self.check_stop();
         self.end_of(heeded)
     }
 
-    /// The outcome for callers: a doubt stops the machine, and lifts its finger where that is safe.
+    /// Converts the outcome for callers. A `Doubt` stops the machine, and lifts its finger if that is safe.
     fn end_of<T>(&mut self, outcome: Result<T, Fault>) -> Result<T, StageError> {
         outcome.map_err(|fault| match fault {
             Fault::Line(error) => StageError::Line(error),
@@ -282,7 +282,7 @@ impl<L: StageLink> GcodeStage<L> {
     /// Sends the settings that moves rely on.
     pub(super) fn set(&mut self) -> Result<(), Fault> {
         for setting in self.firmware.settings() {
-            // A Marlin without inches does not know the command that switches them off.
+            // Marlin without support for inches rejects the command that switches them off.
             self.ask(setting, ANSWER, |firmware, line| {
                 *setting == "G21" && firmware.does_not_know(setting, line)
             })?;
@@ -290,7 +290,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(())
     }
 
-    /// A straight move to the axes that are given, to its end, where the reported position must be the target. G-code has mm and mm/min.
+    /// Moves straight to the given coordinates, and waits for the end, where the reported position must be the target. G-code uses mm and mm/min.
     pub(super) fn go(&mut self, to_mm: [Option<f64>; 3], speed_m_per_s: f64) -> Result<(), Fault> {
         self.check_stop()?;
         let from_mm = self.at_mm.ok_or(Fault::NotHomed)?;
@@ -355,7 +355,7 @@ impl<L: StageLink> GcodeStage<L> {
         }
     }
 
-    /// A status report of GRBL, which answers `?` at any time and without `ok`.
+    /// A status report of GRBL. GRBL answers `?` at any time and without `ok`.
     pub(super) fn status_report(&mut self, until: Duration) -> Result<StatusReport, Fault> {
         self.reject_unasked()?;
         self.link.write_all(b"?")?;
@@ -388,10 +388,10 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(())
     }
 
-    /// Waits for a greeting, and asks boards that do not greet; the firmware, or `None` where its words name none.
+    /// Waits for a greeting, and queries boards that do not greet. Returns the firmware, or `None` if the answers name neither.
     fn identify(&mut self, said: &mut String) -> Result<Option<Firmware>, Fault> {
         let until = self.link.now() + IDENTIFY;
-        // `M115` is Marlin's question, `$I` GRBL's.
+        // `M115` is the query of Marlin, `$I` that of GRBL.
         let mut questions = ["M115\n", "$I\n"].into_iter().cycle();
         while self.link.now() < until {
             let until = self.link.now() + GREETING;
@@ -415,7 +415,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(None)
     }
 
-    /// Passes over all answers to earlier commands, so that the next `ok` belongs to the next command.
+    /// Skips all answers to earlier commands, so that the next `ok` belongs to the next command.
     pub(super) fn synchronize(&mut self, time: Duration) -> Result<(), Fault> {
         match self.firmware {
             Firmware::Marlin => self.await_echo(time),
@@ -423,8 +423,7 @@ impl<L: StageLink> GcodeStage<L> {
         }
     }
 
-    /// Asks Marlin to echo words that nothing else contains: all before them belongs to earlier commands. A firmware that does not know `M118`
-    /// quotes it.
+    /// Requests a unique echo from Marlin: all lines before the echo belong to earlier commands. A firmware without `M118` quotes the command.
     fn await_echo(&mut self, time: Duration) -> Result<(), Fault> {
         self.echoes += 1;
         let echo = format!("palpate-{}", self.echoes);
@@ -442,11 +441,11 @@ impl<L: StageLink> GcodeStage<L> {
         if is_silent {
             return Err(Fault::Doubt(Doubt::Silent { command, seconds: time.as_secs() }));
         }
-        // Without an echo the line has been quiet for long enough, and the report of the next query shows whether its `ok` is its own.
+        // If the echo is missing, the line has been quiet for long enough. The report of the next query then shows whether its `ok` belongs to it.
         Ok(())
     }
 
-    /// Waits for silence, then asks GRBL for its version, which must come before the `ok`.
+    /// Waits for silence, then requests GRBL's version, which must come before the `ok`.
     fn await_version(&mut self, time: Duration) -> Result<(), Fault> {
         const TRIES: usize = 3;
         for _ in 0..TRIES {
@@ -473,7 +472,7 @@ impl<L: StageLink> GcodeStage<L> {
         Err(Fault::Doubt(Doubt::NoReport { command: "$I".to_owned(), expected: "its version" }))
     }
 
-    /// Learns whether the firmware reads a stop during a move.
+    /// Determines whether the firmware reads a stop during a move.
     fn learn_stopping(&mut self) -> Result<(), Fault> {
         if self.firmware == Firmware::Grbl {
             return Ok(());
@@ -482,7 +481,7 @@ impl<L: StageLink> GcodeStage<L> {
         self.ask("M115", ANSWER, |_, line| {
             is_named |= line.contains("FIRMWARE_NAME:") && line.contains("Marlin");
             is_at_once |= line.trim() == "Cap:EMERGENCY_PARSER:1";
-            // Firmwares describe themselves in words of their own.
+            // Firmwares describe themselves in free text.
             !line.starts_with("Error") && !line.starts_with("Resend")
         })?;
         if !is_named {
@@ -501,7 +500,7 @@ impl<L: StageLink> GcodeStage<L> {
         self.ask(command, time, |_, _| false)
     }
 
-    /// Sends a command, and waits for its `ok`. `takes` is shown every line up to and with that; true for a report that the command asks for.
+    /// Sends a command, and waits for its `ok`. `takes` receives every line up to and including the `ok`; it returns true for the requested report.
     fn ask(
         &mut self,
         command: &str,
@@ -536,7 +535,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(self.link.flush()?)
     }
 
-    /// Reads lines that came while nothing was asked; an `ok` among them would be taken for the answer to the next command.
+    /// Rejects lines that arrive outside of any command; an `ok` among them would be mistaken for the answer to the next command.
     fn reject_unasked(&mut self) -> Result<(), Fault> {
         while let Some(line) = self.next_line(self.link.now())? {
             match self.firmware.classify(&line) {
@@ -548,7 +547,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(())
     }
 
-    /// The next line that the machine sends, without its end; `None` when time is up.
+    /// The next line of the machine, without its line end; `None` when time is up.
     pub(super) fn next_line(&mut self, until: Duration) -> Result<Option<String>, Fault> {
         loop {
             while let Some(end) = self.received.iter().position(|byte| *byte == b'\n') {
@@ -567,7 +566,7 @@ impl<L: StageLink> GcodeStage<L> {
         }
     }
 
-    /// Reads what is there, waiting no longer than the link does; false where nothing came.
+    /// Reads the available bytes, and waits no longer than the link does; false if there are none.
     fn read(&mut self) -> io::Result<bool> {
         let mut bytes = [0; 256];
         match self.link.read(&mut bytes) {
@@ -576,7 +575,7 @@ impl<L: StageLink> GcodeStage<L> {
                 if self.received.len() < LONGEST {
                     self.received.extend(&bytes[..count]);
                 } else {
-                    // What remains of a line that is too long: only its end counts.
+                    // The rest of a line that is too long: only its end counts.
                     self.received.extend(bytes[..count].iter().filter(|byte| **byte == b'\n'));
                 }
                 Ok(true)
@@ -588,7 +587,7 @@ impl<L: StageLink> GcodeStage<L> {
         }
     }
 
-    /// Halts the machine, where that was asked for.
+    /// Halts the machine if a stop was requested.
     pub(super) fn check_stop(&mut self) -> Result<(), Fault> {
         if self.is_halted {
             return Err(Fault::Stopped);
@@ -615,7 +614,8 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(())
     }
 
-    /// Takes what the machine still says after its stop: a connection that is closed with unread bytes is reset, and the stop may be lost with it.
+    /// Discards the last output of the machine after its stop. A connection that is closed with unread bytes is reset, and the stop may be lost
+    /// with it.
     fn hear_out(&mut self) {
         let until = self.link.now() + LAST_WORDS;
         while self.link.now() < until && self.read().is_ok() {
@@ -624,7 +624,7 @@ impl<L: StageLink> GcodeStage<L> {
     }
 }
 
-/// A status report of GRBL, its position in work coordinates.
+/// A status report of GRBL with the position in work coordinates.
 pub(super) struct StatusReport {
     pub state: String,
     pub is_held: bool,

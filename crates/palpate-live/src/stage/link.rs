@@ -35,16 +35,16 @@ impl<L: StageLink + ?Sized> StageLink for Box<L> {
     }
 }
 
-/// Longest time that a link waits for a byte, and so until a stop is sent.
+/// Longest wait of a link for a byte, and thus the longest delay of a stop.
 const READ: Duration = Duration::from_millis(10);
-/// Longest time for a command to be written, and for a host to take a connection.
+/// Time limit for writing a command, and for a host to accept a connection.
 const WRITE: Duration = Duration::from_millis(200);
 const CONNECT: Duration = Duration::from_secs(2);
 /// Time for which DTR is dropped: the capacitor of an Arduino's reset line needs some 10 ms.
 const DTR: Duration = Duration::from_millis(20);
 
 impl StageUrl {
-    /// Opens the link; the clock gives its time.
+    /// Opens the link; the clock provides its time.
     pub(super) fn open(&self, clock: HostClock) -> io::Result<Box<dyn StageLink>> {
         match self {
             Self::Serial { port, baud } => {
@@ -87,7 +87,7 @@ impl Write for SerialLink {
         self.port.write(bytes)
     }
 
-    /// Does nothing: the port has no buffer of its own, and waiting for the wire would hold up a stop.
+    /// Does nothing: the port has no buffer of its own, and waiting for the transmission would delay a stop.
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }

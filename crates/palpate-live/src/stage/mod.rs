@@ -1,7 +1,8 @@
 //! Machines that press by themselves: 3-D printers and mills with G-code firmware.
 //!
-//! A [`GcodeStage`] speaks to a machine over a [`StageLink`]. Answers belong to the command that was sent last, and the position is compared after
-//! every move; anything else stops the machine and lifts its finger where that is safe. A [`SimulatedMachine`] has the faults of real ones.
+//! A [`GcodeStage`] communicates with a machine over a [`StageLink`]. Every answer must belong to the last command, and the position is compared
+//! after every move. Any mismatch stops the machine, and lifts its finger if that is safe. A [`SimulatedMachine`] reproduces the faults of real
+//! ones.
 
 mod error;
 mod firmware;

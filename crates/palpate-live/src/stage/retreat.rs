@@ -1,6 +1,7 @@
-//! The way out of a doubt: the machine is stopped, its finger lifted where that is safe, and then it is halted until somebody resets it.
+//! Retreat after a `Doubt`: the machine is stopped, its finger is lifted if that is safe, and it is halted until a reset.
 //!
-//! A lift is safe where the machine still answers, and reports a position on the way of its last move: it was not reset, and its own z grows.
+//! A lift is safe if the machine still answers, and reports a position on the path of its last move. It was then not reset, and the lift increases
+//! its own z.
 
 use super::error::{Doubt, Finger};
 use super::firmware::Firmware;
@@ -8,13 +9,13 @@ use super::gcode::{Fault, GcodeStage, TOLERANCE_MM};
 use super::link::StageLink;
 use std::time::Duration;
 
-/// Time for the answer of a machine that is still there.
+/// Time limit for the answer of a machine that still runs.
 const LIFE: Duration = Duration::from_secs(2);
-/// Time for a feed hold to come to rest, and for the greeting after a reset.
+/// Time limit for a feed hold to come to rest, and for the greeting after a reset.
 const HOLD: Duration = Duration::from_secs(2);
 
 impl<L: StageLink> GcodeStage<L> {
-    /// Stops the machine for a doubt, lifts its finger where that is safe, and halts it.
+    /// Stops the machine because of a `Doubt`, lifts its finger if that is safe, and halts it.
     pub(super) fn retreat(&mut self, doubt: &Doubt) -> Finger {
         if !self.has_moved {
             return Finger::Unmoved;
@@ -23,7 +24,7 @@ impl<L: StageLink> GcodeStage<L> {
         let is_lost = self.at_mm.is_none() || matches!(doubt, Doubt::Restart { .. });
         let lifted = if is_lost { Finger::Unknown } else { self.try_to_lift().unwrap_or(Finger::Unknown) };
         let finger = if was_up { Finger::Up } else { lifted };
-        // Where even this cannot be sent, the finger is where it is.
+        // If even the halt cannot be sent, the finger stays at its position.
         match self.halt() {
             Ok(()) => finger,
             Err(_) => Finger::Unknown,
@@ -37,7 +38,7 @@ impl<L: StageLink> GcodeStage<L> {
     fn try_to_lift(&mut self) -> Result<Finger, Fault> {
         match self.firmware {
             Firmware::Marlin => {
-                // Drops all moves; the position stays known.
+                // `M410` drops all moves; the position remains known.
                 self.send("M410")?;
                 self.synchronize(LIFE)?;
             }
@@ -55,7 +56,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(Finger::Lifted)
     }
 
-    /// Stops the moves of GRBL. A reset drops them after a hold, at rest, which keeps the position.
+    /// Stops the moves of GRBL by a feed hold. A reset at rest then drops them and keeps the position.
     fn hold(&mut self) -> Result<(), Fault> {
         self.pass_over(LIFE)?;
         let until = self.link.now() + LIFE;
@@ -83,14 +84,14 @@ impl<L: StageLink> GcodeStage<L> {
         self.set()
     }
 
-    /// Reads what comes until the line is quiet for the time of a read, at most for `most`.
+    /// Reads until the line is quiet for the time of a read, at most for `most`.
     fn pass_over(&mut self, most: Duration) -> Result<(), Fault> {
         let until = self.link.now() + most;
         while self.next_line(self.link.now())?.is_some() && self.link.now() < until {}
         Ok(())
     }
 
-    /// True for a position between those before and after the last move.
+    /// True for a position between the start and the target of the last move.
     fn is_on_way(&self, at_mm: [f64; 3]) -> bool {
         let Some(from_mm) = self.at_mm else { return false };
         let is_between = |at: f64, from: f64, to: f64| {

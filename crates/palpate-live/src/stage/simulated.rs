@@ -1,4 +1,4 @@
-//! A machine without hardware: bytes of G-code in, answers and the contact of its finger out, in time that the caller tells.
+//! A machine without hardware: bytes of G-code in, answers and the contact of its finger out. The caller sets the time.
 
 use super::firmware::Firmware;
 use super::link::StageLink;
@@ -11,15 +11,15 @@ use std::str::FromStr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Greeting of a board whose port is opened.
+/// Greeting of a board when its port is opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Greeting {
     /// At once.
     #[default]
     AtOnce,
-    /// After a time in which the board reads nothing.
+    /// After a time in which the board does not read.
     After(Duration),
-    /// None: the board goes on as it was.
+    /// The board continues without a greeting.
     None,
 }
 
@@ -30,17 +30,17 @@ pub enum FaultKind {
     Unknown,
     /// The line does not arrive.
     Lost,
-    /// The machine answers nothing from now on.
+    /// The machine stops answering.
     Silence,
-    /// The line is asked for again, and not executed.
+    /// The line is requested again, and not executed.
     Resend,
-    /// The line is not executed, as the machine is not homed any more.
+    /// The line is not executed, because the machine is not homed any more.
     HomeFirst,
     /// The machine halts with an error.
     Error,
-    /// The machine starts anew in place of executing the line.
+    /// The machine restarts instead of executing the line.
     Reset,
-    /// The machine starts anew in the middle of the move.
+    /// The machine restarts in the middle of the move.
     ResetMoving,
     /// An end stop ends the move in its middle.
     Endstop,
@@ -64,11 +64,11 @@ pub struct MachineFault {
 pub struct MachineConfig {
     /// Greeting when its port is opened.
     pub greeting: Greeting,
-    /// Time by which every answer is late.
+    /// Delay of every answer.
     pub delay: Duration,
     /// True for a Marlin that reads a stop during a move.
     pub emergency_parser: bool,
-    /// True for moves that take their time; false for moves that end at once.
+    /// True for moves in real duration; false for moves that end at once.
     pub is_paced: bool,
     /// Duration of homing.
     pub homing: Duration,
@@ -92,7 +92,7 @@ impl Default for MachineConfig {
     }
 }
 
-/// Text that describes no behaviour of a machine.
+/// Error of a text that does not describe the behaviour of a machine.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` describes no machine; parts, separated by commas, are `no-greeting`, `greeting=12s`, `delay=500ms`, `no-emergency-parser`, `paced`, `homing=90s`, `soft-limit-x=200mm` and a fault with its line, as in `unknown@G1 Z:3`: unknown, lost, silence, resend, home-first, error, reset, reset-moving, endstop or extra-ok"
@@ -168,12 +168,12 @@ pub struct SimulatedMachine {
 }
 
 impl SimulatedMachine {
-    /// A machine whose finger presses with `force_n` at the greatest depth of `setup`.
+    /// A machine with a finger that presses with `force_n` at the greatest depth of `setup`.
     pub fn new(firmware: Firmware, setup: Stage, extent: Extent, force_n: f64) -> Self {
         Self::with_config(firmware, setup, extent, force_n, MachineConfig::default())
     }
 
-    /// A machine that behaves as `config` says.
+    /// A machine with the behaviour of `config`.
     pub fn with_config(
         firmware: Firmware,
         setup: Stage,
@@ -213,7 +213,7 @@ impl SimulatedMachine {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The contact of its finger: the force grows with the depth. `None` while it does not touch.
+    /// The contact of the finger, with a force that grows with the depth. `None` while the finger is in the air.
     pub fn contact(&self) -> Option<Contact> {
         let state = self.state();
         if !state.is_homed && state.shift_m == [0.0; 3] {
@@ -229,17 +229,17 @@ impl SimulatedMachine {
             .then(|| Contact { position, force_n: state.force_n * depth_m / state.setup.deepest_m() })
     }
 
-    /// Opens its port anew: a board that greets is reset by that.
+    /// Opens the port again, which resets a board that greets.
     pub fn open(&self) {
         self.state().open();
     }
 
-    /// Takes bytes that were sent to it.
+    /// Receives bytes from the host.
     pub fn receive(&self, bytes: &[u8]) {
         self.state().receive(bytes);
     }
 
-    /// Goes on to a time since its start; times before the last one change nothing.
+    /// Advances to a time since the start; earlier times than the last one are ignored.
     pub fn advance_to(&self, now: Duration) {
         self.state().advance_to(now);
     }
@@ -249,12 +249,12 @@ impl SimulatedMachine {
         self.state().take_answers()
     }
 
-    /// True once it was stopped, until its port is opened anew.
+    /// True from a stop until the port is opened again.
     pub fn is_stopped(&self) -> bool {
         self.stopped_at().is_some()
     }
 
-    /// Time at which a stop took effect first, since its port was opened.
+    /// Time of the first stop that took effect since the port was opened.
     pub fn stopped_at(&self) -> Option<Duration> {
         self.state().stopped_at
     }
@@ -264,23 +264,23 @@ impl SimulatedMachine {
         self.state().motion.is_some()
     }
 
-    /// Faults that came true.
+    /// Number of faults that occurred.
     pub fn faults_met(&self) -> usize {
         self.state().faults_met
     }
 
-    /// Moves after a fault, or of a machine that is not homed, that do more than to lift the finger.
+    /// Number of moves after a fault, or before homing, that do more than lift the finger.
     pub fn doubtful_moves(&self) -> usize {
         self.state().doubtful_moves
     }
 
-    /// A link whose time passes only while somebody waits at it.
+    /// A link in virtual time, which advances only while the caller waits for an answer.
     pub fn link(&self) -> SimulatedLink {
         SimulatedLink { machine: self.clone(), is_waited_for: Duration::from_millis(10) }
     }
 }
 
-/// A link to a simulated machine in virtual time: a read without an answer takes 10 ms of it.
+/// A link to a simulated machine in virtual time: a read without an answer takes 10 ms.
 #[derive(Clone, Debug)]
 pub struct SimulatedLink {
     machine: SimulatedMachine,
@@ -334,16 +334,16 @@ impl StageLink for SimulatedLink {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     Ready,
-    /// Nothing moves until a reset; GRBL answers with an error.
+    /// The machine stays still until a reset; GRBL answers with an error.
     Halted,
-    /// Feed hold of GRBL.
+    /// Feed hold (GRBL).
     Held,
     /// GRBL's lock after an alarm, or before homing.
     Alarm,
     Silent,
 }
 
-/// A move between two places, in the machine's own coordinates.
+/// A move between two positions, in machine coordinates.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     from_m: [f64; 3],
@@ -361,29 +361,29 @@ struct State {
     config: MachineConfig,
     now: Duration,
     received: Vec<u8>,
-    /// Lines that were received and not executed.
+    /// Lines that were received, but not executed yet.
     lines: VecDeque<String>,
-    /// Answers with the time at which they are due.
+    /// Bytes of the answers with the time at which they are due.
     answers: VecDeque<(Duration, u8)>,
-    /// Target of the last move in the coordinates of the machine; where it is at rest.
+    /// Target of the last move in machine coordinates; the position at rest.
     at_m: [f64; 3],
-    /// Difference between the finger's place and the machine's coordinates.
+    /// Difference between the position of the finger and the machine coordinates.
     shift_m: [f64; 3],
     motion: Option<Motion>,
-    /// End of the command that waits, and its answer.
+    /// End time of the command that waits, and its answer.
     wait: Option<(Duration, String)>,
     deaf_until: Duration,
     resets_at: Option<Duration>,
     is_homed: bool,
     mode: Mode,
     stopped_at: Option<Duration>,
-    /// Lines so far that each fault counts.
+    /// Number of matching lines so far, for each fault.
     seen: Vec<u32>,
     faults_met: usize,
     doubtful_moves: usize,
 }
 
-/// Time between two `busy` of Marlin.
+/// Time between two `busy` messages of Marlin.
 const BUSY_EVERY: Duration = Duration::from_secs(2);
 
 impl State {
@@ -396,14 +396,14 @@ impl State {
         self.stopped_at = None;
     }
 
-    /// Starts anew where the finger is, as a board does; its port may be open.
+    /// Restarts at the current position of the finger, as a board does; the port may be open.
     fn reset(&mut self) {
         self.restart(Duration::ZERO);
     }
 
     fn restart(&mut self, boot: Duration) {
         let place_m = self.place_m();
-        // A board takes the place in which it starts for its origin; one that was never homed has its finger up.
+        // A board assumes that it starts at its origin; if it was never homed, its finger is up.
         if self.is_homed || self.shift_m != [0.0; 3] {
             self.shift_m = place_m;
         }
@@ -424,7 +424,7 @@ impl State {
         }
     }
 
-    /// The machine's own coordinates now.
+    /// The present position in machine coordinates.
     fn machine_m(&self) -> [f64; 3] {
         let Some(Motion { from_m, to_m, start, end }) = self.motion else { return self.at_m };
         let share = if end > start {
@@ -435,7 +435,7 @@ impl State {
         std::array::from_fn(|axis| from_m[axis] + share * (to_m[axis] - from_m[axis]))
     }
 
-    /// The finger's place.
+    /// The position of the finger.
     fn place_m(&self) -> [f64; 3] {
         let at_m = self.machine_m();
         std::array::from_fn(|axis| at_m[axis] + self.shift_m[axis])
@@ -526,17 +526,17 @@ impl State {
         }
     }
 
-    /// Ends the move where it is.
+    /// Ends the move at the current position.
     fn freeze(&mut self) {
         self.at_m = self.machine_m();
         (self.motion, self.wait) = (None, None);
         self.lines.clear();
     }
 
-    /// `M112` or `M410`, read during whatever else.
+    /// Executes `M112` or `M410`, which are read during any other command.
     fn interrupt(&mut self, line: &str) {
         if self.mode == Mode::Silent {
-            // It may still hear.
+            // A silent machine may still receive.
             self.freeze();
             if line == "M112" {
                 self.note_stop();
@@ -569,7 +569,7 @@ impl State {
         }
     }
 
-    /// A soft reset of GRBL: after a hold the position is kept.
+    /// A soft reset of GRBL; after a feed hold the position is kept.
     fn soft_reset(&mut self) {
         self.note_stop();
         if self.mode == Mode::Silent {
@@ -599,7 +599,7 @@ impl State {
     fn execute(&mut self, line: &str) {
         match self.mode {
             Mode::Halted if self.firmware == Firmware::Marlin => return,
-            // One whose answers are lost goes on.
+            // A silent machine still executes its commands.
             Mode::Silent | Mode::Halted | Mode::Ready | Mode::Held | Mode::Alarm => {}
         }
         match self.due_fault(line) {
@@ -676,7 +676,7 @@ impl State {
         }
     }
 
-    /// The finger stops half-way; Marlin takes it to be at its target.
+    /// The finger stops half-way, while Marlin assumes that it has reached its target.
     fn hit_endstop(&mut self, line: &str) {
         let from_m = self.at_m;
         self.obey(line);

@@ -1,4 +1,4 @@
-//! The thread of a machine: it takes orders, and heeds a stop at any time.
+//! The thread of a machine: it executes orders, and obeys a stop at any time.
 
 use super::error::StageError;
 use super::firmware::Firmware;
@@ -16,22 +16,22 @@ use std::thread::JoinHandle;
 /// Work for a machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
-    /// To look for its end stops.
+    /// Home: move to the end stops.
     Home,
-    /// To travel to a position at the height of travel.
+    /// Travel to a position at the height of travel.
     Travel(Position),
-    /// To travel to a position, and to press there.
+    /// Travel to a position, and press there.
     Press {
         /// The position.
         position: Position,
         /// The depth.
         depth_m: f64,
     },
-    /// To lift its finger.
+    /// Lift the finger.
     Lift,
-    /// To move by these distances along x, y and z, in metres, at the height of travel or above.
+    /// Move by these distances along x, y and z, in metres, at the height of travel or above.
     Jog([f64; 3]),
-    /// To go down to this z, in metres of the machine, no lower than the deepest press.
+    /// Lower the finger to this z, in metres of the machine, but not below the deepest press.
     Lower(f64),
 }
 
@@ -44,7 +44,7 @@ pub enum Done {
     Down([f64; 3]),
 }
 
-/// A machine in a thread of its own, which is stopped when this is dropped while it moves.
+/// A machine in a thread of its own. Dropping this during a move stops the machine.
 #[derive(Debug)]
 pub struct StageThread {
     firmware: Firmware,
@@ -56,10 +56,11 @@ pub struct StageThread {
 }
 
 impl StageThread {
-    /// Opens the link and greets the machine; the clock gives the link's time. Setting `stop` stops the machine at any time, as [`Self::stop`] does.
+    /// Opens the link and connects to the machine; the clock provides the time of the link. Setting `stop` stops the machine at any time, as
+    /// [`Self::stop`] does.
     ///
     /// # Errors
-    /// [`StageError`] where it is not there, or does not answer.
+    /// [`StageError`] if the machine is missing, or does not answer.
     pub fn open(
         url: &StageUrl,
         stage: Stage,
@@ -85,20 +86,20 @@ impl StageThread {
         self.stopping
     }
 
-    /// Asks for work; returns at once.
+    /// Orders work; returns at once.
     pub fn order(&self, order: Order) {
         if let Some(orders) = &self.orders {
-            // One that has failed has said so.
+            // A thread that has failed has reported its error.
             let _ = orders.send(order);
         }
     }
 
-    /// The outcome of the work that was asked for, once it is done.
+    /// The outcome of the ordered work, once it is done.
     pub fn done(&self) -> Option<Result<Done, StageError>> {
         self.done.try_recv().ok()
     }
 
-    /// Stops the machine, whatever it does; it has been sent the stop when this returns.
+    /// Stops the machine during any work. The stop has been sent when this returns.
     pub fn stop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         self.join();
@@ -114,7 +115,7 @@ impl StageThread {
         self.done.try_iter().try_for_each(|done| done.map(drop))
     }
 
-    /// Ends the thread after the work that was asked for, with the machine as that leaves it.
+    /// Ends the thread after the ordered work; the machine stays in its final state.
     pub fn close(&mut self) {
         self.join();
     }
@@ -143,13 +144,13 @@ fn run(
     loop {
         let done = match orders.try_recv() {
             Ok(order) => obey(&mut machine, order),
-            // Waits for a line as long as a read takes, and heeds a stop.
+            // Waits for a line for the time of one read, and obeys a stop.
             Err(TryRecvError::Empty) => match machine.watch() {
                 Ok(()) => continue,
                 Err(error) => Err(error),
             },
             Err(TryRecvError::Disconnected) => {
-                // The stop may be what ends it.
+                // The thread may be ended by the stop.
                 let _ = machine.heed_stop();
                 return;
             }

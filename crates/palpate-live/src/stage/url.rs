@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Place of a machine of Marlin or GRBL firmware.
+/// Address of a machine with Marlin or GRBL firmware.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum StageUrl {
     /// At a serial port.
@@ -15,19 +15,19 @@ pub enum StageUrl {
         /// Bits a second.
         baud: u32,
     },
-    /// Behind a TCP server, as of a bridge to a serial port.
+    /// Behind a TCP server, for example a bridge to a serial port.
     Tcp(Address),
 }
 
-/// Text that is no place of a machine.
+/// Error of a text that is not the address of a machine.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{text}` is no machine{problem}; machines are `gcode:serial:///dev/ttyUSB0?baud=115200` and `gcode:tcp://host:port`"
+    "`{text}` is not a machine{problem}; machines are `gcode:serial:///dev/ttyUSB0?baud=115200` and `gcode:tcp://host:port`"
 )]
 pub struct StageUrlError {
     /// The text.
     pub text: String,
-    /// Its problem, from `: ` on, where more is known.
+    /// The problem of the text, beginning with `: `; empty if it is unknown.
     pub problem: String,
 }
 

@@ -7,10 +7,10 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Longest time that anything may take on a machine that has other things to do.
+/// Timeout of all waits, for a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(30);
 
-/// A source, and what arrives from it.
+/// A source, and its arrivals.
 pub struct Bench {
     pub source: Source,
     arrivals: Receiver<Input>,
@@ -32,7 +32,7 @@ impl Bench {
         }
     }
 
-    /// Waits until the device is there.
+    /// Waits until the device is opened.
     pub fn opened(&self) {
         loop {
             match self.next() {
@@ -43,7 +43,7 @@ impl Bench {
         }
     }
 
-    /// The reason why the device went away, once it has.
+    /// Waits until the device goes away; returns the cause.
     pub fn lost(&self) -> String {
         match self.next() {
             Arrival::Lost(why) => why,
@@ -51,7 +51,7 @@ impl Bench {
         }
     }
 
-    /// Bytes up to so many.
+    /// Waits for `count` bytes.
     pub fn bytes(&self, count: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
         while bytes.len() < count {
@@ -63,7 +63,7 @@ impl Bench {
         bytes
     }
 
-    /// Time from the source's end to that of its thread.
+    /// Ends the source; returns the time until its thread ends.
     pub fn end(self) -> Duration {
         let start = Instant::now();
         drop(self.source);

@@ -1,4 +1,4 @@
-//! A broker between board, session and machine: mosquitto, begun and ended by the tests.
+//! A broker between board, session and machine: mosquitto, started and ended by the tests.
 
 use crate::bench::{Bench, PATIENCE, lines};
 use palpate_estimators::fit::{Fit, FitTask};
@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 
 const RIG: &str = include_str!("../../../../examples/noisy-beam.toml");
 
-/// A broker of its own.
+/// A broker for one test.
 struct Broker(Child);
 
 impl Drop for Broker {
@@ -50,14 +50,14 @@ impl Broker {
     }
 }
 
-/// The program of the broker, where there is one.
+/// Path of the broker's program; `None` if it is not installed.
 fn mosquitto() -> Option<std::path::PathBuf> {
     let named = std::env::var_os("PALPATE_MOSQUITTO").map(Into::into);
     Some(named.unwrap_or_else(|| "/usr/sbin/mosquitto".into()))
         .filter(|path: &std::path::PathBuf| path.is_file())
 }
 
-/// True where there is no broker; the test is skipped then.
+/// True without an installed broker; the test is then skipped.
 fn is_missing() -> bool {
     let missing = mosquitto().is_none();
     if missing {
@@ -70,7 +70,7 @@ fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
-/// Carries what comes to one port to another and back, as long as the test runs.
+/// Forwards data from one port to another and back, as long as the test runs.
 fn forward(from: u16, to: u16) {
     let listener = TcpListener::bind(("127.0.0.1", from)).unwrap();
     std::thread::spawn(move || {
@@ -87,7 +87,7 @@ fn forward(from: u16, to: u16) {
     });
 }
 
-/// Another client of the broker, and the messages that it gets.
+/// Another client of the broker, and its received messages.
 struct Subscriber {
     client: Client,
     messages: Receiver<(String, Vec<u8>)>,
@@ -120,7 +120,7 @@ impl Subscriber {
         self.messages.recv_timeout(PATIENCE).unwrap()
     }
 
-    /// Messages up to the first of a topic with this text, which is left out.
+    /// Messages before the first one of a topic with this text.
     fn until(&self, topic: &str, text: &str) -> Vec<(String, Vec<u8>)> {
         let end = (topic.to_owned(), text.as_bytes().to_vec());
         std::iter::from_fn(|| Some(self.next()).filter(|message| *message != end)).collect()
@@ -149,7 +149,7 @@ fn a_broker_that_begins_anew_is_subscribed_to_again() {
         }
         bench.source.send(b"zero").unwrap();
         assert_eq!(board.next(), ("bench/values/command".to_owned(), b"zero".to_vec()));
-        // A message is a line, and needs no end.
+        // A message is a line, and needs no line end.
         bench.source.commander().unwrap().send_line("brake on").unwrap();
         assert_eq!(board.next(), ("bench/values/command".to_owned(), b"brake on".to_vec()));
         drop(broker);
@@ -157,7 +157,7 @@ fn a_broker_that_begins_anew_is_subscribed_to_again() {
     }
 }
 
-/// A session of a simulated board, whose outputs go to a sink.
+/// A session of a simulated board that sends its outputs to a sink.
 struct Bridge<'a> {
     board: SimulatedBoard<'a>,
     session: Session<'a>,
@@ -166,7 +166,7 @@ struct Bridge<'a> {
 }
 
 impl Bridge<'_> {
-    /// Sends so many frames of the board through the session; the samples that came of them.
+    /// Sends frames of the board through the session. Returns the number of samples.
     fn send(&mut self, frames: usize) -> usize {
         let mut samples = 0;
         for _ in 0..frames {
@@ -206,7 +206,7 @@ fn estimates_events_status_and_rules_reach_a_broker_that_begins_anew() {
 
     assert!(listener.until("bench/left/status", "online").is_empty());
     let samples = bridge.send(1500);
-    // Retained: who comes later knows it, too.
+    // The message is retained: later subscribers receive it, too.
     let later = Subscriber::connect(port, "bench/left/status");
     assert_eq!(later.next(), ("bench/left/status".to_owned(), b"online".to_vec()));
 
@@ -224,11 +224,11 @@ fn estimates_events_status_and_rules_reach_a_broker_that_begins_anew() {
     let estimate: Value = serde_json::from_slice(&first.1).unwrap();
     assert_eq!((&estimate["number"], &estimate["status"]), (&0.into(), &"no_contact".into()));
 
-    // Away: estimates are counted as lost, and a rule's message waits.
+    // While the broker is away, estimates are counted as lost, and the message of a rule waits.
     let away = bridge.send(3000);
     let lost = bridge.sink.lost().load(Ordering::Relaxed);
     assert!(lost as usize >= away, "{lost} of {away}");
-    // Who listens is there before the sink finds the broker, as no broker keeps a message for who comes later.
+    // The subscriber connects before the sink finds the broker, because a broker does not keep messages for later subscribers.
     let again = free_port();
     let _broker = Broker::start(folder.path(), again);
     let listener = Subscriber::connect(again, "bench/#");
@@ -241,13 +241,13 @@ fn estimates_events_status_and_rules_reach_a_broker_that_begins_anew() {
     listener.until("bench/left/status", "offline");
 }
 
-/// A broker of its own making: it answers to one client, then does `after` with the connection.
+/// A minimal broker: it answers one client, then calls `after` with the connection.
 fn fake_broker(code: u8, after: impl FnOnce(&mut TcpStream) + Send + 'static) -> u16 {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = listener.local_addr().unwrap().port();
     std::thread::spawn(move || {
         let (mut stream, _) = listener.accept().unwrap();
-        // A packet is its kind, its length (below 128 here), and its content.
+        // A packet consists of its kind, its length (below 128 here), and its content.
         let packet = |stream: &mut TcpStream| {
             let mut head = [0; 2];
             stream.read_exact(&mut head).unwrap();

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
-/// The least of several, which other work on the machine has delayed least.
+/// The least of several measurements, which other work on the machine has delayed least.
 fn least(times: usize, measure: impl Fn() -> Duration) -> Duration {
     (0..times).map(|_| measure()).min().unwrap()
 }
@@ -72,11 +72,11 @@ fn a_serial_port_that_is_held_is_named_and_bytes_that_waited_are_a_backlog() {
     bench.end();
     let (mut board, host) = TTYPort::pair().unwrap();
     let device = host.name().unwrap();
-    // The port stays open for the board, as one that is plugged in, and is held by nobody.
+    // The port stays open, as with a connected board, but no program has locked it.
     let _open = std::fs::File::open(&device).unwrap();
     drop(host);
     board.write_all(b"1,2\n3,").unwrap();
-    // The kernel hands bytes from one end to the other in the background.
+    // The kernel transfers bytes from one end to the other in the background.
     std::thread::sleep(Duration::from_millis(100));
     let bench = Bench::open(&format!("serial://{device}"));
     bench.opened();
@@ -108,7 +108,7 @@ fn a_server_that_goes_away_is_connected_to_again() {
     let why = bench.lost();
     assert!(why.contains("closed the connection"), "{why}");
     drop(serve(&server));
-    // Now nobody listens for a while.
+    // For a while the server does not listen.
     drop(server);
     bench.lost();
     let why = bench.lost();
@@ -122,7 +122,7 @@ fn a_server_that_goes_away_is_connected_to_again() {
     serve(&server);
 }
 
-/// Rules that act without end, at a board that is read: what is sent is bounded, and said once for each reason.
+/// Rules that act too often: the number of commands is bounded, and unsent ones are reported once per cause.
 #[test]
 fn commands_of_rules_are_bounded_and_what_is_not_sent_is_told() {
     let server = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -148,7 +148,7 @@ fn commands_of_rules_are_bounded_and_what_is_not_sent_is_told() {
     assert!((1..=50).contains(&told.len()), "{told:?}");
     let Some(Input::Command(Command::Trouble(last))) = told.last() else { panic!("{told:?}") };
     assert!(last.contains("`brake on`") && last.contains("50 commands within 1 s"), "{last}");
-    // Away: said once.
+    // The lost board is reported once.
     drop(board);
     drop(server);
     bench.lost();
@@ -182,7 +182,7 @@ fn every_source_ends_within_100_ms() {
     let udp = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let urls = [
         format!("tcp://{at}"),
-        // Nobody answers at an address for documentation (RFC 5737).
+        // No host answers at an address for documentation (RFC 5737).
         "tcp://192.0.2.1:5000".to_owned(),
         "mqtt://192.0.2.1/values".to_owned(),
         format!("udp://127.0.0.1:{udp}"),
@@ -206,7 +206,7 @@ fn a_source_ends_while_the_session_is_behind() {
     let source = Source::open(&url, Path::new("."), HostClock::new(), to).unwrap();
     let (mut board, _) = server.accept().unwrap();
     board.set_write_timeout(Some(Duration::from_millis(300))).unwrap();
-    // Nobody takes arrivals, so that at some time the board cannot send any more: nothing grows without bound.
+    // The test takes no arrivals, so the board finally cannot send any more: no buffer grows without bound.
     let mut sent = 0;
     while board.write_all(&[b'1'; 1 << 16]).is_ok() {
         sent += 1 << 16;

@@ -1,4 +1,4 @@
-//! A board without a rig, from its first line to the calibration of the rig that was made for it.
+//! Bring-up of a board without a rig, from its first line to the calibration of the new rig.
 
 use crate::client::{get, post};
 use palpate_live::server::{Access, Live, Server};
@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// A board that sends lines of three values to whoever connects, until it is left.
+/// A board that sends lines of three values to each client until the client disconnects.
 fn board() -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -72,7 +72,7 @@ fn a_board_without_a_rig_is_seen_and_gets_one() {
         (&board["lines"][0]["text"], &board["problem"], &board["port"]),
         (&json!("10,-20,30"), &Value::Null, &Value::Null)
     );
-    // Nothing to choose of a source of TCP, and nothing but its steps before there is a locator.
+    // A TCP source offers no choice of ports. Before the locator exists, only the steps of the bring-up are allowed.
     assert_eq!(post(&server, "/api/bring-up", r#"{"port":"/etc/passwd","baud":9600}"#).0, 400);
     assert_eq!(post(&server, "/api/tare", "{}").0, 409);
     assert_eq!(post(&server, "/api/alarms", r#"{"text":""}"#).0, 409);

@@ -24,7 +24,7 @@ pub fn ask(
         request += &format!("Host: {}\r\n", server.address());
     }
     headers.iter().for_each(|(name, value)| request += &format!("{name}: {value}\r\n"));
-    // A server that refuses a body does not read it all.
+    // A server that refuses a body does not read all of it.
     let _ = stream.write_all(format!("{request}\r\n{body}").as_bytes());
     let mut answer = Vec::new();
     let _ = stream.read_to_end(&mut answer);

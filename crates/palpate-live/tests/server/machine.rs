@@ -1,4 +1,4 @@
-//! Calibrations by a machine, started and stopped by requests: a simulated board whose finger a simulated machine moves.
+//! Calibrations by a machine, started and stopped by requests: a simulated machine moves the finger of a simulated board.
 
 use crate::client::{get, post};
 use palpate_live::calibration::Statements;
@@ -19,10 +19,10 @@ use std::time::{Duration, Instant};
 
 /// Factor by which the clocks of server, board and machine run fast.
 const SPEED: u32 = 5;
-/// Longest time that anything may take on a machine that has other things to do.
+/// Timeout of all waits, for a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Time after which nobody is there, with a margin.
+/// Time after which the user counts as absent, with a margin.
 const ABSENCE: Duration = Duration::from_secs(6);
 
 fn rig() -> Rig {
@@ -91,7 +91,7 @@ impl Bench {
 }
 
 impl Bench {
-    /// Waits for the stop, which is on its way.
+    /// Waits until the machine is stopped.
     fn is_told_to_stop(&self) {
         let start = Instant::now();
         while !self.machine.is_stopped() {
@@ -136,7 +136,7 @@ fn step(server: &Server, step: &str) -> (u16, Value) {
     post(server, "/api/calibration", &json!({ "step": step }).to_string())
 }
 
-/// The state once it is as it should be; asking for it is attendance.
+/// Waits for a state that satisfies `is_so`. The requests count as attendance.
 fn waited(server: &Server, is_so: impl Fn(&Value) -> bool) -> Value {
     let start = Instant::now();
     loop {
@@ -165,7 +165,7 @@ fn a_machine_is_stopped_gone_on_with_and_ends_in_a_locator() {
     let pressed = waited(&server, |state| state["taken"] == 2);
     assert!(pressed["machine"]["runs"] == true && pressed["machine"]["firmware"] == "Marlin", "{pressed}");
     assert!(pressed["machine"]["x_mm"].is_number() && pressed["machine"]["left_s"].is_number(), "{pressed}");
-    // What would lead a machine past its own press is refused, with what is to be done first.
+    // Steps that would skip a press of the machine are refused, with the required step.
     for refused in ["redo", "skip", "finish"] {
         let (status, answer) = step(&server, refused);
         assert_eq!((status, &answer["help"]), (409, &json!("end it early, or wait until it has ended")));
@@ -197,7 +197,7 @@ fn a_machine_is_stopped_gone_on_with_and_ends_in_a_locator() {
     );
     assert!(check["median_mm"].as_f64().unwrap() < 1.0 && check["covered"].is_u64(), "{check}");
     assert!(!bench.machine.is_stopped() && bench.machine.contact().is_none());
-    // A check that is stopped leaves the locator in use, and measures it by the presses that were taken.
+    // A stopped check leaves the locator in use, and assesses it with the recorded presses.
     assert_eq!(step(&server, "check").0, 200);
     waited(&server, |state| state["phase"] == "checking" && state["taken"] == 2);
     assert_eq!(post(&server, "/api/emergency-stop", "{}").0, 200);
@@ -225,7 +225,7 @@ fn a_machine_that_ends_early_lifts_its_finger() {
 #[test]
 fn a_machine_that_nobody_watches_lifts_its_finger_and_ends() {
     let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::start());
-    // More presses than fit into the time after which nobody is there.
+    // More presses than fit into the time after which the user counts as absent.
     let rig = rig_with_repeats(20);
     let (live, server) = served_rig(rig, folder.path(), &bench.from, Some(&bench.stage));
     step(&server, "begin");
@@ -248,7 +248,7 @@ fn a_server_that_ends_stops_the_machine() {
     bench.is_told_to_stop();
 }
 
-/// A machine that takes the way down and never says that it is there; its lines with the instants at which they came.
+/// A machine that starts the descent and never confirms it. Returns its lines with the instants of their arrival.
 fn stuck_machine() -> (String, Receiver<(Instant, String)>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("gcode:tcp://{}", listener.local_addr().unwrap());
@@ -280,7 +280,7 @@ fn a_stop_reaches_a_machine_that_is_in_the_middle_of_a_press() {
     step(&server, "begin");
     while !lines.recv_timeout(PATIENCE).unwrap().1.starts_with("G1 Z21") {}
     assert_eq!(lines.recv_timeout(PATIENCE).unwrap().1, "M400");
-    // As many requests as the server takes in a second do not hold up the one that stops.
+    // A full second of requests must not delay the stop request.
     while post(&server, "/api/mark", "{}").0 != 429 {}
     let asked = Instant::now();
     assert_eq!(post(&server, "/api/emergency-stop", "").0, 200);
@@ -293,13 +293,13 @@ fn a_stop_reaches_a_machine_that_is_in_the_middle_of_a_press() {
     live.end();
 }
 
-/// A fault of a machine in the middle of a run, and what the page says of it.
+/// A fault of a machine in the middle of a run, with the message of the page.
 struct FaultCase {
     config: String,
-    /// Words of the problem, of Marlin and of GRBL.
+    /// Text of the problem, for Marlin and for GRBL.
     words: [&'static str; 2],
     finger: &'static str,
-    /// Presses that were taken before.
+    /// Presses recorded before the fault.
     taken: usize,
 }
 
@@ -338,7 +338,7 @@ fn fault_cases(firmware: Firmware) -> Vec<FaultCase> {
     ]
 }
 
-/// Every kind of fault, of either firmware, from the browser: the page quotes the line, and no row is of a press that did not happen.
+/// Every kind of fault, of either firmware, from the browser: the page quotes the line, and every row belongs to a press that happened.
 #[test]
 fn fault_of_a_machine_ends_the_run_with_its_words() {
     let runs = [Firmware::Marlin, Firmware::Grbl].into_iter().enumerate().flat_map(|(of, firmware)| {
@@ -367,7 +367,7 @@ fn ends_with_its_words(firmware: Firmware, case: &FaultCase, words: &str) {
     live.end();
 }
 
-/// A board that is reset while its finger rests on the surface is not driven on.
+/// After a reset while the finger rests on the surface, the machine gets no further moves.
 #[test]
 fn reset_at_rest_ends_the_run() {
     of_both_firmwares(|firmware| {
@@ -384,7 +384,7 @@ fn reset_at_rest_ends_the_run() {
     });
 }
 
-/// Homing that takes longer than any other answer, with the `busy` of Marlin and the silence of GRBL, is waited for.
+/// The server waits for slow homing, with `busy` messages of Marlin and the silence of GRBL.
 #[test]
 fn slow_homing_is_waited_for() {
     of_both_firmwares(|firmware| {
@@ -398,13 +398,13 @@ fn slow_homing_is_waited_for() {
     });
 }
 
-/// Does the same with either firmware, both at once: their time is waiting.
+/// Runs a test with both firmwares in parallel, because it mostly waits.
 fn of_both_firmwares(test: fn(Firmware)) {
     let runs = [Firmware::Marlin, Firmware::Grbl].map(|firmware| std::thread::spawn(move || test(firmware)));
     runs.into_iter().for_each(|run| run.join().unwrap());
 }
 
-/// A dry run, jogs and a touch-off from the browser, whose height the presses use.
+/// A dry run, jogs and a touch-off from the browser. The presses use the height of the touch-off.
 #[test]
 fn a_machine_is_set_up_before_its_presses() {
     of_both_firmwares(|firmware| {
@@ -444,7 +444,7 @@ fn a_machine_is_set_up_before_its_presses() {
     });
 }
 
-/// A touch-off is stopped as presses are: by the button at once, by a fault with its words, and where nobody watches with its finger up.
+/// A touch-off is stopped as presses are: by the button at once, by a fault with its message, and for an absent user with its finger up.
 #[test]
 fn a_machine_that_is_set_up_stops_as_one_that_presses() {
     of_both_firmwares(|firmware| {

@@ -1,4 +1,4 @@
-//! Each route as it should be asked, and as it should not.
+//! Each route with valid and with invalid requests.
 
 use crate::client::{ask, follow, get, next, post};
 use palpate_estimators::fit::{Fit, FitTask};
@@ -16,12 +16,12 @@ use tungstenite::Message;
 const RIG: &str = include_str!("../../../../examples/noisy-beam.toml");
 const TOKEN: &str = "0123456789abcdef";
 
-/// A served simulated board of 1,000 readings a second, whose session has not begun.
+/// A server with a simulated board of 1,000 readings per second, before the session has begun.
 fn served(token: Option<&str>) -> (Arc<Live>, Server) {
     served_with(token, Vec::new())
 }
 
-/// The same with these sinks beside browsers.
+/// A server as from [`served`], with these sinks beside browsers.
 pub fn served_with(token: Option<&str>, sinks: Vec<OpenSink>) -> (Arc<Live>, Server) {
     let rig = Rig::from_toml(RIG).unwrap();
     let recording = rig.simulate(0).unwrap();
@@ -43,7 +43,7 @@ fn a_browser_begins_the_simulated_board_and_follows_it() {
     assert_eq!(session["surface"]["supports"][1], json!({ "at_mm": 400.0, "kind": "simple" }));
     assert_eq!(session["channels"].as_array().unwrap().len(), 8);
     assert_eq!(session["limit"]["sd_mm"].as_array().unwrap().len(), 399);
-    // Before there is a session, there is nothing to tare.
+    // A tare without a session is refused.
     assert_eq!(post(&server, "/api/tare", "{}").0, 409);
 
     let mut socket = follow(&server, "", None).unwrap();
@@ -67,7 +67,7 @@ fn a_browser_begins_the_simulated_board_and_follows_it() {
     for expected in ["source_opened", "mark", "tared"] {
         assert!(events.iter().any(|event| event == expected), "{expected}: {events:?}");
     }
-    // Begun anew, it counts from 0 for the same browser.
+    // A new session counts from 0 for the same browser.
     assert_eq!(post(&server, "/api/source", r#"{"url":"simulated"}"#).0, 200);
     let begins = Instant::now();
     while next(&mut socket)["samples"].as_array().unwrap().iter().all(|sample| sample["number"] != 0) {
@@ -148,7 +148,7 @@ fn a_token_is_asked_for() {
     assert_eq!(ask(&server, "POST", "/api/tare", &[("Authorization", &bearer)], "{}").0, 409);
     assert!(follow(&server, "", None).is_err());
     follow(&server, &format!("?token={TOKEN}"), None).unwrap();
-    // The page itself tells nothing of the session.
+    // The page itself contains no data of the session.
     assert_eq!(ask(&server, "GET", "/", &[], "").0, 200);
 }
 
@@ -315,7 +315,7 @@ fn a_page_that_is_loaded_again_gets_the_past_of_the_session() {
     assert!(times.windows(2).all(|pair| (pair[1] * 10.0).floor() > (pair[0] * 10.0).floor()), "{times:?}");
     assert_eq!(samples[0]["reading"].as_array().unwrap().len(), 8);
     assert!(past["events"].as_array().unwrap().iter().any(|event| event["text"] == "here"), "{past}");
-    // Another session has a past of its own.
+    // Another session has a separate history.
     assert_eq!(post(&server, "/api/source", r#"{"url":"simulated"}"#).0, 200);
     let (_, past) = get(&server, "/api/history");
     assert!(!past["events"].as_array().unwrap().iter().any(|event| event["text"] == "here"), "{past}");

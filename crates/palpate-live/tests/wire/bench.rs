@@ -1,4 +1,4 @@
-//! A session of a simulated board, whose outputs go to a sink.
+//! A session of a simulated board that sends its outputs to a sink.
 
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
@@ -14,7 +14,7 @@ use std::time::Duration;
 
 const RIG: &str = include_str!("../../../../examples/noisy-beam.toml");
 
-/// Longest time that anything may take on a machine that has other things to do.
+/// Timeout of all waits, for a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(30);
 
 /// A rig and its locator.
@@ -42,7 +42,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Sends so many frames of the board through the session into a sink; the batches that came of them.
+    /// Sends frames of the board through the session into a sink. Returns their batches.
     pub fn send(&mut self, frames: usize, sink: &mut impl Sink) -> Vec<Arc<Batch>> {
         let mut batches = Vec::new();
         for _ in 0..frames {
@@ -60,7 +60,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// The next trouble that a sink tells.
+/// The next problem that a sink reports.
 pub fn trouble(told: &Receiver<Input>) -> String {
     match told.recv_timeout(PATIENCE) {
         Ok(Input::Command(Command::Trouble(text))) => text,

@@ -1,4 +1,4 @@
-//! Foxglove's WebSocket, followed as the app follows it.
+//! Foxglove's WebSocket, with a client that acts as the app.
 
 use crate::bench::{Bench, PATIENCE, fitted};
 use foxglove::Decode;
@@ -35,7 +35,7 @@ fn connect(address: SocketAddr, protocol: &str) -> Result<WebSocket<TcpStream>, 
 }
 
 impl App {
-    /// Connects, and subscribes to so many topics as soon as they are there.
+    /// Connects, and subscribes to `count` topics as soon as they are announced.
     fn follow(address: SocketAddr, count: usize) -> Self {
         let mut app = Self { socket: connect(address, PROTOCOL).unwrap(), topics: BTreeMap::new() };
         assert_eq!(app.text()["name"], "palpate");
@@ -63,7 +63,7 @@ impl App {
         }
     }
 
-    /// Topic, time and bytes of the next message of a topic; `None` where none comes for so long.
+    /// Topic, time and bytes of the next message of a topic; `None` if no message comes within `time`.
     fn next_within(&mut self, time: Duration) -> Option<(String, u64, Vec<u8>)> {
         self.socket.get_ref().set_read_timeout(Some(time)).unwrap();
         loop {
@@ -86,7 +86,7 @@ impl App {
         self.next_within(PATIENCE).expect("a message")
     }
 
-    /// Waits until messages arrive: the server knows of a subscription a moment after it was sent.
+    /// Waits until messages arrive: the server processes a subscription with a delay.
     fn until_heard(&mut self, bench: &mut Bench<'_>, sink: &mut FoxgloveSink) {
         let start = Instant::now();
         while self.next_within(Duration::from_millis(50)).is_none() {
@@ -188,7 +188,7 @@ fn the_app_gets_every_reading_estimate_event_and_scene() {
     assert!(located > 300 && untouched > 300, "{located} {untouched}");
 }
 
-/// The next message that is of no event; events are counted.
+/// The next message other than an event; events are counted.
 fn next_of_sample(app: &mut App, told_events: &mut usize) -> (String, u64, Vec<u8>) {
     loop {
         let next = app.next();
@@ -221,7 +221,7 @@ fn a_session_that_begins_anew_keeps_the_topics() {
     });
     assert_eq!(readings.count(), samples);
     drop(server);
-    // The app is told of the end: it does not wait for its patience.
+    // The app is informed of the end: it does not wait for a timeout.
     let start = Instant::now();
     while app.socket.read().is_ok() {}
     assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
@@ -258,7 +258,7 @@ fn what_cannot_be_served_is_refused() {
     assert!(error.contains("192.0.2.1:8765"), "{error}");
     let server = FoxgloveServer::start(loopback()).unwrap();
     assert!(connect(server.address(), "graphql-ws").is_err());
-    // What a client sends reaches nobody.
+    // Messages of a client have no effect.
     let mut app = App { socket: connect(server.address(), PROTOCOL).unwrap(), topics: BTreeMap::new() };
     app.text();
     for text in ["", "{", "[]", r#"{"op":"subscribe"}"#, r#"{"op":"setParameters","parameters":[]}"#] {

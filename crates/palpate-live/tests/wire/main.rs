@@ -1,4 +1,4 @@
-//! The sinks whose dependencies take minutes to compile, over real parts: Zenoh routers and WebSockets. `cargo xtask wire` runs them.
+//! Tests of the sinks with slow-to-compile dependencies, over real Zenoh routers and WebSockets. `cargo xtask wire` runs them.
 #![forbid(unsafe_code)]
 
 mod bench;

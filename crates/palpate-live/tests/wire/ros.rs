@@ -1,4 +1,4 @@
-//! ROS 2 through Zenoh: a router and a subscriber over TCP, as nodes of `rmw_zenoh_cpp` have them.
+//! ROS 2 through Zenoh: a router and a subscriber over TCP, as for nodes of `rmw_zenoh_cpp`.
 
 use crate::bench::{Bench, PATIENCE, fitted, trouble};
 use palpate_live::sink::Batch;
@@ -14,7 +14,7 @@ fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
-/// A session of Zenoh that finds others by nothing but these settings; tried until the port is free.
+/// A Zenoh session that finds others by these settings alone; tried until the port is free.
 fn zenoh(mode: &str, settings: &str, port: u16) -> Session {
     let start = Instant::now();
     loop {
@@ -30,7 +30,7 @@ fn zenoh(mode: &str, settings: &str, port: u16) -> Session {
     }
 }
 
-/// A client of the router, what it is sent, and the tokens that come and go.
+/// A client of the router, with the messages and the tokens that it receives.
 struct Subscriber {
     _session: Session,
     messages: Receiver<Sample>,
@@ -58,7 +58,7 @@ impl Subscriber {
         self.messages.recv_timeout(PATIENCE).unwrap()
     }
 
-    /// The next tokens that come or go.
+    /// The next tokens that appear or disappear.
     fn next_tokens(&self, count: usize, kind: SampleKind) -> Vec<String> {
         let mut tokens: Vec<String> = (0..count)
             .map(|_| {
@@ -80,14 +80,14 @@ fn attachment(sample: &Sample) -> (i64, i64, [u8; 16]) {
     (number(0..8), number(8..16), bytes[17..].try_into().unwrap())
 }
 
-/// What follows from batches, as [`messages`] says, whose bytes `rosbags` reads.
+/// Messages of batches from [`messages`]; `rosbags` reads their bytes in another test.
 fn expected(batches: &[Arc<Batch>], url: &RosUrl, bench: &Bench<'_>) -> Vec<RosMessage> {
     let outputs = batches.iter().flat_map(|batch| &batch.outputs);
     let (channels, extent) = (bench.session.channels(), bench.session.extent());
     outputs.flat_map(|output| messages(output, &url.frame, channels, extent)).collect()
 }
 
-/// Waits until messages arrive: a publisher knows of a subscriber a moment after that has subscribed.
+/// Waits until messages arrive: a publisher detects a new subscriber with a delay.
 fn until_heard(bench: &mut Bench<'_>, sink: &mut RosSink, subscriber: &Subscriber) {
     let start = Instant::now();
     while subscriber.messages.try_recv().is_err() {
@@ -107,7 +107,7 @@ fn nodes_get_every_message_and_a_router_that_begins_anew_is_found_again() {
     let (reports, told) = sync_channel(64);
     let mut sink = RosSink::new(&url, bench.session.channels(), bench.session.extent(), reports).unwrap();
 
-    // Before there is a router, all is lost, and that is said once.
+    // Without a router all messages are lost, and this is reported once.
     let text = trouble(&told);
     assert!(text.contains(&format!("tcp/127.0.0.1:{port} cannot be reached")), "{text}");
     let early: usize = bench.send(50, &mut sink).iter().map(|batch| batch.outputs.len()).sum();
@@ -152,7 +152,7 @@ fn nodes_get_every_message_and_a_router_that_begins_anew_is_found_again() {
     }
     assert_eq!((publishers.len(), sink.lost()), (TOPICS.len(), early as u64));
 
-    // The router goes, and another begins at its address.
+    // The router ends, and another begins at its address.
     drop(subscriber);
     router.close().wait().unwrap();
     let text = trouble(&told);
@@ -166,7 +166,7 @@ fn nodes_get_every_message_and_a_router_that_begins_anew_is_found_again() {
     assert_eq!(subscriber.next_tokens(1 + TOPICS.len(), SampleKind::Put), tokens);
     until_heard(&mut bench, &mut sink, &subscriber);
 
-    // Nodes hear of the end at once.
+    // Nodes are informed of the end at once.
     let start = Instant::now();
     drop(sink);
     let took = start.elapsed();
@@ -201,7 +201,7 @@ fn a_sink_ends_soon_whoever_does_not_answer() {
     let (rig, locator) = fitted();
     let mut bench = Bench::new(&rig, &locator);
     for router in [
-        // Nobody answers at an address for documentation (RFC 5737); nobody takes what is sent to the listener.
+        // No host answers at an address for documentation (RFC 5737); the listener never reads.
         "tcp/192.0.2.1".to_owned(),
         format!("tcp/{}", silent.local_addr().unwrap()),
         "tcp/no-such-host.invalid".to_owned(),

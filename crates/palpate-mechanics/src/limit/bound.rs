@@ -1,10 +1,10 @@
-//! Fisher information of a few parameters, and the Cramér–Rao bound at one contact that follows from it.
+//! Fisher information of a few parameters, and the resulting Cramér–Rao bound at one contact.
 //!
-//! Readings with independent Gaussian noise, each divided by the standard deviation of its noise, have the Fisher
-//! information F = JᵀJ, where J holds the derivative of every reading (rows) with respect to every parameter (columns).
+//! Readings with independent Gaussian noise are divided by the standard deviation of their noise. Their Fisher information is F = JᵀJ.
+//! J contains the derivative of every reading (rows) with respect to every parameter (columns).
 //! No unbiased estimator has a covariance below F⁻¹ (Kay, *Fundamentals of Statistical Signal Processing: Estimation
-//! Theory*, 1993, section 3.9). F itself is never formed: with J = Q·R it is Rᵀ·R, and R keeps the digits that
-//! squaring loses where two columns are nearly parallel, as those of force and position are near a support.
+//! Theory*, 1993, section 3.9). F itself is never formed: with J = Q·R it is Rᵀ·R. R keeps the digits that
+//! squaring loses where two columns are nearly parallel, as those of force and position near a support.
 
 use std::f64::consts::FRAC_2_PI;
 
@@ -12,14 +12,14 @@ use serde::Serialize;
 
 use palpate_numerics::small::{Ldl, Matrix, add_multiple, dot, principal_variances};
 
-/// The Cramér–Rao bound at one contact: what no unbiased estimator can beat there.
+/// The Cramér–Rao bound at one contact, for unbiased estimators.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bound {
     /// Least standard deviation of the position along the length, in metres.
     pub sd_x_m: f64,
-    /// The same across the width; 0 on a one-dimensional surface.
+    /// Least standard deviation of the position across the width, in metres; 0 on a one-dimensional surface.
     pub sd_y_m: f64,
-    /// Covariance of the two, in m².
+    /// Covariance of the errors along and across, in m².
     pub covariance_xy_m2: f64,
     /// Least standard deviation of the force, in newtons; `None` where the force is known.
     pub sd_force_n: Option<f64>,
@@ -28,8 +28,8 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// The bound of readings with independent noise of variance 1, from their derivatives along and across, per metre; the
-    /// force is known. `None` where they do not tell the place.
+    /// The bound of readings with independent noise of variance 1, from their derivatives along and across, per metre, for a
+    /// known force. `None` where they do not determine the position.
     pub fn of_columns(columns: [Vec<f64>; 2]) -> Option<Self> {
         Some(Self::new(inverse_information(columns)?, None))
     }
@@ -48,7 +48,7 @@ impl Bound {
     /// Mean distance of estimate and contact, in metres, for an efficient estimator with Gaussian errors.
     ///
     /// s₁·√(2/π)·E(1 − s₂²/s₁²), where s₁ ≥ s₂ are the standard deviations along the principal axes and E is the complete
-    /// elliptic integral of the second kind. On a one-dimensional surface s₂ = 0, E = 1, and it is σ·√(2/π).
+    /// elliptic integral of the second kind. On a one-dimensional surface s₂ = 0 and E = 1, so it is σ·√(2/π).
     pub fn mean_error_m(&self) -> f64 {
         let (xx, yy) = (self.sd_x_m * self.sd_x_m, self.sd_y_m * self.sd_y_m);
         let [larger, smaller] = principal_variances([xx, self.covariance_xy_m2, yy]);
@@ -78,8 +78,8 @@ fn elliptic_e(complement: f64) -> f64 {
     std::f64::consts::FRAC_PI_2 / a * (1.0 - sum)
 }
 
-/// A column that the columns before it explain to within this share of its length says nothing of its own: derivatives
-/// taken by differences are precise to 10⁻¹⁰, so what is left is rounding.
+/// A column adds no information when the columns before it explain all but this share of its length: numerical derivatives are
+/// precise to 10⁻¹⁰, so the remainder is rounding error.
 const EXPLAINED: f64 = 1e-9;
 
 /// F⁻¹ for the columns of J, P by P, in their order; `None` where F is singular to rounding.
@@ -134,7 +134,7 @@ mod tests {
         assert!((line.mean_error_m() - 2e-3 * (2.0 / PI).sqrt()).abs() < 1e-12);
         let round = Bound::new([[4e-6, 0.0], [0.0, 4e-6]], None);
         assert!((round.mean_error_m() - 2e-3 * (PI / 2.0).sqrt()).abs() < 1e-12);
-        // The same ellipse, turned.
+        // The first ellipse, rotated.
         let along = Bound::new([[9e-6, 0.0], [0.0, 1e-6]], None);
         let turned = Bound::new([[5e-6, 4e-6], [4e-6, 5e-6]], None);
         assert!((along.mean_error_m() - turned.mean_error_m()).abs() < 1e-12);

@@ -11,7 +11,7 @@ use palpate_numerics::{mean, percentile};
 pub struct LimitPoint {
     /// Position of the contact.
     pub position: Position,
-    /// The bound there; `None` where the readings do not tell the position.
+    /// The bound there; `None` where the readings do not determine the position.
     pub bound: Option<Bound>,
 }
 
@@ -37,7 +37,7 @@ pub struct LimitPoint {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct LimitCurve {
-    /// The surface.
+    /// Extent of the surface.
     pub extent: Extent,
     /// The contact force, in newtons.
     pub force_n: f64,
@@ -47,7 +47,7 @@ pub struct LimitCurve {
     pub points: Vec<LimitPoint>,
 }
 
-/// A curve in short, over the positions where there is a bound. Limits are standard deviations.
+/// Summary of a curve, over the positions with a bound. Limits are standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitSummary {
     /// Mean limit, in metres.
@@ -56,18 +56,18 @@ pub struct LimitSummary {
     pub median_m: f64,
     /// Mean over the positions of the mean error of an estimator at the limit (σ·√(2/π) on a line), in metres.
     pub mean_error_m: f64,
-    /// Smallest limit, in metres, and where it is.
+    /// Position and value of the smallest limit, in metres.
     pub best: (Position, f64),
-    /// Largest limit, in metres, and where it is.
+    /// Position and value of the largest limit, in metres.
     pub worst: (Position, f64),
-    /// Positions without a bound.
+    /// Number of positions without a bound.
     pub without: usize,
 }
 
-/// Positions of a surface `every_m` (metres) apart, the first of them `every_m` from the edge.
+/// Positions on a surface `every_m` (metres) apart, the first of them `every_m` from the edge.
 ///
 /// # Errors
-/// [`LimitError::Positions`] where those are none or more than 100,000.
+/// [`LimitError::Positions`] for no position or more than 100,000.
 pub fn positions_with_spacing(extent: Extent, every_m: f64) -> Result<Vec<Position>, LimitError> {
     Ok(Grid::with_spacing(extent, every_m)?.positions)
 }
@@ -97,7 +97,7 @@ impl LimitCurve {
         Ok(Self { extent: limit.extent, force_n, force, points: positions.iter().map(point).collect() })
     }
 
-    /// A figure of the bound by x in metres, from left to right; on a plane its mean across the width. NaN where there is no bound.
+    /// `figure` of the bound by x in metres, from left to right; on a plane the mean across the width. NaN where no bound exists.
     pub fn by_x(&self, figure: impl Fn(&Bound) -> f64) -> Vec<(f64, f64)> {
         let mut points: Vec<&LimitPoint> = self.points.iter().collect();
         points.sort_by(|a, b| a.position.x_m.total_cmp(&b.position.x_m));
@@ -109,7 +109,7 @@ impl LimitCurve {
         columns.map(|column| (column[0].position.x_m, mean(column))).collect()
     }
 
-    /// "1 of 399 positions, 0.3 %, at 12000 mm": those without a bound, in words; `None` where there is none.
+    /// The positions without a bound as text: "1 of 399 positions, 0.3 %, at 12000 mm"; `None` where all have one.
     pub fn not_told_in_words(&self) -> Option<String> {
         const MOST_NAMED: usize = 3;
         let places: Vec<String> = self
@@ -127,7 +127,7 @@ impl LimitCurve {
         }
     }
 
-    /// The curve in short; `None` where no position has a bound.
+    /// Summary of the curve; `None` where no position has a bound.
     pub fn summary(&self) -> Option<LimitSummary> {
         let mut bounds: Vec<(Position, Bound)> =
             self.points.iter().filter_map(|point| Some((point.position, point.bound?))).collect();

@@ -1,14 +1,14 @@
 //! The limit: the Cramér–Rao bound of contact position and force for a surface, its layout and its noise.
 //!
-//! Sensor i reads y_i(a, W) plus independent Gaussian noise of variance σ_i² + q_i²/12, where a is the contact
-//! position, W its force, y_i the sensor's response function (W·f_i(a), with f_i its influence function, on a surface that
-//! bends little), σ_i its noise and q_i its resolution (quantisation as noise
-//! of variance q²/12: Widrow and Kollár, *Quantization Noise*, 2008). For a known force on a line the bound is
-//! 1/√(Σ_i (∂y_i/∂a/σ_i)²); an unknown force is estimated along and costs part of that information.
+//! Sensor i reads y_i(a, W) plus independent Gaussian noise of variance σ_i² + q_i²/12. Here a is the contact
+//! position, W the force, y_i the sensor's response function, σ_i its noise and q_i its resolution (quantisation as noise
+//! of variance q²/12: Widrow and Kollár, *Quantization Noise*, 2008). On a surface that bends little y_i = W·f_i(a), with the
+//! influence function f_i. For a known force on a line the bound is
+//! 1/√(Σ_i (∂y_i/∂a/σ_i)²). An unknown force is estimated with the position, at the cost of part of that information.
 //!
-//! Left out: dead channels, and those that are saturated at the contact. Not counted: gain and offset errors, which
-//! calibration removes. The bound is one of unbiased estimators and small errors; where it nears the size of the surface it
-//! says "blind" and no more, and that two contacts far apart may read alike is for [`LimitWarning`] to say.
+//! The bound ignores dead channels, and those that are saturated at the contact. It does not include gain and offset errors, which
+//! calibration removes. It is valid for unbiased estimators and small errors. Where it nears the size of the surface, its value means
+//! "blind" and no more. [`LimitWarning`] reports distant contacts with nearly equal readings.
 
 mod bound;
 mod curve;
@@ -33,11 +33,11 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use responses::Responses;
 use zone::Grid;
 
-/// Knowledge of the contact force: given, or estimated along.
+/// Knowledge of the contact force: given, or estimated with the position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Force {
-    /// Value.
+    /// The force is given.
     Known,
     /// The force is estimated together with the position.
     Unknown,
@@ -53,22 +53,22 @@ impl Force {
     }
 }
 
-/// A surface with the sensors that are alive and the noise of each.
+/// A surface with its active sensors and their noise.
 #[derive(Clone)]
 pub struct CramerRaoBound<'a> {
     extent: Extent,
-    /// The mechanics, where there are some.
+    /// The mechanics; `None` for a surface without a model.
     model: Option<&'a dyn Surface>,
     channels: Vec<Channel>,
     responses: Responses<'a>,
-    /// Length of the whitened reading of a newton where all sensors read their most.
+    /// Norm of the whitened readings per newton, with every sensor at its full scale.
     full_scale: f64,
 }
 
-/// Share of the full scale below which a contact, or a step of it by the length of the surface, changes readings by no more than rounding.
+/// Share of the full scale below which readings, or their change over the length of the surface, are rounding errors.
 const SILENT: f64 = 1e-9;
 
-/// A live sensor.
+/// An active sensor.
 #[derive(Clone)]
 struct Channel {
     /// Number of the sensor in the layout, from 0.
@@ -80,22 +80,22 @@ struct Channel {
 }
 
 impl<'a> CramerRaoBound<'a> {
-    /// The limit of a surface read by `layout`; dead channels are left out.
+    /// The limit of a surface with the sensors of `layout`, except dead ones.
     ///
-    /// Of more than 1,500 sensors on a plate no influence functions are kept: each contact is solved for, as [`CramerRaoBound::prepare`]
-    /// does for those all over the surface.
+    /// For more than 1,500 sensors on a plate no influence functions are stored. Each contact is then solved for, as
+    /// [`CramerRaoBound::prepare`] does for contacts all over the surface.
     ///
     /// # Errors
-    /// [`LimitError::Noise`] for a live sensor with neither noise nor resolution, or when none is alive; [`LimitError::Surface`] for a
-    /// surface whose equations have no solution in balance.
+    /// [`LimitError::Noise`] for an active sensor with neither noise nor resolution, or when no sensor is active; [`LimitError::Surface`] when
+    /// the equations of the surface have no balanced solution.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LimitError> {
         Self::new_watched(surface, layout, Watch::NONE)
     }
 
-    /// The same, watched while sensors are solved for.
+    /// The limit as in [`CramerRaoBound::new`], watched during the solutions for the sensors.
     ///
     /// # Errors
-    /// Those of [`CramerRaoBound::new`], and [`LimitError::Cancelled`].
+    /// The errors of [`CramerRaoBound::new`], and [`LimitError::Cancelled`].
     pub fn new_watched(surface: &'a dyn Surface, layout: &Layout, watch: Watch) -> Result<Self, LimitError> {
         let channel = |(index, (sensor, sd)): (usize, (&Sensor, Option<f64>))| {
             Some(Channel { index, kind: sensor.kind, sd: sd?, range: sensor.channel.range })
@@ -115,8 +115,8 @@ impl<'a> CramerRaoBound<'a> {
         })
     }
 
-    /// The limit of a surface without a model, from what each of its channels reads over the standard deviation of its noise, as a
-    /// recording told it.
+    /// The limit of a surface without a model. Each response is that of one channel over the standard deviation of its noise, both from a
+    /// recording.
     ///
     /// ```
     /// use palpate_mechanics::contact::{Contact, Position};
@@ -157,14 +157,14 @@ impl<'a> CramerRaoBound<'a> {
         Self { extent, model: None, channels, responses, full_scale }
     }
 
-    /// Work and memory of the limit of a surface read by `layout`, all over it and at so many other contacts.
+    /// Work and memory of the limit of a surface with the sensors of `layout`, all over it and at `others` further contacts.
     pub fn cost(surface: &dyn Surface, layout: &Layout, others: usize) -> LimitCost {
         let alive = layout.sensors().iter().filter(|sensor| !sensor.channel.dead).count();
         Responses::cost(surface, alive, Grid::over_surface(surface.extent()).positions.len() + others)
     }
 
-    /// Solves for contacts all over the surface, which curves and warnings ask of, and for others, so that they need not be solved for
-    /// one by one. Only of many sensors there is anything to do.
+    /// Solves in advance for contacts all over the surface, which curves and warnings use, and for `others`. Only for many sensors does this
+    /// do any work.
     ///
     /// # Errors
     /// [`Cancelled`] when the work is to stop.
@@ -173,19 +173,19 @@ impl<'a> CramerRaoBound<'a> {
         self.responses.prepare(&positions, watch)
     }
 
-    /// The surface that is touched.
+    /// The extent of the surface.
     pub fn extent(&self) -> Extent {
         self.extent
     }
 
-    /// Number of sensors that are alive.
+    /// Number of active sensors.
     pub fn alive(&self) -> usize {
         self.channels.len()
     }
 
-    /// The bound at a contact; `None` where the readings do not tell the position at all, which is where the Fisher
-    /// information is singular to rounding: no force, no sensor that notices, or a change of position that a change of force undoes. Over a
-    /// support nothing is read, however hard the touch: a force that is not known, and a position with it, is not told.
+    /// The bound at a contact; `None` where the readings do not determine the position: the Fisher information is singular to rounding.
+    /// Reasons are a zero force, the lack of a sensitive sensor, or a change of position that a change of force cancels. Over a
+    /// support the readings respond to no force, so an unknown force is undetermined there, and the position with it.
     pub fn bound_at(&self, contact: Contact, force: Force) -> Option<Bound> {
         let Columns { force: by_force, along, across } = self.derivatives(contact);
         let least = SILENT * self.full_scale;
@@ -215,12 +215,12 @@ impl<'a> CramerRaoBound<'a> {
         }
     }
 
-    /// Each live sensor's reading at a contact, without noise, over the standard deviation of its noise.
+    /// Noise-free reading of each active sensor at a contact, over the standard deviation of its noise.
     pub fn whitened_reading(&self, contact: Contact) -> Vec<f64> {
         self.whitened_readings(&[contact.position], contact.force_n).pop().unwrap_or_default()
     }
 
-    /// The same at several contacts of one force, which are solved for together.
+    /// Whitened readings at several contacts of one force, which are solved for together.
     fn whitened_readings(&self, positions: &[Position], force_n: f64) -> Vec<Vec<f64>> {
         let mut each = self.responses.readings(positions, force_n);
         for readings in &mut each {
@@ -231,17 +231,17 @@ impl<'a> CramerRaoBound<'a> {
         each
     }
 
-    /// Number of each live sensor in the layout, from 0, with the standard deviation of its noise by which readings are whitened.
+    /// Index of each active sensor in the layout, from 0, and the standard deviation of its noise, which whitens its readings.
     pub fn noise_sds(&self) -> Vec<(usize, f64)> {
         self.channels.iter().map(|channel| (channel.index, channel.sd)).collect()
     }
 
-    /// Length of the whitened reading: how many standard deviations a touch stands out of the noise.
+    /// Norm of the whitened readings: the signal of a touch in standard deviations of the noise.
     pub fn signal_to_noise(&self, contact: Contact) -> f64 {
         norm(&self.whitened_reading(contact))
     }
 
-    /// Derivatives of the whitened readings; those of saturated channels are 0.
+    /// Derivatives of the whitened readings; 0 for saturated channels.
     fn derivatives(&self, contact: Contact) -> Columns {
         let mut columns = Columns::default();
         let mut across = Vec::new();
@@ -261,7 +261,7 @@ impl<'a> CramerRaoBound<'a> {
 }
 
 impl Channel {
-    /// A reading, held at the ends of the range.
+    /// A reading, clamped to the range.
     fn held(&self, reading: f64) -> f64 {
         self.range.map_or(reading, |(low, high)| reading.max(low).min(high))
     }
@@ -275,13 +275,13 @@ struct Columns {
     across: Option<Vec<f64>>,
 }
 
-/// Error of a bench for which there is no bound.
+/// Error of a bench without a bound.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LimitError {
     /// The surface has no model.
-    #[error("a measured surface has no model, and without influence functions there is no limit to compute")]
+    #[error("a measured surface has no model, and without influence functions its limit cannot be computed")]
     NoModel,
-    /// The noise is singular, and the limit would be 0; or no sensor is alive.
+    /// The noise is singular, and the limit would be 0; or no sensor is active.
     #[error(transparent)]
     Noise(#[from] NoiseError),
     /// The contact force is not a positive, finite number.
@@ -290,26 +290,26 @@ pub enum LimitError {
         /// The force, in newtons.
         force_n: f64,
     },
-    /// The force is nowhere given.
+    /// No force is given.
     #[error("the limit depends on the contact force, and none is given")]
     NoForce,
     /// Too few or too many positions.
     #[error("the limit is asked for at {count} positions; there must be at least 1 and at most {most}")]
     Positions {
-        /// Number that was asked for.
+        /// Requested number.
         count: f64,
-        /// The most.
+        /// Largest number.
         most: usize,
     },
-    /// The equations of the surface have no solution that is in balance.
+    /// The equations of the surface have no balanced solution.
     #[error("the equations of the surface could not be solved: {0}")]
     Surface(#[from] Unsolvable),
-    /// Whoever watched the work stopped it.
+    /// The watch stopped the work.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
 
-/// Refuses a force for which there is no limit.
+/// Refuses a force that is not positive and finite.
 fn check_force(force_n: f64) -> Result<(), LimitError> {
     if force_n > 0.0 && force_n.is_finite() { Ok(()) } else { Err(LimitError::Force { force_n }) }
 }

@@ -1,7 +1,8 @@
-//! Readings of the sensors of a limit under a contact, and their derivatives by its position.
+//! Readings of the sensors of a limit under a contact, and their derivatives with respect to its position.
 //!
-//! Few sensors have a response function each. Of many on a surface that is solved by elements those would fill the memory and take
-//! as many solutions; by reciprocity three solutions for a contact tell what all of them read there and its derivatives, and these are kept.
+//! Each of a few sensors has a response function. For many sensors on a surface of finite elements these functions would fill the memory
+//! and take as many solutions. By reciprocity three solutions for a contact give the readings of all sensors and their derivatives, which
+//! are cached.
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -15,29 +16,29 @@ use crate::surface::{
 use palpate_numerics::small::add_multiple;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// More sensors than this are solved for by contact: about as many as solutions for the contacts of a whole plane.
+/// Largest number of sensors with response functions: about as many as solutions for the contacts of a whole plane.
 const MOST_FUNCTIONS: usize = 1500;
-/// Bytes of what is kept of contacts, at most.
+/// Largest memory of cached contacts, in bytes.
 const MOST_KEPT: usize = 256 << 20;
-/// Sensors that are solved for between two questions whether to go on: as many as a plate solves for in one sweep.
+/// Sensors that are solved for between two checks of the watch: as many as a plate solves for in one sweep.
 const SOLVED_TOGETHER: usize = 24;
-/// Bytes of readings under loads on degrees of freedom, at most.
+/// Largest memory of readings under loads on degrees of freedom, in bytes.
 const MOST_OF_DEGREES: usize = 192 << 20;
 
-/// Solutions that the search for contacts that read alike may need for others than those all over the surface, as a multiple of these.
+/// Largest number of further solutions in the search for twins, as a multiple of the solutions all over the surface.
 const MOST_SOLUTIONS: f64 = 12.0;
 
-/// Work and memory of a limit all over a surface, by an estimate.
+/// Estimated work and memory of a limit all over a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitCost {
     /// Memory, in bytes.
     pub memory_bytes: f64,
-    /// Time of the solutions, at least and at most, in seconds of a core of some 3 GHz: for how many contacts the search for those that read
-    /// alike solves is known when it has ended.
+    /// Smallest and largest time of the solutions, in seconds of a core of some 3 GHz. The number of solutions in the search for twins is
+    /// known only at its end.
     pub seconds: [f64; 2],
 }
 
-/// Responses of the live sensors, in their order.
+/// Responses of the active sensors, in their order.
 #[derive(Clone)]
 pub(super) enum Responses<'a> {
     BySensor(Vec<Arc<dyn ResponseFunction + 'a>>),
@@ -49,14 +50,14 @@ pub(super) enum Responses<'a> {
 pub(super) struct ByContact<'a> {
     readings: Arc<dyn ReadingsByContact + 'a>,
     sensors: usize,
-    /// By the bits of a contact's position.
+    /// Influences by the bits of a contact's position.
     kept: Arc<Mutex<HashMap<[u64; 2], Arc<Influences>>>>,
-    /// Readings of all sensors under loads on degrees of freedom, for contacts that are asked for one by one near each other.
+    /// Readings of all sensors under loads on degrees of freedom, for single contacts near each other.
     degrees: Arc<Mutex<HashMap<usize, Vec<f64>>>>,
 }
 
 impl<'a> Responses<'a> {
-    /// Responses of the sensors of a layout that are alive.
+    /// Responses of the active sensors of a layout.
     pub fn new(surface: &'a dyn Surface, layout: &Layout, watch: Watch) -> Result<Self, Cancelled> {
         Self::with_most_functions(surface, layout, MOST_FUNCTIONS, watch)
     }
@@ -91,7 +92,7 @@ impl<'a> Responses<'a> {
         Ok(Self::BySensor(functions))
     }
 
-    /// Reading of each sensor under a force at each of some positions.
+    /// Reading of each sensor under a force at each of `positions`.
     pub fn readings(&self, positions: &[Position], force_n: f64) -> Vec<Vec<f64>> {
         match self {
             Self::BySensor(functions) => {
@@ -115,11 +116,11 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// Work and memory of the responses of so many sensors at so many positions, and of comparing them.
+    /// Work and memory of the responses of `sensors` sensors at `positions` positions, and of their comparison.
     pub fn cost(surface: &dyn Surface, sensors: usize, positions: usize) -> LimitCost {
         let solving = if sensors > MOST_FUNCTIONS { Solving::ByContact } else { Solving::BySensor };
         let reading = (size_of::<f64>() * sensors) as f64;
-        // The search for contacts that read alike keeps readings and derivatives of its own.
+        // The search for twins stores readings and derivatives of its own.
         let compared = 4.0 * positions as f64 * reading;
         let Some(cost) = surface.solution_cost(sensors, solving) else {
             return LimitCost { memory_bytes: compared, seconds: [0.0; 2] };
@@ -139,7 +140,7 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// Solves for contacts, many together, as long as there is room to keep them.
+    /// Solves for contacts, many at a time, while the cache has room.
     pub fn prepare(&self, positions: &[Position], watch: Watch) -> Result<(), Cancelled> {
         match self {
             Self::BySensor(_) => Ok(()),
@@ -161,7 +162,7 @@ impl ByContact<'_> {
         positions.iter().map(of).collect()
     }
 
-    /// Readings per newton at a contact, from those under loads on the degrees of freedom around it.
+    /// Readings per newton at a contact, from the readings under loads on the degrees of freedom around it.
     fn interpolated(&self, position: Position) -> Vec<f64> {
         let around = self.readings.degrees(position);
         let mut degrees = self.degrees.lock().unwrap_or_else(PoisonError::into_inner);
@@ -216,7 +217,7 @@ impl ByContact<'_> {
         kept.insert(key(position), influences);
     }
 
-    /// Influences at a contact, which are kept while there is room.
+    /// Influences at a contact, which are cached while there is room.
     fn solved(&self, position: Position) -> Arc<Influences> {
         let influences = Arc::new(self.readings.influences(&[position]).pop().unwrap_or_default());
         if self.has_room() {
@@ -226,7 +227,7 @@ impl ByContact<'_> {
     }
 }
 
-/// The bits of a position, by which what was found there is kept.
+/// The bits of a position, as a key for caches.
 pub(super) fn key(position: Position) -> [u64; 2] {
     [position.x_m, position.y_m].map(f64::to_bits)
 }

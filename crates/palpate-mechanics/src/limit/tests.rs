@@ -1,4 +1,4 @@
-//! The limit against the paper's figures, closed forms, simulation, and its own symmetries.
+//! The limit compared with the paper's figures, closed forms, simulation, and symmetries.
 
 use std::sync::LazyLock;
 
@@ -60,10 +60,10 @@ fn over_a_support_an_unknown_force_is_not_told_and_left_out_of_the_summary() {
         let summary = curve.summary().unwrap();
         assert_eq!(summary.without, 1);
         assert_eq!(curve.not_told_in_words().unwrap(), "1 of 399 positions, 0.3 %, at 12000 mm");
-        // Beside the support the limit is the larger the nearer it is: the least is not over the support.
+        // The limit grows towards the support: its minimum is not over the support.
         let beside = at(11.94, Force::Unknown).unwrap().sd_position_m;
         assert!(summary.best.1 < beside && (summary.best.0.x_m - 12.0).abs() > 1.0, "{summary:?}");
-        // A zone of several positions around it is blind by its largest limit, not by the one position that has none.
+        // A blind zone of several positions reports its largest limit, not the single position without one.
         let warnings = limit_warnings(&limit, 1e3, Force::Unknown, Watch::NONE).unwrap();
         let told = |warning: &LimitWarning| match warning {
             LimitWarning::Blind { zone, sd_m, .. } => zone.to.x_m - zone.from.x_m < 0.2 || sd_m.is_some(),
@@ -73,7 +73,7 @@ fn over_a_support_an_unknown_force_is_not_told_and_left_out_of_the_summary() {
     }
 }
 
-/// The words of some warnings.
+/// Texts of some warnings.
 fn words(warnings: &[LimitWarning]) -> String {
     warnings.iter().map(|warning| format!("{warning}\n  would help: {}\n", warning.help())).collect()
 }
@@ -81,7 +81,7 @@ fn words(warnings: &[LimitWarning]) -> String {
 #[test]
 fn the_papers_beam_has_the_limits_that_the_paper_leaves_room_for() {
     let limit = bound(&deflections(8));
-    // What physics allows at 5 µm and 3 N, from a calculation of its own.
+    // The limit at 5 µm and 3 N, from an independent calculation.
     let known = [(1.0, 0.087), (50.0, 0.095), (100.0, 0.12), (200.0, 0.69)];
     let unknown = [(1.0, 8300.0), (20.0, 21.0), (50.0, 3.3), (200.0, 0.69)];
     for (force, figures) in [(Force::Known, known), (Force::Unknown, unknown)] {
@@ -119,7 +119,7 @@ fn two_reactions_give_the_closed_form() {
     }
 }
 
-/// A plane on a bump of the influence for every sensor: exp(−d²/2w²) of the distance d of sensor and contact.
+/// A plane with a bump as the influence function of every sensor: exp(−d²/2w²), with the distance d of sensor and contact.
 struct Pad;
 
 const PAD_WIDTH_M: f64 = 0.02;
@@ -174,7 +174,7 @@ fn a_plane_has_a_bound_in_both_directions() {
     let limit = CramerRaoBound::new(&Pad, &four).unwrap();
     let at =
         |x_m, y_m, force| limit.bound_at(Contact { position: Position { x_m, y_m }, force_n: 2.0 }, force);
-    // In the centre of a symmetric layout x, y and force do not disturb each other: 1/√(Σ (∂y_i/∂x)²) each.
+    // In the centre of a symmetric layout the errors of x, y and force are independent: 1/√(Σ (∂y_i/∂x)²) each.
     let centre = at(0.03, 0.02, Force::Unknown).unwrap();
     let reading = 2.0 * 1e-4 * (-0.5 * (4e-4 + 1e-4) / 4e-4_f64).exp() / 1e-6;
     let by_x = reading * 0.02 / 4e-4;
@@ -185,19 +185,19 @@ fn a_plane_has_a_bound_in_both_directions() {
     let known = at(0.035, 0.022, Force::Known).unwrap();
     let unknown = at(0.035, 0.022, Force::Unknown).unwrap();
     assert!(known.sd_x_m < unknown.sd_x_m && known.sd_position_m < unknown.sd_position_m);
-    // Sensors on a line through the contact do not see it move across.
+    // Sensors on a line through the contact are insensitive to its motion across.
     let line = pad_layout(&corners.map(|(x_m, _)| (x_m, 0.02)));
     let limit = CramerRaoBound::new(&Pad, &line).unwrap();
     let contact = Contact { position: Position { x_m: 0.03, y_m: 0.02 }, force_n: 2.0 };
     assert_eq!(limit.bound_at(contact, Force::Known), None);
     let found = limit_warnings(&limit, 2.0, Force::Known, Watch::NONE).unwrap();
-    // They cannot tell one side of the line from the other either.
+    // These sensors cannot distinguish the two sides of the line either.
     assert_eq!(found.iter().map(LimitWarning::kind).collect::<Vec<_>>(), ["mirror"], "{}", words(&found));
     let positions = positions_with_spacing(Pad.extent(), 5e-3).unwrap();
     let curve = LimitCurve::at_positions(&limit, 2.0, Force::Known, &positions).unwrap();
     assert_eq!(curve.points.len(), 11 * 7);
     assert_eq!(curve.summary().unwrap().without, 11);
-    // A figure by x is its mean across; every column has a contact on the line, where there is no bound.
+    // A figure by x is the mean across; every column has a contact on the line, without a bound.
     let by_x = curve.by_x(|bound| bound.sd_position_m);
     assert_eq!(by_x.len(), 11);
     assert!(by_x.is_sorted_by(|a, b| a.0 < b.0) && by_x.iter().all(|(_, mean)| mean.is_nan()));
@@ -208,8 +208,8 @@ fn a_plane_has_a_bound_in_both_directions() {
     assert_eq!(curve.by_x(|bound| bound.sd_x_m), [(0.03, bounds.sum::<f64>() / 2.0)]);
 }
 
-/// The position whose readings are nearest to `reading` (whitened), among positions a hundredth of `step_m` apart around
-/// `near_m`: maximum likelihood, where the model is known. An unknown force is fitted along.
+/// The position with the readings nearest to `reading` (whitened), among positions a hundredth of `step_m` apart around
+/// `near_m`: maximum likelihood for a known model. An unknown force is fitted with the position.
 fn most_likely(limit: &CramerRaoBound, reading: &[f64], near_m: f64, step_m: f64, force: Force) -> f64 {
     let cost = |a_m: f64| {
         let shape = limit.whitened_reading(Contact { position: Position::along(a_m), force_n: 3.0 });
@@ -219,7 +219,7 @@ fn most_likely(limit: &CramerRaoBound, reading: &[f64], near_m: f64, step_m: f64
         };
         shape.iter().zip(reading).map(|(s, r)| (r - scale * s).powi(2)).sum::<f64>()
     };
-    // Golden section: the cost has one minimum within the few standard deviations that are searched.
+    // Golden section search: the cost has one minimum within the few standard deviations of the search.
     let (mut low, mut high) = (near_m - step_m, near_m + step_m);
     let ratio = 0.5 * (5f64.sqrt() - 1.0);
     while high - low > 1e-4 * step_m {
@@ -364,7 +364,7 @@ fn no_information_is_none_and_never_infinite() {
     assert_eq!(at(0.2, 0.0, Force::Known), None);
     assert_eq!(at(0.2, f64::NAN, Force::Known), None);
     assert!(at(0.0, 3.0, Force::Known).is_some(), "the beam tilts when a known force leaves its support");
-    // One sensor cannot tell two numbers; nor can it see a small move of a force right above it.
+    // One sensor cannot determine two parameters, and is insensitive to a small motion of a force right above it.
     let one = bound(&deflections(1));
     let contact = |x_m| Contact { position: Position::along(x_m), force_n: 3.0 };
     assert_eq!(one.bound_at(contact(0.1), Force::Unknown), None);

@@ -1,4 +1,4 @@
-//! Contacts whose readings are alike though they are far apart.
+//! Distant contacts with nearly equal readings.
 
 use super::bound::norm;
 use super::zone::Grid;
@@ -6,20 +6,20 @@ use super::{Columns, CramerRaoBound, Force};
 use crate::contact::{Contact, Position};
 use palpate_numerics::small::Ldl;
 
-/// Two contacts whose readings differ by fewer standard deviations than this are called ambiguous: a reading is then taken
-/// for the other contact's more than once in a hundred times (2·2.326).
+/// Largest distance of the readings of two ambiguous contacts, in standard deviations: a reading is then attributed
+/// to the wrong contact more than once in a hundred times (2·2.326).
 pub(super) const AMBIGUOUS_DISTANCE: f64 = 4.653;
-/// Points of the straight way between two contacts at which their difference is looked at, from the middle outwards.
+/// Number of points of the straight line between two contacts at which their difference is computed, from the middle outwards.
 const WAY_POINTS: i32 = 47;
-/// Pitches of the grid around a position in which its derivatives foretell twins, and in which one is searched for: farther away another
-/// position of the grid is nearer, and a search that wanders along a valley ends at the contact itself.
+/// Radius around a position of the grid in which its derivatives predict twins and the search stays, in pitches. Farther away another
+/// position of the grid is nearer, and a search along a valley would end at the contact itself.
 const REACH: f64 = 1.5;
-/// A search is given up where it is farther above the bound than so many times what steps of the last length have gained.
+/// A search stops when its excess over the bound is more than this multiple of the gain of the steps of the last length.
 const HOPELESS: f64 = 10.0;
-/// The search for the nearest reading ends at this share of the grid's pitch.
+/// The final step of the search for the nearest reading, as a share of the grid's pitch.
 const FINEST: f64 = 1e-3;
 
-/// The contact whose readings are nearest, somewhere else on the surface.
+/// The contact elsewhere on the surface with the nearest readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Twin {
     pub position: Position,
@@ -27,10 +27,10 @@ pub(super) struct Twin {
     pub distance: f64,
 }
 
-/// The whitened readings of a whole surface, to be compared with.
+/// Whitened readings over a whole surface, for comparison.
 ///
-/// For a known force W two contacts differ by |y(a) − y(b)|. For an unknown force the second one may have any force, and
-/// what is left is the distance of y(a) from the ray through y(b): |y(a)|·sin of the angle between their directions.
+/// For a known force W two contacts differ by |y(a) − y(b)|. For an unknown force the second contact may have any force. The
+/// difference is then the distance of y(a) from the ray through y(b): |y(a)|·sin of the angle between their directions.
 pub(super) struct TwinSearch<'a> {
     limit: &'a CramerRaoBound<'a>,
     force_n: f64,
@@ -40,14 +40,14 @@ pub(super) struct TwinSearch<'a> {
     places: Vec<Place>,
 }
 
-/// Reading at a position of the grid, and its greatest difference from those around it.
+/// Reading at a position of the grid, and its largest difference from the neighbouring readings.
 struct Place {
     shape: Shape,
-    /// The largest difference of its direction or reading from a neighbour's.
+    /// The largest difference of the compared part from that of a neighbour.
     spread: f64,
-    /// Derivatives of what is compared, along and across, per metre.
+    /// Derivatives of the compared part along and across, per metre.
     slopes: [Vec<f64>; 2],
-    /// The largest difference of a neighbour's from what the derivatives foretell.
+    /// The largest error of the derivatives' prediction at a neighbour.
     bend: f64,
 }
 
@@ -81,12 +81,12 @@ impl<'a> TwinSearch<'a> {
         search
     }
 
-    /// The nearest twin within the bound that is not just a neighbour: on the way to it the readings differ by more.
+    /// The nearest twin within the bound that is not a neighbour: between the two contacts the readings differ by more.
     pub fn twin_of(&self, position: Position) -> Option<Twin> {
         let target = self.shape(position);
         let distances: Vec<f64> =
             self.places.iter().map(|place| self.distance(&target, &place.shape.values)).collect();
-        // From the contact itself the way down leads nowhere.
+        // A search from the contact itself finds no twin.
         let elsewhere = |i: &usize| self.grid.positions[*i] != position;
         let lowest = |i: &usize| self.grid.neighbours(*i).all(|j| distances[*i] <= distances[j]);
         let starts = (0..distances.len())
@@ -101,8 +101,8 @@ impl<'a> TwinSearch<'a> {
             .min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
-    /// True where a twin may be between a position of the grid and its neighbours: as near as they differ from it, and as its derivatives
-    /// foretell within what they err at the neighbours.
+    /// True where a twin may lie between a position of the grid and its neighbours: within the difference to the neighbours, and within
+    /// the prediction of the derivatives and its error at the neighbours.
     fn is_reachable(&self, target: &Shape, i: usize, found: f64) -> bool {
         let place = &self.places[i];
         let scale = if self.force == Force::Known { 1.0 } else { target.length };
@@ -131,8 +131,8 @@ impl<'a> TwinSearch<'a> {
         readings.into_iter().map(shape).collect()
     }
 
-    /// Derivatives of what is compared, along and across: of a direction, those of the reading without their part along it, over its
-    /// length.
+    /// Derivatives of the compared part, along and across. For a direction they are the derivatives of the reading, without their part
+    /// along it, over its length.
     fn slopes(&self, position: Position, shape: &Shape) -> [Vec<f64>; 2] {
         let Columns { along, across, .. } =
             self.limit.derivatives(Contact { position, force_n: self.force_n });
@@ -152,7 +152,7 @@ impl<'a> TwinSearch<'a> {
         match self.force {
             Force::Known => distance(&target.values, other),
             Force::Unknown => {
-                // A force pushes, so a direction that points the other way is no nearer than no contact at all.
+                // A force only pushes, so a contact of opposite direction is not nearer than no contact at all.
                 let along = dot(&target.values, other).max(0.0);
                 let off = sum_in_strands(&target.values, other, |a, b| (a - along * b).powi(2));
                 target.length * off.sqrt()
@@ -160,12 +160,12 @@ impl<'a> TwinSearch<'a> {
         }
     }
 
-    /// The nearest reading around a position of the grid, by ever smaller steps along x and y. Those end in a curved valley as well, where
-    /// Gauss-Newton steps would follow it to the contact itself.
+    /// The nearest reading around a position of the grid, by ever smaller steps along x and y. These converge in a curved valley too, where
+    /// Gauss–Newton steps would follow it to the contact itself.
     fn descend(&self, target: &Shape, start: Position, distance: f64) -> Twin {
         let mut twin = Twin { position: start, distance };
         let (finest_m, reach_m) = (FINEST * self.grid.pitch_m(), REACH * self.grid.pitch_m());
-        // What the distance was before steps of this length, and whether longer ones were tried.
+        // Distance before the steps of this length, and whether longer steps are done.
         let (mut before, mut tried) = (distance, false);
         let mut step_m = 0.5 * self.grid.pitch_m();
         while step_m > finest_m {
@@ -203,14 +203,14 @@ impl<'a> TwinSearch<'a> {
     }
 }
 
-/// The step that takes the most off a difference, by the slopes; 0 along what changes nothing.
+/// The step that reduces a difference most, by the slopes; 0 along a direction without effect.
 fn foretold_step([along, across]: &[Vec<f64>; 2], left: &[f64]) -> [f64; 2] {
     let both = dot(along, across);
     let products = [[dot(along, along), both], [both, dot(across, across)]];
     Ldl::semidefinite(&products).solve([dot(along, left), dot(across, left)])
 }
 
-/// The rest of a difference after a step, by its length.
+/// Length of the remaining difference after a step.
 fn left_of([along, across]: &[Vec<f64>; 2], [dx_m, dy_m]: [f64; 2], difference: &[f64]) -> f64 {
     let mut left = difference.to_vec();
     for (slope, step_m) in [(along, dx_m), (across, dy_m)] {
@@ -231,7 +231,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     sum_in_strands(a, b, |a, b| a * b)
 }
 
-/// Sum of a term over the sensors, in eight strands, none of which waits for another: of many sensors that is most of the search.
+/// Sum of a term over the sensors, in eight independent partial sums: for many sensors this sum takes most of the search time.
 fn sum_in_strands(a: &[f64], b: &[f64], term: impl Fn(f64, f64) -> f64) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
     let mut strands = [0.0; 8];

@@ -1,4 +1,4 @@
-//! Warnings of a limit, in words: the zone, how bad it is, and what would help.
+//! Warnings about a limit as text: the zone, the value and a remedy.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -15,16 +15,16 @@ use palpate_numerics::watch::{Cancelled, Watch};
 
 /// A limit above this share of the length is called blind.
 const BLIND_SHARE: f64 = 0.1;
-/// A touch that stands out of the noise by fewer standard deviations than this is called faint.
+/// A touch with a signal of fewer standard deviations of the noise than this is called faint.
 const FAINT_SIGNAL: f64 = 5.0;
-/// Readings that differ by fewer standard deviations than this are the same.
+/// Readings that differ by fewer standard deviations than this count as equal.
 const INDISTINGUISHABLE: f64 = 0.05;
-/// A touch that stands out by fewer standard deviations than this does not show at all.
+/// A touch with a signal of fewer standard deviations than this has no signal at all.
 const NO_SIGNAL: f64 = 1e-6;
-/// A reaction that changes by less than this share of the force over the whole length does not change.
+/// A reaction that changes by less than this share of the force over the whole length counts as constant.
 const CONSTANT_REACTION: f64 = 1e-6;
 
-/// Warning of contacts that no estimator can tell well on this bench.
+/// Warning of contacts that no estimator can locate or distinguish well on this bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LimitWarning {
     /// The limit is a large part of the surface, or there is none.
@@ -35,16 +35,16 @@ pub enum LimitWarning {
         force: Force,
         /// Position with the largest limit.
         at: Position,
-        /// The limit there, in metres; `None` where the readings do not tell the position.
+        /// The limit there, in metres; `None` where the readings do not determine the position.
         sd_m: Option<f64>,
-        /// Limits up to this, in metres, are not called blind.
+        /// Largest limit that is not called blind, in metres.
         bound_m: f64,
-        /// The limit there if the force were known, in metres; `None` where it is, or where that does not help.
+        /// The limit there for a known force, in metres; `None` where the force is known, or where knowing it does not help.
         known_force_sd_m: Option<f64>,
-        /// Whether there are supports without a reaction sensor at work.
+        /// True when reaction sensors at the supports would help; no active sensor measures a reaction.
         reactions_would_help: bool,
     },
-    /// Two contacts far apart whose readings are alike.
+    /// Two distant contacts with nearly equal readings.
     Mirror {
         /// Zone of such contacts.
         zone: Zone,
@@ -52,29 +52,29 @@ pub enum LimitWarning {
         twins: Zone,
         /// Knowledge of the force.
         force: Force,
-        /// The contact whose twin is nearest.
+        /// The contact with the nearest twin.
         at: Position,
-        /// Twin.
+        /// Position of the twin.
         twin: Position,
         /// Distance of the two readings, in standard deviations.
         distance: f64,
     },
-    /// A contact that hardly shows in the readings.
+    /// A contact with a small signal.
     Faint {
         /// Zone of such contacts.
         zone: Zone,
         /// Position of the faintest contact.
         at: Position,
-        /// By how many standard deviations it stands out of the noise.
+        /// The signal of that contact, in standard deviations of the noise.
         signal_to_noise: f64,
         /// The contact force, in newtons.
         force_n: f64,
-        /// Whether there are supports without a reaction sensor at work.
+        /// True when reaction sensors at the supports would help; no active sensor measures a reaction.
         reactions_would_help: bool,
     },
 }
 
-/// Everything that a limit warns of, for contacts of `force_n` newtons: blind zones, then mirror ambiguity, then faint
+/// All warnings about a limit, for contacts of `force_n` newtons: blind zones, then mirror ambiguity, then faint
 /// contacts, each from left to right.
 ///
 /// # Errors
@@ -86,7 +86,7 @@ pub fn limit_warnings(
     watch: Watch,
 ) -> Result<Vec<LimitWarning>, LimitError> {
     check_force(force_n)?;
-    // A support that stands between the positions of the grid could be missed: next to it little may be told.
+    // The grid could miss a support between its positions, next to which the readings may determine little.
     let grid = Grid::over_surface(limit.extent).including(&force_supports(limit));
     let survey = Survey { limit, force_n, force, grid };
     let mut warnings = survey.blind();
@@ -99,7 +99,7 @@ fn force_supports(limit: &CramerRaoBound) -> Vec<Position> {
     limit.model.map_or_else(Vec::new, Surface::force_supports)
 }
 
-/// One look all over the surface.
+/// One survey of the whole surface.
 struct Survey<'a> {
     limit: &'a CramerRaoBound<'a>,
     force_n: f64,
@@ -129,7 +129,7 @@ impl Survey<'_> {
         let size = |position: Position| told(position).unwrap_or(f64::INFINITY);
         let found = zones(extent, &self.grid, |position| size(position) > bound_m);
         let warning = |(zone, inside): (Zone, Vec<Position>)| {
-            // Of a zone with few positions that are not told, as one over a support, the largest limit that is.
+            // In a zone with few undetermined positions, as one over a support, the largest finite limit.
             let (told, not): (Vec<_>, Vec<_>) = inside.into_iter().partition(|at| told(*at).is_some());
             let most = if told.len() > not.len() { told } else { not };
             let at = most.into_iter().max_by(|a, b| size(*a).total_cmp(&size(*b)))?;
@@ -153,8 +153,8 @@ impl Survey<'_> {
         self.limit.model.is_some_and(has_reactions) && !self.limit.channels.iter().any(reacts)
     }
 
-    /// Whether some support's reaction changes with a contact's position, or tells a force that is not known. That of a clamp
-    /// which alone holds the surface is the force, wherever that acts.
+    /// True where the reaction of a support changes with the position of a contact, or where the force is unknown. The reaction of a
+    /// single clamp is the force itself for any position.
     fn reactions_tell(&self, at: Position) -> bool {
         let Some(surface) = self.limit.model else { return false };
         let supports = surface.force_supports();
@@ -165,10 +165,10 @@ impl Survey<'_> {
         self.force == Force::Unknown || supports.is_empty() || supports.iter().any(changes)
     }
 
-    /// Each pair of zones once, however it was found.
+    /// Reports each pair of zones once, from either side.
     fn mirrors(&self, watch: Watch) -> Result<Vec<LimitWarning>, Cancelled> {
         let search = TwinSearch::new(self.limit, self.force_n, self.force);
-        // Where a contact is faint or blind anyway, everything around it reads alike.
+        // Around a faint or blind contact all readings are similar.
         let clear = |position: Position| {
             self.signal(position) >= FAINT_SIGNAL
                 && self.sd_m(position, self.force).is_some_and(|sd_m| sd_m <= self.blind_from_m())
@@ -189,7 +189,7 @@ impl Survey<'_> {
             let pairs: Vec<(Position, Twin)> =
                 inside.into_iter().filter_map(|at| Some((at, twin(at)?))).collect();
             let nearest = pairs.iter().min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
-            // On a plane the ends are corners of a rectangle, which need not be inside.
+            // On a plane the ends are corners of a rectangle, which need not be in the zone.
             let is_line = zone.from.y_m == 0.0 && zone.to.y_m == 0.0;
             let ends = [zone.from, zone.to].into_iter().filter(|_| is_line).filter_map(twin);
             let twins =
@@ -238,15 +238,14 @@ impl LimitWarning {
         }
     }
 
-    /// Zone of the surface that it is about.
+    /// Zone of the surface for this warning.
     pub const fn zone(&self) -> Zone {
         match self {
             Self::Blind { zone, .. } | Self::Mirror { zone, .. } | Self::Faint { zone, .. } => *zone,
         }
     }
 
-    /// Worst value, and the bound that this is held against: metres for a blind zone, standard
-    /// deviations for the others. `None` where there is no limit at all.
+    /// Worst value and its bound: metres for a blind zone, standard deviations for the others. `None` where no limit exists.
     pub const fn value_and_bound(&self) -> (Option<f64>, f64) {
         match self {
             Self::Blind { sd_m, bound_m, .. } => (*sd_m, *bound_m),
@@ -255,7 +254,7 @@ impl LimitWarning {
         }
     }
 
-    /// Advice on what would help.
+    /// Advice on a remedy.
     pub fn help(&self) -> String {
         let (value, bound) = self.value_and_bound();
         match self {
@@ -273,14 +272,14 @@ impl LimitWarning {
                 });
                 ways.join(", or ")
             }
-            // Readings that are the same stay so, however quiet the sensors are.
+            // Equal readings stay equal, even with quiet sensors.
             Self::Mirror { distance, .. } if *distance < INDISTINGUISHABLE => {
                 "a sensor that breaks the symmetry; less noise does not help".to_owned()
             }
             Self::Mirror { distance, .. } => {
-                format!("{}, or a sensor that tells the two apart", less_noise(bound / distance))
+                format!("{}, or a sensor that distinguishes the two", less_noise(bound / distance))
             }
-            // Over a rigid support nothing moves, however quiet the sensors are and however hard the touch.
+            // Over a rigid support the surface does not move, even with quiet sensors and a large force.
             Self::Faint { signal_to_noise, reactions_would_help, .. } if *signal_to_noise < NO_SIGNAL => {
                 let sensor = if *reactions_would_help {
                     "reaction sensors at the supports"
@@ -319,7 +318,7 @@ impl fmt::Display for LimitWarning {
             Self::Blind { zone, force, sd_m: None, .. } => {
                 write!(
                     f,
-                    "blind at {zone} with {} force: the readings do not tell the position",
+                    "blind at {zone} with {} force: the readings do not determine the position",
                     force.name()
                 )
             }
@@ -332,7 +331,7 @@ impl fmt::Display for LimitWarning {
                 if *distance < INDISTINGUISHABLE {
                     return write!(f, "{at} and {twin} read the same");
                 }
-                // A reading of the one is nearer to that of the other where its noise exceeds half their distance.
+                // A reading of one contact is nearer to that of the other when its noise exceeds half their distance.
                 let mistaken = figure(100.0 * normal_cdf(-0.5 * distance));
                 let (distance, bound) = (figure(*distance), figure(AMBIGUOUS_DISTANCE));
                 write!(
@@ -356,7 +355,7 @@ fn place(position: Position) -> String {
     Zone::point(position).to_string()
 }
 
-/// About two significant digits, and no exponent: "0.087", "3.3", "8300".
+/// A number with about two significant digits and no exponent: "0.087", "3.3", "8300".
 fn figure(value: f64) -> String {
     let digits = 1 - value.abs().max(1e-6).log10().floor() as i32;
     let unit = 10f64.powi(-digits);

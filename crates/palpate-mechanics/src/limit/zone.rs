@@ -1,4 +1,4 @@
-//! Positions that cover a surface, and the stretches of it where something holds.
+//! Positions that cover a surface, and the zones of it where a condition is true.
 
 use serde::Serialize;
 
@@ -7,25 +7,25 @@ use crate::contact::Position;
 use crate::surface::Extent;
 use crate::units::format_length_mm;
 
-/// Halvings by which the end of a stretch is found between two positions of the grid.
+/// Halvings in the bisection for the end of a zone between two positions of the grid.
 const HALVINGS: u32 = 12;
 
-/// A zone of a plane is called filled from this share on.
+/// Smallest share of a plane's zone from which it is called filled.
 const FILLED: f64 = 0.9;
 
-/// A stretch of a line, or a rectangle of a plane around all its positions.
+/// An interval of a line, or the bounding rectangle of positions on a plane.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Zone {
     /// Left or lower left end.
     pub from: Position,
     /// Right or upper right end.
     pub to: Position,
-    /// Share of it where what is said holds; 1 of a stretch of a line.
+    /// Share of the zone where the condition is true; 1 for an interval of a line.
     pub filled: f64,
 }
 
 impl Zone {
-    /// The smallest zone that holds all `positions`; `None` of none.
+    /// The smallest zone around all `positions`; `None` for no positions.
     pub(super) fn bounding(positions: impl IntoIterator<Item = Position>) -> Option<Self> {
         positions.into_iter().fold(None, |zone: Option<Self>, position| {
             let Self { from, to, .. } = zone.unwrap_or(Self::point(position));
@@ -42,7 +42,7 @@ impl Zone {
         Self { from: position, to: position, filled: 1.0 }
     }
 
-    /// Whether it holds a position.
+    /// True for a position in the zone, its boundary included.
     pub fn contains(&self, position: Position) -> bool {
         let Self { from, to, .. } = self;
         (from.x_m..=to.x_m).contains(&position.x_m) && (from.y_m..=to.y_m).contains(&position.y_m)
@@ -75,9 +75,9 @@ fn tenths_mm(value_m: f64) -> f64 {
     (value_m * 1e4).round() / 1e4
 }
 
-/// The zones of a grid where `holds`, each with its positions of the grid. On a line there is one for each stretch, its
-/// ends found between the positions of the grid and carried to the end of the surface from the outermost; on a plane there is
-/// one for each set of neighbours, half a pitch wider than they are.
+/// The zones of a grid where `holds` is true, each with its positions of the grid. On a line there is one zone for each interval. The
+/// ends of a zone lie between positions of the grid; next to the outermost position it extends to the end of the surface. On a plane there is
+/// one zone for each connected set of neighbours, half a pitch wider than the set.
 pub(super) fn zones(
     extent: Extent,
     grid: &Grid,
@@ -124,7 +124,7 @@ fn patches(length_m: f64, width_m: f64, grid: &Grid, mut flags: Vec<bool>) -> Ve
         }
         let inside: Vec<Position> = patch.iter().map(|i| grid.positions[*i]).collect();
         let Some(around) = Zone::bounding(inside.iter().copied()) else { continue };
-        // From the outermost positions a zone is carried to the edge.
+        // From the outermost positions a zone extends to the edge.
         let lower = |at_m: f64, pitch_m: f64| if at_m < 1.5 * pitch_m { 0.0 } else { at_m - 0.5 * pitch_m };
         let upper = |at_m: f64, pitch_m: f64, size_m: f64| {
             if at_m > size_m - 1.5 * pitch_m { size_m } else { at_m + 0.5 * pitch_m }
@@ -142,7 +142,7 @@ fn patches(length_m: f64, width_m: f64, grid: &Grid, mut flags: Vec<bool>) -> Ve
     found
 }
 
-/// End of the stretch where `holds`, between a position inside and one outside, in metres.
+/// End of the interval where `holds` is true, between a position inside and one outside, in metres.
 fn edge(mut inside_m: f64, mut outside_m: f64, holds: &impl Fn(Position) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle_m = inside_m.midpoint(outside_m);
@@ -151,30 +151,30 @@ fn edge(mut inside_m: f64, mut outside_m: f64, holds: &impl Fn(Position) -> bool
     inside_m
 }
 
-/// Positions on a line: 1/400 of the length apart, as everywhere in palpate (every millimetre of the paper's beam).
+/// Number of positions on a line: 1/400 of the length apart, as everywhere in palpate (every millimetre of the paper's beam).
 const ALONG_A_LINE: usize = 399;
-/// Positions on a plane, about; more of them along its longer side.
+/// Approximate number of positions on a plane; more of them along its longer side.
 const ON_A_PLANE: f64 = 600.0;
-/// The most positions that a spacing may make.
+/// Largest number of positions from a spacing.
 const MOST: usize = 100_000;
 
-/// Positions in rows along x, evenly between the edges of the surface and not on them.
+/// Positions in rows along x, evenly spaced between the edges of the surface and not on them.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Grid {
     pub positions: Vec<Position>,
-    /// Positions in a row.
+    /// Number of positions in a row.
     pub columns: usize,
 }
 
 impl Grid {
-    /// Fine enough to see what a limit does.
+    /// A grid that resolves the features of a limit.
     pub fn over_surface(extent: Extent) -> Self {
         let Some(width_m) = extent.width_m() else { return Self::even(extent, ALONG_A_LINE, 1) };
         let side = |ratio: f64| (ON_A_PLANE * ratio).sqrt().clamp(5.0, ON_A_PLANE / 5.0).round() as usize;
         Self::even(extent, side(extent.length_m() / width_m), side(width_m / extent.length_m()))
     }
 
-    /// `every_m` apart, from `every_m` to as far as the surface reaches.
+    /// Positions `every_m` apart, from `every_m` to the end of the surface.
     pub fn with_spacing(extent: Extent, every_m: f64) -> Result<Self, LimitError> {
         let inside = |size_m: f64| (size_m / every_m - 1e-6).floor();
         let (columns, rows) = (inside(extent.length_m()), extent.width_m().map_or(1.0, inside));
@@ -186,21 +186,21 @@ impl Grid {
         Ok(Self::new(columns as usize, rows as usize, |column| column as f64 * every_m, y_m))
     }
 
-    /// `columns` × `rows` evenly between the edges.
+    /// `columns` × `rows` positions, evenly spaced between the edges.
     fn even(extent: Extent, columns: usize, rows: usize) -> Self {
         let share = |i: usize, count: usize| i as f64 / (count + 1) as f64;
         let y_m = |row: usize| extent.width_m().map_or(0.0, |width_m| share(row, rows) * width_m);
         Self::new(columns, rows, |column| share(column, columns) * extent.length_m(), y_m)
     }
 
-    /// From x of each column and y of each row, which count from 1.
+    /// Positions from x of each column and y of each row, which count from 1.
     fn new(columns: usize, rows: usize, x_m: impl Fn(usize) -> f64, y_m: impl Fn(usize) -> f64) -> Self {
         let x_m: Vec<f64> = (1..=columns).map(x_m).collect();
         let row = |y_m: f64| x_m.iter().map(move |&x_m| Position { x_m, y_m });
         Self { positions: (1..=rows).map(y_m).flat_map(row).collect(), columns }
     }
 
-    /// On a line, with these positions among the others where they lie between its ends; on a plane as it is.
+    /// On a line, the grid with these positions added where they lie between its ends; on a plane, the grid unchanged.
     pub fn including(mut self, others: &[Position]) -> Self {
         let rows = self.positions.len() / self.columns.max(1);
         let slack_m = 1e-6 * self.pitch_m();
@@ -228,7 +228,7 @@ impl Grid {
             .filter(move |&j| j != i)
     }
 
-    /// Distance of neighbours along x.
+    /// Distance between neighbours along x, in metres.
     pub fn pitch_m(&self) -> f64 {
         match self.positions.as_slice() {
             [first, second, ..] if self.columns > 1 => second.x_m - first.x_m,

@@ -78,29 +78,29 @@ impl Beam {
         self.0.bending_stiffness()
     }
 
-    /// Deflection y(x) per newton at a, in m/N, positive upward: −b·x·(l² − b² − x²)/(6·E·I·l) for x ≤ a, and mirrored
-    /// beyond (the founding paper's eq. 1).
+    /// Deflection y(x) per newton at a, in m/N, positive upward: −b·x·(l² − b² − x²)/(6·E·I·l) for x ≤ a, and the mirror image
+    /// for x > a (the founding paper's eq. 1).
     fn deflection(&self, span: Span) -> f64 {
         let Span { l, b, x, .. } = span;
         -b * x * (l * l - b * b - x * x) / (6.0 * self.bending_stiffness() * l)
     }
 
-    /// Slope y'(x) per newton at a, in rad/N: −b·(l² − b² − 3·x²)/(6·E·I·l) for x ≤ a, mirrored with the sign changed
-    /// beyond.
+    /// Slope y'(x) per newton at a, in rad/N: −b·(l² − b² − 3·x²)/(6·E·I·l) for x ≤ a, and the mirror image with opposite sign
+    /// for x > a.
     fn slope(&self, span: Span) -> f64 {
         let Span { l, b, x, direction } = span;
         -direction * b * (l * l - b * b - 3.0 * x * x) / (6.0 * self.bending_stiffness() * l)
     }
 
     /// Strain on the lower face per newton at a, positive in tension: (t/2)·y''(x) = (t/2)·b·x/(E·I·l) for x ≤ a,
-    /// mirrored beyond. A downward force stretches the lower face, so it is never negative.
+    /// and the mirror image for x > a. A downward force stretches the lower face, so the strain is never negative.
     fn strain(&self, span: Span) -> f64 {
         let Span { l, b, x, .. } = span;
         0.5 * self.0.thickness_m * b * x / (self.bending_stiffness() * l)
     }
 
     /// Force of the support at `sensor` on the beam per newton at a, positive upward: b/l on the left, a/l on the
-    /// right; 0 where there is no support.
+    /// right; 0 without a support.
     fn reaction(&self, sensor_m: f64, contact_m: f64) -> f64 {
         let l = self.0.length_m;
         let near = |support_m: f64| (sensor_m - support_m).abs() <= 1e-9 * l;
@@ -140,10 +140,10 @@ impl From<Beam> for Strip {
     }
 }
 
-/// Place of the sensor, seen from the support on its side of the force.
+/// Place of the sensor, relative to the support on its side of the force.
 ///
 /// l: length; x: distance of the sensor from that support; b: distance of the force from the other one, all in metres;
-/// direction: 1 seen from the left, −1 seen from the right.
+/// direction: 1 from the left support, −1 from the right one.
 #[derive(Clone, Copy)]
 struct Span {
     l: f64,
@@ -183,9 +183,9 @@ impl InfluenceFunction for BeamInfluence<'_> {
         }
     }
 
-    /// In closed form: of the deflection, the slope with sensor and force exchanged (Maxwell's reciprocity,
-    /// y(x; a) = y(a; x)); of the slope, (l² − 3·b² − 3·x²)/(6·E·I·l) on either side; of the strain, −(t/2)·x/(E·I·l)
-    /// and mirrored with the sign changed, with its kink over the sensor; of the reactions, −1/l and 1/l.
+    /// Closed forms. Deflection: the slope with sensor and force exchanged (Maxwell's reciprocity,
+    /// y(x; a) = y(a; x)). Slope: (l² − 3·b² − 3·x²)/(6·E·I·l) on either side. Strain: −(t/2)·x/(E·I·l)
+    /// and the mirror image with opposite sign, with the kink over the sensor. Reactions: −1/l and 1/l.
     fn gradient(&self, contact: Position) -> [f64; 2] {
         let Self { beam, kind, sensor_m } = *self;
         let (l, stiffness) = (beam.0.length_m, beam.bending_stiffness());
@@ -220,7 +220,7 @@ impl Surface for Beam {
         [0.0, self.0.length_m].map(Position::along).to_vec()
     }
 
-    /// Supports hold the deflection, and leave nothing to bend.
+    /// At the supports deflection and bending moment are 0.
     fn insensitive_sensor(&self, kind: SensorKind, sensor: Position) -> Option<InsensitiveSensor> {
         let held =
             matches!(kind, SensorKind::Deflection | SensorKind::Strain) && self.is_supported_at(sensor);

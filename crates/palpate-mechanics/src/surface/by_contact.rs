@@ -8,7 +8,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 /// Readings of all sensors per newton at a contact, in their order, and their derivatives along and across, per metre.
 pub type Influences = [Vec<f64>; 3];
 
-/// Way of solving a surface for what many sensors read under many contacts.
+/// Method of solving a surface for the readings of many sensors under many contacts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solving {
     /// One solution for each sensor, its influence function.
@@ -17,36 +17,36 @@ pub enum Solving {
     ByContact,
 }
 
-/// Work and memory of solving a surface, by an estimate.
+/// Estimated work and memory of solving a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolutionCost {
-    /// Memory of the equations, and of what is kept of sensors, in bytes.
+    /// Memory of the equations and of the data of the sensors, in bytes.
     pub memory_bytes: f64,
-    /// Time of setting up the equations and factoring them, once, in seconds of a core of some 3 GHz.
+    /// Time to set up and factor the equations once, in seconds of a core of some 3 GHz.
     pub seconds_once: f64,
     /// Time of one of many solutions.
     pub seconds_each: f64,
 }
 
 impl Solving {
-    /// The way with fewer solutions.
+    /// The method with fewer solutions.
     pub const fn sooner(sensors: usize, contacts: usize) -> Self {
         if sensors > ContactLoad::EACH * contacts { Self::ByContact } else { Self::BySensor }
     }
 }
 
-/// Readings of many sensors on a surface that bends in proportion to the force, by contact: by reciprocity one solution for a
-/// contact tells all of them, where influence functions are one solution for each sensor.
+/// Readings of many sensors, by contact, on a surface with deflections proportional to the force. By reciprocity one solution for a
+/// contact gives the readings of all sensors, whereas influence functions take one solution for each sensor.
 pub trait ReadingsByContact: Send + Sync {
     /// Readings of the sensors, in their order, under each of `loads`.
     fn under(&self, loads: &[ContactLoad]) -> Vec<Vec<f64>>;
 
-    /// A unit force at a contact as a sum of loads on degrees of freedom, each with its factor: contacts near each other share them.
+    /// A unit force at a contact as a sum of loads on degrees of freedom, each with its factor. Contacts near each other share these loads.
     fn degrees(&self, contact: Position) -> Vec<(usize, f64)>;
 
-    /// Loads that are sooner solved for together than one by one; more at a time cost memory and save nothing.
+    /// Number of loads that are solved together faster than one by one; more loads cost memory and save no time.
     fn together(&self) -> usize;
-    /// Influences at each of some contacts.
+    /// Influences at each of `contacts`.
     fn influences(&self, contacts: &[Position]) -> Vec<Influences> {
         let loads: Vec<ContactLoad> = contacts.iter().copied().flat_map(ContactLoad::all).collect();
         let mut under = self.under(&loads).into_iter();
@@ -55,8 +55,8 @@ pub trait ReadingsByContact: Send + Sync {
 }
 
 impl dyn ReadingsByContact + '_ {
-    /// Solves for contacts, few of them together, and hands their influences on with their indices, until `take` breaks off. `stage` is
-    /// what the watch is told.
+    /// Solves for contacts, a few at a time, and passes each index with its influences to `take`, until `take` stops. `stage` is
+    /// the name of the stage for the watch.
     ///
     /// # Errors
     /// [`Cancelled`] when the work is to stop.
@@ -85,16 +85,16 @@ impl dyn ReadingsByContact + '_ {
 pub enum ContactLoad {
     /// A downward unit force: sensors read their influence.
     Force(Position),
-    /// Derivative by x: sensors read the derivative of their influence along the length, per metre.
+    /// Derivative with respect to x: sensors read the derivative of their influence along the length, per metre.
     ByX(Position),
-    /// Derivative by y, across the width.
+    /// Derivative with respect to y, across the width.
     ByY(Position),
-    /// One on a degree of freedom of [`ReadingsByContact::degrees`].
+    /// A unit load on a degree of freedom of [`ReadingsByContact::degrees`].
     Degree(usize),
 }
 
 impl ContactLoad {
-    /// Loads that tell the influences at one contact.
+    /// Number of loads that determine the influences at one contact.
     pub const EACH: usize = 3;
 
     /// The force at a contact and its derivatives.

@@ -11,16 +11,16 @@ use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
 use palpate_numerics::OutOfRange;
 
-/// A straight finger of rectangular section, clamped at x = 0 and free at x = l, that bends as far as a force bends it.
+/// A straight finger of rectangular section, clamped at x = 0 and free at x = l, that can bend far.
 ///
-/// It is read by strain gauges. For small forces they are proportional to the force, and that is its [`Surface`]; for any
-/// force they are those of its [`Elastica`]. Positions are counted along the finger, so a contact keeps its position when
+/// The sensors are strain gauges. For small forces their readings are proportional to the force: the influence functions of [`Surface`].
+/// For any force they are those of the finger's [`Elastica`]. Positions are counted along the finger, so a contact keeps its position when
 /// the finger bends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Finger", into = "Finger")]
 pub struct Digit(Finger);
 
-/// A digit that is yet to be checked.
+/// An unchecked digit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Finger {
     #[serde(flatten)]
@@ -34,7 +34,7 @@ pub enum DigitError {
     /// A dimension is not a positive, finite number.
     #[error(transparent)]
     NotPositive(#[from] OutOfRange),
-    /// The force that bends it markedly, E·I/l², is not a positive, finite number.
+    /// The force that causes large bending, E·I/l², is not a positive, finite number.
     #[error("a digit's characteristic force E·I/l² is {force_n} N; it must be greater than 0 and finite")]
     Stiffness {
         /// E·I/l², in newtons.
@@ -43,11 +43,11 @@ pub enum DigitError {
 }
 
 impl Digit {
-    /// The largest load F·s²/(E·I) of a contact that palpate looks for: where the founding tables of the bent cantilever
-    /// end. A vertical load of 10 turns the contact by 82°, a normal one by 157°.
+    /// The largest load F·s²/(E·I) of a contact in palpate's searches: the end of the founding tables of the bent cantilever.
+    /// A vertical load of 10 turns the contact by 82°, a normal one by 157°.
     pub const MOST_LOAD: f64 = 10.0;
 
-    /// A finger of this length, width and thickness, in metres, and Young's modulus, in pascals, pushed across itself.
+    /// A finger of this length, width and thickness, in metres, and Young's modulus, in pascals, with normal forces.
     ///
     /// # Errors
     /// [`DigitError`] for a number that is not positive and finite.
@@ -70,7 +70,7 @@ impl Digit {
         Self::try_from(Finger { strip, direction: ForceDirection::Normal })
     }
 
-    /// The same, touched by forces of this direction.
+    /// This digit with contact forces of this direction.
     #[must_use]
     pub fn with_direction(self, direction: ForceDirection) -> Self {
         Self(Finger { direction, ..self.0 })
@@ -106,12 +106,12 @@ impl Digit {
         self.0.strip.bending_stiffness()
     }
 
-    /// The force at the tip whose load F·l²/(E·I) is 1, in newtons: up to a tenth of it the finger is linear within 1 %.
+    /// The force F at the tip for a load F·l²/(E·I) of 1, in newtons: up to a tenth of it the finger is linear within 1 %.
     pub fn characteristic_force_n(&self) -> f64 {
         self.bending_stiffness() / (self.length_m() * self.length_m())
     }
 
-    /// The finger's exact shape when it is touched at `contact`.
+    /// The finger's exact shape under `contact`.
     pub fn shape(&self, contact: Contact) -> Elastica {
         Elastica::new(self.direction(), self.bending_stiffness(), contact.position.x_m, contact.force_n)
     }

@@ -1,19 +1,19 @@
-//! The exact shape of a thin finger that one force bends: Euler's elastica.
+//! The exact shape of a thin finger under one force: Euler's elastica.
 //!
-//! The finger is clamped at σ = 0, does not stretch, and is straight beyond the contact at σ = s. Before it, with ψ the angle by
-//! which the finger is turned downward,
+//! The finger is clamped at σ = 0, does not stretch, and is straight beyond the contact at σ = s. Let ψ be the downward rotation of
+//! the finger. Before the contact
 //!
 //! ψ″(σ) = −q·cos(ψ − α), ψ(0) = 0, ψ′(s) = 0, q = F/(E·I),
 //!
 //! where α is the angle of the force from the downward normal of the clamp: 0 for a force that stays vertical, ψ(s) for
-//! one that stays normal to the finger. Seen from the contact this is a pendulum of angle ω = π/2 + ψ − α that is let go
+//! one that stays normal to the finger. From the contact on this is a pendulum of angle ω = π/2 + ψ − α that starts
 //! at rest: with u = √q·(s − σ)
 //!
 //! sin(ω/2) = √m·cd(u | m), ψ′ = 2·√q·√(m·m′)·sd(u | m), m = sin²(ω(s)/2), m′ = 1 − m
 //!
-//! (Love, *A Treatise on the Mathematical Theory of Elasticity*, §§ 262–263; Jacobi's functions). A normal force starts the
-//! pendulum at ω = π/2, so that m = ½ whatever the load. A vertical one has to bring it to ω = π/2 at the clamp; with the
-//! Gudermannian w of the turn there, sin ψ(s) = tanh w and m = 1/(1 + e⁻²ʷ), the load is
+//! (Love, *A Treatise on the Mathematical Theory of Elasticity*, §§ 262–263; Jacobi's functions). For a normal force the
+//! pendulum starts at ω = π/2, so that m = ½ for any load. For a vertical one it reaches ω = π/2 at the clamp. With the
+//! Gudermannian w of the rotation there, sin ψ(s) = tanh w and m = 1/(1 + e⁻²ʷ), the load is
 //!
 //! F·s²/(E·I) = (1 − e⁻²ʷ)·R_F(e⁻²ʷ, 2/(1 + e²ʷ), 1)²
 //!
@@ -30,9 +30,9 @@ use palpate_numerics::{Jacobi, carlson_rd, carlson_rf};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ForceDirection {
-    /// Always across the finger where it is touched: a contact without friction.
+    /// Always normal to the finger at the contact: a contact without friction.
     Normal,
-    /// Always across the finger as it is when straight: a weight on a horizontal finger.
+    /// Always normal to the straight finger: a weight on a horizontal finger.
     Vertical,
 }
 
@@ -46,12 +46,12 @@ impl ForceDirection {
     }
 }
 
-/// Beyond this w, where a vertical load passes 10⁵, the contact hangs straight down to all digits.
+/// Largest w: a vertical load there passes 10⁵, and the finger at the contact hangs straight down to all digits.
 const MOST_TURN: f64 = 300.0;
-/// Newton steps; from above the root of a convex function about six reach the last bit.
+/// Largest number of Newton steps; from above the root of a convex function about six reach the last bit.
 const MOST_STEPS: usize = 60;
 
-/// A finger in its exact shape under one force.
+/// The exact shape of a finger under one force.
 ///
 /// ```
 /// use palpate_mechanics::surface::{Elastica, ForceDirection};
@@ -85,8 +85,8 @@ impl Elastica {
     /// The shape of a finger of bending stiffness E·I (N·m², greater than 0) under a force (N, positive downward) at
     /// `contact_m` metres along it, which is at least 0.
     ///
-    /// Valid for loads F·s²/(E·I) up to 10⁵ vertically; a normal load above 13.75 = (2·K(½))² turns the contact by more
-    /// than half a turn, which no frictionless finger bears without touching itself.
+    /// Valid for vertical loads F·s²/(E·I) up to 10⁵. A normal load above 13.75 = (2·K(½))² turns the contact by more
+    /// than half a turn, and a frictionless finger would then touch itself.
     pub fn new(direction: ForceDirection, stiffness_n_m2: f64, contact_m: f64, force_n: f64) -> Self {
         let q = force_n.abs() / stiffness_n_m2;
         let mut shape = Self {
@@ -127,8 +127,8 @@ impl Elastica {
         self.sign * 2.0 * self.q.sqrt() * self.half_cosine * sn / dn
     }
 
-    /// Derivatives of the curvature at `at_m` as the contact moves along the finger, in 1/m², and as the force grows, in
-    /// 1/(m·N); 0 beyond the contact, and at the contact what holds just before it.
+    /// Derivatives of the curvature at `at_m` with respect to the contact's position along the finger, in 1/m², and the force, in
+    /// 1/(m·N). They are 0 beyond the contact; at the contact they are the limits from before it.
     pub fn curvature_gradient(&self, at_m: f64) -> [f64; 2] {
         if at_m > self.contact_m {
             return [0.0; 2];
@@ -161,8 +161,8 @@ impl Elastica {
         [x0 - x1 + straight_m * cosine, -self.sign * (y0 - y1) - straight_m * sine]
     }
 
-    /// The vector from σ to the contact, along the straight finger and downward: with S = ∫ sin ω = ψ′/q and
-    /// C = ∫ cos ω = (2·(ℰ − m·sn·cd) − u)/√q over the way between them, (S·cos α + C·sin α, S·sin α − C·cos α).
+    /// The vector from σ to the contact, along the straight finger and downward. With the integrals S = ∫ sin ω = ψ′/q and
+    /// C = ∫ cos ω = (2·(ℰ − m·sn·cd) − u)/√q from σ to the contact it is (S·cos α + C·sin α, S·sin α − C·cos α).
     fn way_to_contact(&self, at_m: f64) -> [f64; 2] {
         if self.q == 0.0 {
             return [self.contact_m - at_m, 0.0];
@@ -198,8 +198,8 @@ struct Turn {
 }
 
 impl Turn {
-    /// Inverts the load by Newton's method. The load is convex in w, at least 2·w and at least (w − 1)², so the first guess
-    /// lies above the root, and so do all that follow.
+    /// Inverts the load by Newton's method. The load is convex in w, at least 2·w and at least (w − 1)². So the first guess
+    /// lies above the root, and so do all further iterates.
     fn of_load(load: f64) -> Self {
         let mut turn = Self { w: (0.5 * load).min(load.sqrt() + 1.0).min(MOST_TURN), by_load: 0.5 };
         for _ in 0..MOST_STEPS {

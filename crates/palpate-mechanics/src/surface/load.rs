@@ -1,15 +1,15 @@
-//! A force that is spread over part of a surface.
+//! A distributed force on part of a surface.
 
 use super::InfluenceFunction;
 use crate::contact::Position;
 
-/// Points along each side at which a spread force is summed: by the midpoint rule the kinks of strain and reaction sensors
+/// Points along each side in the sum over a distributed force. By the midpoint rule the kinks of strain and reaction sensors
 /// cost less than 10⁻⁴ of their full scale.
 const POINTS_ALONG: usize = 100;
-/// The same across, on a plane.
+/// Points across the width in that sum, on a plane.
 const POINTS_ACROSS: usize = 20;
 
-/// A force spread evenly over a stretch of a line, or over a rectangle of a plane.
+/// A uniformly distributed force on an interval of a line, or on a rectangle of a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UniformLoad {
     from: Position,
@@ -18,7 +18,7 @@ pub struct UniformLoad {
 }
 
 impl UniformLoad {
-    /// A force in newtons over a stretch of a line, from one end of it to the other, in metres.
+    /// A force in newtons on an interval of a line, between two ends in metres.
     ///
     /// ```
     /// use palpate_mechanics::surface::UniformLoad;
@@ -30,7 +30,7 @@ impl UniformLoad {
         Self::new(Position::along(from_m), Position::along(to_m), force_n)
     }
 
-    /// A force in newtons over the stretch, or the rectangle, between two opposite ends or corners.
+    /// A force in newtons on the interval or rectangle between two opposite ends or corners.
     pub const fn new(one: Position, other: Position, force_n: f64) -> Self {
         Self {
             from: Position { x_m: one.x_m.min(other.x_m), y_m: one.y_m.min(other.y_m) },
@@ -49,23 +49,23 @@ impl UniformLoad {
         self.to
     }
 
-    /// The whole force in newtons, positive downward.
+    /// The total force in newtons, positive downward.
     pub const fn force_n(&self) -> f64 {
         self.force_n
     }
 
-    /// The middle of it, where its force acts as a whole.
+    /// The centre of the load, where its resultant acts.
     pub fn centre(&self) -> Position {
         Position { x_m: self.from.x_m.midpoint(self.to.x_m), y_m: self.from.y_m.midpoint(self.to.y_m) }
     }
 
-    /// Reading of a sensor per newton of the load: the mean of the influence function over the stretch, in its unit.
+    /// Reading of a sensor per newton of the load: the mean of the influence function over the load, in its unit.
     pub fn mean(&self, influence: &dyn InfluenceFunction) -> f64 {
         let points = self.points();
         points.iter().map(|point| influence.at(*point)).sum::<f64>() / points.len() as f64
     }
 
-    /// Derivatives of that reading as the whole load moves along x and along y, per metre.
+    /// Derivatives of that reading with respect to a motion of the whole load along x and along y, per metre.
     pub fn mean_gradient(&self, influence: &dyn InfluenceFunction) -> [f64; 2] {
         let points = self.points();
         let sum = points.iter().fold([0.0, 0.0], |[sum_x, sum_y], point| {
@@ -100,7 +100,7 @@ mod tests {
         Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap()
     }
 
-    /// 5·q·l⁴/(384·E·I) at mid-span, t·q·l²/(16·E·I) there, and half of the load at either support.
+    /// 5·q·l⁴/(384·E·I) at mid-span, t·q·l²/(16·E·I) there, and half of the load at each support.
     #[test]
     fn a_load_all_over_a_beam_bends_it_as_tables_say() {
         let (beam, l) = (beam(), 0.4);

@@ -1,4 +1,4 @@
-//! Surfaces and their influence functions: the reading of a sensor when a unit force acts somewhere; nothing of recordings or estimators.
+//! Surfaces and their influence functions: the reading of a sensor under a unit force at a position. Recordings and estimators are elsewhere.
 
 mod beam;
 mod by_contact;
@@ -32,15 +32,15 @@ use crate::sensing::SensorKind;
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// An elastic surface with a model.
+/// An elastic surface with a model of its mechanics.
 ///
 /// Forces are positive downward, deflections upward, so deflections are negative as in the founding paper's eq. (1).
 pub trait Surface: Send + Sync {
-    /// The influence function of a sensor of this `kind` at `sensor`, which must be on the surface. On a surface that is
-    /// solved by elements this is one solution, so ask once and keep the answer.
+    /// The influence function of a sensor of this `kind` at `sensor`, which must be on the surface. On a surface of finite elements
+    /// each call takes one solution, so keep the result.
     fn influence_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_>;
 
-    /// The influence functions of several sensors of one kind; some surfaces have them sooner together than one by one.
+    /// The influence functions of several sensors of one kind; some surfaces compute them faster together than one by one.
     fn influence_functions(
         &self,
         kind: SensorKind,
@@ -49,7 +49,7 @@ pub trait Surface: Send + Sync {
         sensors.iter().map(|sensor| self.influence_function(kind, *sensor)).collect()
     }
 
-    /// The same, watched while the surface is solved.
+    /// The influence functions of several sensors of one kind, watched during the solution.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch stopped it.
@@ -63,12 +63,12 @@ pub trait Surface: Send + Sync {
         Ok(self.influence_functions(kind, sensors))
     }
 
-    /// The response function of a sensor: its influence times the force, unless the surface bends too far for that.
+    /// The response function of a sensor: influence times force, unless the surface bends too far for that.
     fn response_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn ResponseFunction + '_> {
         Arc::new(Proportional(self.influence_function(kind, sensor)))
     }
 
-    /// The response functions of several sensors of one kind, as [`Surface::influence_functions`] has their influence functions.
+    /// The response functions of several sensors of one kind, in the way of [`Surface::influence_functions`].
     fn response_functions(
         &self,
         kind: SensorKind,
@@ -77,7 +77,7 @@ pub trait Surface: Send + Sync {
         sensors.iter().map(|sensor| self.response_function(kind, *sensor)).collect()
     }
 
-    /// The same, watched while the surface is solved.
+    /// The response functions of several sensors of one kind, watched during the solution.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch stopped it.
@@ -91,7 +91,7 @@ pub trait Surface: Send + Sync {
         Ok(self.response_functions(kind, sensors))
     }
 
-    /// Readings of many sensors, contact by contact; `None` where a surface has nothing that is sooner than their influence
+    /// Readings of many sensors, contact by contact; `None` where a surface has no faster way than influence
     /// functions.
     fn readings_by_contact(
         &self,
@@ -100,40 +100,40 @@ pub trait Surface: Send + Sync {
         None
     }
 
-    /// Work and memory of solving the surface for so many sensors, by an estimate that solves nothing; `None` where closed forms take next
-    /// to none, and nothing is solved by contact.
+    /// Estimated work and memory of solving the surface for this number of sensors, without a solution. `None` for closed forms, which take
+    /// almost no work and are not solved by contact.
     fn solution_cost(&self, _sensors: usize, _solving: Solving) -> Option<SolutionCost> {
         None
     }
 
-    /// One value of an influence function, where no other of the same sensor is wanted.
+    /// One value of an influence function, for a single use of the sensor.
     fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64 {
         self.influence_function(kind, sensor).at(contact)
     }
 
-    /// Whether a support at `position` takes up force, so that its reaction can be measured.
+    /// True when a support at `position` has a reaction force, which can be measured.
     fn is_supported_at(&self, position: Position) -> bool;
 
-    /// Positions at which single supports take up force, so that a reaction can be measured there, from left to right.
+    /// Positions of single supports with a measurable reaction force, from left to right.
     fn force_supports(&self) -> Vec<Position> {
         Vec::new()
     }
 
-    /// Reason for which a sensor of this `kind` at `sensor` reads 0 wherever the surface is touched; `None` where it reads something.
+    /// Reason for which a sensor of this `kind` at `sensor` reads 0 for every contact; `None` for a sensitive sensor.
     fn insensitive_sensor(&self, _kind: SensorKind, _sensor: Position) -> Option<InsensitiveSensor> {
         None
     }
 
-    /// Solves the surface, where that has to be done, and checks that it is in balance under forces all over it; before that is known, and
-    /// where it cannot be solved, its functions may be NaN.
+    /// Solves the surface, where necessary, and checks that it is in balance under forces all over it. Before this check, and
+    /// where no solution exists, the surface's functions may be NaN.
     ///
     /// # Errors
-    /// [`Unsolvable`], with what is singular or out of balance.
+    /// [`Unsolvable`], with the singular equations or the imbalance.
     fn check_solution(&self) -> Result<(), Unsolvable> {
         self.check_solution_watched(Watch::NONE)
     }
 
-    /// The same, watched; where it was stopped, the surface is as it was before.
+    /// Checks the solution as [`Surface::check_solution`] does, watched; a stop leaves the surface unchanged.
     ///
     /// # Errors
     /// As [`Surface::check_solution`], and [`Unsolvable::Cancelled`].
@@ -141,10 +141,10 @@ pub trait Surface: Send + Sync {
         Ok(watch.round()?)
     }
 
-    /// The largest magnitude that `influence` has for this `kind`, over all sensor and contact positions.
+    /// The largest magnitude of `influence` for this `kind`, over all sensor and contact positions.
     fn full_scale(&self, kind: SensorKind) -> f64;
 
-    /// The area that can be touched.
+    /// The extent of the surface.
     fn extent(&self) -> Extent;
 
     /// Length l of the surface along x, in metres.
@@ -152,20 +152,20 @@ pub trait Surface: Send + Sync {
         self.extent().length_m()
     }
 
-    /// Whether `position` is on the surface, its boundary included.
+    /// True for a `position` on the surface, its boundary included.
     fn contains(&self, position: Position) -> bool {
         self.extent().contains(position)
     }
 }
 
-/// Influence function of one sensor: its reading per newton of downward force, as a function of where the force acts.
+/// Influence function of one sensor: its reading per newton of downward force, as a function of the contact's position.
 pub trait InfluenceFunction: Send + Sync {
     /// The reading per newton of downward force at `contact`, in SI units per newton (m/N, rad/N, 1/N, N/N); 0 for a raw
-    /// channel, which no model explains. Off the surface the value has no meaning.
+    /// channel, which has no model. Off the surface the value has no meaning.
     fn at(&self, contact: Position) -> f64;
 
-    /// Derivatives by the contact's position along x and along y, in its unit per metre; 0 along y on a
-    /// one-dimensional surface. Where the influence has a kink, some value between those of its two sides.
+    /// Derivatives with respect to the contact's position along x and along y, in the reading's unit per newton and metre; 0 along y on a
+    /// one-dimensional surface. At a kink, a value between those of the two sides.
     fn gradient(&self, contact: Position) -> [f64; 2];
 }
 
@@ -174,16 +174,16 @@ pub trait ResponseFunction: Send + Sync {
     /// The reading at `contact`, in the sensor's SI unit; 0 for a raw channel. Off the surface the value has no meaning.
     fn at(&self, contact: Contact) -> f64;
 
-    /// Derivatives of the reading by the contact. Where it has a kink, some value between those of its two sides.
+    /// Derivatives of the reading with respect to the contact. At a kink, a value between those of the two sides.
     fn gradient(&self, contact: Contact) -> ResponseGradient;
 }
 
-/// The derivatives of a reading by its contact.
+/// The derivatives of a reading with respect to its contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ResponseGradient {
-    /// By the contact's position along x and along y, in the reading's unit per metre.
+    /// With respect to the contact's position along x and along y, in the reading's unit per metre.
     pub position: [f64; 2],
-    /// By its force, in the reading's unit per newton.
+    /// With respect to the contact's force, in the reading's unit per newton.
     pub force: f64,
 }
 
@@ -202,44 +202,44 @@ impl ResponseFunction for Proportional<'_> {
     }
 }
 
-/// Reason for which a sensor reads 0 wherever the surface is touched.
+/// Reason for which a sensor reads 0 for every contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InsensitiveSensor {
-    /// A support of a beam holds what it measures.
+    /// A support of a beam fixes the measured quantity.
     #[error("{} there", held(*kind))]
     Held {
         /// Quantity that the sensor measures.
         kind: SensorKind,
     },
-    /// The edge of a plate cannot move so.
-    #[error("the {edge} edge, which is {held}, has no {kind} wherever the plate is touched")]
+    /// The edge of a plate fixes the measured quantity.
+    #[error("the {edge} edge, which is {held}, has no {kind} for any contact")]
     AtEdge {
-        /// Which edge.
+        /// Name of the edge.
         edge: &'static str,
         /// Condition along that edge.
         held: &'static str,
         /// Quantity that the sensor measures.
         kind: SensorKind,
     },
-    /// The deflection of a plate over a support that does not give.
+    /// The deflection of a plate over a rigid support.
     #[error("simple support {number} keeps the plate from deflecting there")]
     AtSupport {
-        /// Which support, from 1.
+        /// Number of the support, from 1.
         number: usize,
     },
 }
 
-/// Reason for which a support leaves a sensor of this kind nothing to read.
+/// Text of the reason for which a beam's sensor of this kind reads 0.
 fn held(kind: SensorKind) -> &'static str {
     match kind {
-        SensorKind::Deflection => "a support holds the surface",
-        SensorKind::Slope => "a support holds the slope",
-        SensorKind::Strain => "nothing bends the surface",
+        SensorKind::Deflection => "a support fixes the surface",
+        SensorKind::Slope => "a support fixes the slope",
+        SensorKind::Strain => "no contact bends the surface",
         SensorKind::Reaction | SensorKind::Raw => "nothing acts",
     }
 }
 
-/// The surface that is touched.
+/// The description of a surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SurfaceSpec {
@@ -251,7 +251,7 @@ pub enum SurfaceSpec {
     Plate(Plate),
     /// A flexible cantilever finger.
     Digit(Digit),
-    /// A surface without a model, known by recordings only.
+    /// A surface without a model, for which only recordings exist.
     Measured(Extent),
 }
 
@@ -286,7 +286,7 @@ impl From<Extent> for SurfaceSpec {
 }
 
 impl SurfaceSpec {
-    /// The area that can be touched.
+    /// The extent of the surface.
     pub fn extent(&self) -> Extent {
         match self {
             Self::Beam(beam) => beam.extent(),
@@ -297,7 +297,7 @@ impl SurfaceSpec {
         }
     }
 
-    /// Its mechanics, where it has a model.
+    /// The mechanics of the surface; `None` without a model.
     pub fn model(&self) -> Option<&dyn Surface> {
         match self {
             Self::Beam(beam) => Some(beam),
@@ -319,7 +319,7 @@ struct Strip {
 }
 
 impl Strip {
-    /// Checks that length, width, thickness and Young's modulus, named so in the error, are positive and finite.
+    /// Checks that length, width, thickness and Young's modulus are positive and finite; `names` are for the error.
     fn check(&self, names: [&'static str; 4]) -> Result<(), OutOfRange> {
         let values = [self.length_m, self.width_m, self.thickness_m, self.youngs_modulus_pa];
         OutOfRange::check_positive(names.into_iter().zip(values))

@@ -1,16 +1,16 @@
 //! Loads that move along the simply supported beam, with its inertia and damping: modal superposition.
 //!
-//! The beam's downward deflection is w(x, t) = Σ_k φ_k(x)·q_k(t) over the modes φ_k(x) = sin(kπx/l), and loads W_j(t) at
-//! a_j(t) drive each of them alone (L. Frýba, *Vibration of Solids and Structures under Moving Loads*, 3rd ed. 1999,
+//! The beam's downward deflection is w(x, t) = Σ_k φ_k(x)·q_k(t) over the modes φ_k(x) = sin(kπx/l). Loads W_j(t) at
+//! a_j(t) drive each mode independently (L. Frýba, *Vibration of Solids and Structures under Moving Loads*, 3rd ed. 1999,
 //! chapter 1):
 //!
 //! q̈_k + 2ζω_k·q̇_k + ω_k²·q_k = Σ_j W_j·φ_k(a_j)/m_k, with ω_k = (kπ/l)²·√(E·I/(ρ·A)) and m_k = ρ·A·l/2.
 //!
-//! What finitely many modes leave out follows the load without delay, so it is added in closed form: a sensor reads its
-//! static value, plus its share of each mode's departure from that mode's static value (the mode acceleration method of
-//! D. Williams, 1945). A load that creeps is then read as exactly as by [`Beam`] itself.
+//! The remainder beyond finitely many modes follows the load without delay, so it is added in closed form. A sensor reads its
+//! static value, plus its share of each mode's departure from the mode's static value (the mode acceleration method of
+//! D. Williams, 1945). The readings for a slowly moving load are therefore as exact as those of [`Beam`] itself.
 //!
-//! The load has a force and no mass; the weight of the beam itself is tared away.
+//! The load has a force and no mass; the weight of the beam is tared.
 
 use std::f64::consts::PI;
 
@@ -35,7 +35,7 @@ pub struct ModalBeam {
     damping_ratio: f64,
 }
 
-/// Error of a beam whose motion cannot be computed.
+/// Error of a beam with a motion that cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ModalBeamError {
     /// The density is not a positive, finite number.
@@ -44,7 +44,7 @@ pub enum ModalBeamError {
         /// Value, in kg/m³.
         density_kg_per_m3: f64,
     },
-    /// The damping ratio is not one of a beam that swings.
+    /// The damping ratio is negative, or not below critical damping.
     #[error("the damping ratio is {damping_ratio}; it must be at least 0 and below 1")]
     Damping {
         /// Value.
@@ -59,14 +59,14 @@ pub enum ModalBeamError {
 }
 
 impl ModalBeam {
-    /// The damping ratio of thin metal on wedges, where nobody measured it.
+    /// Default damping ratio, for thin metal on wedges without a measured value.
     pub const USUAL_DAMPING_RATIO: f64 = 0.01;
 
-    /// `beam` of a material of density ρ, in kg/m³, with the share ζ of the critical damping in every mode.
+    /// `beam` of a material of density ρ, in kg/m³, with the damping ratio ζ in every mode.
     ///
     /// # Errors
-    /// [`ModalBeamError`] for a density that is not greater than 0 and finite, for ζ below 0 or not below 1, and where the
-    /// frequency that follows is no number.
+    /// [`ModalBeamError`] for a density that is not greater than 0 and finite, for ζ below 0 or not below 1, and for a
+    /// first natural frequency that is not greater than 0 and finite.
     pub fn new(beam: Beam, density_kg_per_m3: f64, damping_ratio: f64) -> Result<Self, ModalBeamError> {
         let positive = |value: f64| value > 0.0 && value.is_finite();
         if !positive(density_kg_per_m3) {
@@ -80,12 +80,12 @@ impl ModalBeam {
         if positive(frequency_hz) { Ok(modal) } else { Err(ModalBeamError::Frequency { frequency_hz }) }
     }
 
-    /// Shape and stiffness.
+    /// The beam's shape and stiffness.
     pub fn beam(&self) -> &Beam {
         &self.beam
     }
 
-    /// Share ζ of the critical damping that every mode has.
+    /// Damping ratio ζ of every mode.
     pub fn damping_ratio(&self) -> f64 {
         self.damping_ratio
     }
@@ -105,13 +105,13 @@ impl ModalBeam {
         self.angular_frequency(k) / (2.0 * PI)
     }
 
-    /// The speed v_cr = (π/l)·√(E·I/(ρ·A)) at which a steady load passes from support to support within half a period of
-    /// the first mode, in m/s; the load that goes with the first mode's own wave.
+    /// The speed v_cr = (π/l)·√(E·I/(ρ·A)) of a steady load that passes from support to support within half a period of
+    /// the first mode, in m/s; it equals the wave speed of the first mode.
     pub fn critical_speed_m_per_s(&self) -> f64 {
         self.angular_frequency(1) / self.wave_number(1)
     }
 
-    /// The beam in balance under `loads`, at rest; `modes` of its modes move.
+    /// The beam in balance under `loads`, at rest, with `modes` dynamic modes.
     pub fn at_rest(&self, modes: usize, loads: &[Contact]) -> ModalResponse {
         let mut response = ModalResponse {
             beam: *self,
@@ -131,14 +131,14 @@ impl ModalBeam {
         k as f64 * PI / self.beam.length_m()
     }
 
-    /// m_k = ρ·A·l/2, in kg, the same for every mode.
+    /// m_k = ρ·A·l/2, in kg, for every mode.
     fn modal_mass(&self) -> f64 {
         0.5 * self.mass_per_length() * self.beam.length_m()
     }
 }
 
-/// The highest mode's force turns by at most this many radians in a step of the integration, so that between its ends it
-/// is as good as linear: its middle is off by 1/8 of the square, 10⁻⁵.
+/// Largest phase, in radians, by which a step of the integration advances the highest mode's force. The force is then linear
+/// within a step to 1/8 of the square, 10⁻⁵.
 const MOST_RADIANS: f64 = 0.01;
 
 /// A beam under moving loads, at an instant.
@@ -148,14 +148,14 @@ pub struct ModalResponse {
     /// The loads at this instant.
     loads: Vec<Contact>,
     modes: Vec<State>,
-    /// The oscillators of the last step, which is mostly like the one before.
+    /// The oscillators of the last step, cached because the step length rarely changes.
     oscillators: Vec<Oscillator>,
     step_s: f64,
 }
 
 impl ModalResponse {
-    /// Lets `duration_s` pass, greater than 0, in which every load goes evenly in place and force to what `loads` says;
-    /// they are as many as before, those that do not touch with force 0.
+    /// Advances the beam by `duration_s`, greater than 0. Each load changes linearly in place and force to its value in `loads`.
+    /// The number of loads stays the same; a load without contact has force 0.
     pub fn advance(&mut self, loads: &[Contact], duration_s: f64) {
         let steps = self.steps(loads);
         self.prepare(duration_s / steps as f64);
@@ -173,12 +173,12 @@ impl ModalResponse {
         }
     }
 
-    /// Puts other loads on all at once, before anything has moved: a load let go, or one that drops on.
+    /// Replaces the loads instantly, before any motion: a released load, or a dropped one.
     pub fn change_loads(&mut self, loads: &[Contact]) {
         self.loads = loads.to_vec();
     }
 
-    /// Reading of a faultless sensor of a kind at `sensor`, in its SI unit; 0 for a raw channel.
+    /// Reading of a sensor of a kind at `sensor` without channel faults, in its SI unit; 0 for a raw channel.
     pub fn reading(&self, kind: SensorKind, sensor: Position) -> f64 {
         let beam = &self.beam.beam;
         let at_once = |load: &Contact| load.force_n * beam.influence(kind, sensor, load.position);
@@ -187,9 +187,9 @@ impl ModalResponse {
         at_once + (1..=self.modes.len()).map(|k| self.shape(k, kind, sensor.x_m) * late(k)).sum::<f64>()
     }
 
-    /// Reading of a sensor per metre of q_k, with the sign conventions of [`Beam`](crate::surface::Beam): of the downward
-    /// deflection sin(kπx/l), the upward deflection, its derivative, t/2 times its second derivative, and at the supports
-    /// E·I times the third, as a force upward.
+    /// Reading of a sensor per metre of q_k, with the sign conventions of [`Beam`](crate::surface::Beam). For the downward
+    /// deflection sin(kπx/l) it is the upward deflection, its derivative, or t/2 times its second derivative. At the supports it is
+    /// E·I times the third derivative, as an upward force.
     fn shape(&self, k: usize, kind: SensorKind, x_m: f64) -> f64 {
         let beam = &self.beam.beam;
         let wave = self.beam.wave_number(k);
@@ -218,7 +218,7 @@ impl ModalResponse {
         self.acceleration(k, loads) / self.beam.angular_frequency(k).powi(2)
     }
 
-    /// Steps in which the way to `loads` is gone.
+    /// Number of integration steps on the way to `loads`.
     fn steps(&self, loads: &[Contact]) -> usize {
         let moved = |(from, to): (&Contact, &Contact)| (to.position.x_m - from.position.x_m).abs();
         let farthest_m = self.loads.iter().zip(loads).map(moved).fold(0.0, f64::max);
@@ -226,7 +226,7 @@ impl ModalResponse {
         (radians / MOST_RADIANS).ceil().clamp(1.0, 1e6) as usize
     }
 
-    /// Has oscillators ready for steps of a length.
+    /// Prepares oscillators for steps of `step_s`.
     fn prepare(&mut self, step_s: f64) {
         if step_s != self.step_s {
             let (beam, zeta) = (&self.beam, self.beam.damping_ratio);
@@ -237,7 +237,7 @@ impl ModalResponse {
     }
 }
 
-/// A load on its way.
+/// A contact between two contacts, at a share of the way.
 fn interpolated(from: Contact, to: Contact, share: f64) -> Contact {
     let mix = |from: f64, to: f64| from + share * (to - from);
     Contact {
@@ -248,8 +248,8 @@ fn interpolated(from: Contact, to: Contact, share: f64) -> Contact {
 
 /// A damped oscillator q̈ + 2ζω·q̇ + ω²·q = p over steps of one length.
 ///
-/// While p is linear in time, q_p = A + B·t with B = ṗ/ω² and A = p₀/ω² − 2ζṗ/ω³ solves the equation, and the remainder of
-/// place and velocity swings freely; both are known in closed form, so a step is exact however long it is (N. C. Nigam
+/// While p is linear in time, q_p = A + B·t with B = ṗ/ω² and A = p₀/ω² − 2ζṗ/ω³ solves the equation. The remainder of
+/// place and velocity oscillates freely. Both have closed forms, so a step of any length is exact (N. C. Nigam
 /// and P. C. Jennings, Bull. Seismol. Soc. Am. 59, 1969).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Oscillator {
@@ -290,7 +290,7 @@ impl Oscillator {
         self.free
     }
 
-    /// One step, over which p goes evenly from `from` to `to`.
+    /// One step, over which p changes linearly from `from` to `to`.
     fn step(&self, state: State, from: f64, to: f64) -> State {
         let square = self.omega * self.omega;
         let slope = (to - from) / self.step_s;

@@ -1,15 +1,15 @@
-//! A contact that goes to and fro.
+//! A contact that moves back and forth.
 
 use std::f64::consts::PI;
 
 use crate::contact::{Contact, Position};
 use palpate_numerics::OutOfRange;
 
-/// A contact that moves between two places and back, straight, as often as is said.
+/// A contact that moves between two places and back along a straight line, for a number of passes.
 ///
-/// A pass starts and ends at rest. Its speed builds up and falls as (1 − cos)/2 over `turn_m` at either end, so that it has
-/// no jump in the acceleration, and is constant between: a turn of length s at speed v takes 2s/v and accelerates by
-/// πv²/(4s) at most. Between passes the contact is lifted for `lifted_s`, and lets go and comes down over `touch_s` each.
+/// A pass starts and ends at rest. At either end the speed rises and falls as (1 − cos)/2 over `turn_m`, without a
+/// jump in the acceleration. Between the ends it is constant. A turn of length s at speed v takes 2s/v and has an acceleration of
+/// πv²/(4s) at most. Between passes the contact is lifted for `lifted_s`; its release and its return take `touch_s` each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     from: Position,
@@ -21,17 +21,17 @@ pub struct Motion {
     touch_s: f64,
 }
 
-/// Straight pieces of a turn: they stay within π/(8·200²) = 10⁻⁵ of its length, and the force within 1.6·10⁻⁵ of it.
+/// Straight pieces of a turn: their error is within π/(8·200²) = 10⁻⁵ of its length, and that of the force within 1.6·10⁻⁵ of it.
 const PIECES: usize = 200;
 
-/// Time before and after the instant at which a force without a time of touching is gone or there.
+/// Time before and after a sudden change of the force, in seconds.
 const AT_ONCE_S: f64 = 1e-9;
 
 impl Motion {
     /// One pass from a place to another one, with turns of `turn_m` metres at both ends and a constant speed between them.
     ///
     /// # Errors
-    /// [`OutOfRange`] unless the way and the speed are greater than 0, and a turn is so too and at most half the way.
+    /// [`OutOfRange`] unless the distance and the speed are greater than 0, and the turn is greater than 0 and at most half the distance.
     ///
     /// ```
     /// use palpate_mechanics::contact::Position;
@@ -45,24 +45,24 @@ impl Motion {
         Self { from, to, speed_m_per_s, turn_m, passes: 1, lifted_s: 0.0, touch_s: 0.0 }.checked()
     }
 
-    /// The same at another constant speed, in m/s.
+    /// This motion with another constant speed, in m/s.
     ///
     /// # Errors
-    /// [`OutOfRange`] unless it is greater than 0 and finite.
+    /// [`OutOfRange`] unless the speed is greater than 0 and finite.
     pub fn with_speed(self, speed_m_per_s: f64) -> Result<Self, OutOfRange> {
         Self { speed_m_per_s, ..self }.checked()
     }
 
-    /// The same way gone `passes` times, there and back in turn.
+    /// This motion with `passes` passes, in alternating directions.
     ///
     /// # Errors
-    /// [`OutOfRange`] for none.
+    /// [`OutOfRange`] for no passes.
     pub fn with_passes(self, passes: usize) -> Result<Self, OutOfRange> {
         Self { passes, ..self }.checked()
     }
 
-    /// The same, with nothing touching for `lifted_s` seconds between two passes (0 to keep touching), and a force that takes
-    /// `touch_s` seconds to fall before that and to build up after it.
+    /// This motion with the surface untouched for `lifted_s` seconds between two passes (0 for a permanent contact). The force takes
+    /// `touch_s` seconds to fall before that and to rise after it.
     ///
     /// # Errors
     /// [`OutOfRange`] for a time that is negative or not finite.
@@ -89,8 +89,8 @@ impl Motion {
         self.passes as f64 * self.pass_s() + (self.passes - 1) as f64 * self.rest_s()
     }
 
-    /// The contact at `time_s`, held to the first and the last moment; its force, in newtons, is `force_n` or, while it is
-    /// lifted, less.
+    /// The contact at `time_s`, clamped to the duration of the motion. The force is `force_n`, in newtons, or less while the contact is
+    /// lifted.
     pub fn contact_at(&self, time_s: f64, force_n: f64) -> Contact {
         let time_s = time_s.clamp(0.0, self.duration_s());
         let cycle_s = self.pass_s() + self.rest_s();
@@ -108,7 +108,7 @@ impl Motion {
     }
 
     /// Instants after `from_s` and before `to_s`, ascending, at which a path of straight pieces must break to follow the motion:
-    /// each turn, and each falling or growing of the force, in 200 of them. What is between is even already.
+    /// each turn, and each fall or rise of the force, has 200 pieces. Between them the motion is linear.
     pub fn breaks_s(&self, from_s: f64, to_s: f64) -> Vec<f64> {
         let cycle_s = self.pass_s() + self.rest_s();
         let pass_at = |time_s: f64| ((time_s / cycle_s).max(0.0) as usize).min(self.passes - 1);
@@ -126,8 +126,8 @@ impl Motion {
         breaks
     }
 
-    /// Spans, from the start of a pass, in which its contact speeds up or slows down, and in which its force falls or builds up
-    /// after it; a force that changes all at once does so within [`AT_ONCE_S`] of that instant.
+    /// Intervals, from the start of a pass, in which its contact accelerates or slows down, and in which its force falls or rises
+    /// after it. A sudden change of the force lies within [`AT_ONCE_S`] of its instant.
     fn curved_s(&self, pass: usize) -> [Option<[f64; 2]>; 4] {
         let (turn_s, pass_s, rest_s) = (self.turn_s(), self.pass_s(), self.rest_s());
         let is_lifted = rest_s > 0.0 && pass + 1 < self.passes;
@@ -160,7 +160,7 @@ impl Motion {
         if self.lifted_s > 0.0 { self.lifted_s + 2.0 * self.touch_s } else { 0.0 }
     }
 
-    /// Distance gone in a pass, in metres, `since_s` seconds after its start.
+    /// Distance since the start of a pass, in metres, `since_s` seconds after it.
     fn way_m(&self, since_s: f64) -> f64 {
         let (turn_s, left_s) = (self.turn_s(), self.pass_s() - since_s);
         let turning = |t: f64| 0.5 * self.speed_m_per_s * (t - turn_s / PI * (PI * t / turn_s).sin());
@@ -173,7 +173,7 @@ impl Motion {
         }
     }
 
-    /// The share of the force at a time after the end of a pass: it falls, is 0, and builds up, each as (1 ± cos)/2.
+    /// The share of the force at a time after the end of a pass: it falls, is 0, and rises, each as (1 ± cos)/2.
     fn pressed(&self, rest_s: f64) -> f64 {
         if rest_s <= 0.0 || self.lifted_s <= 0.0 {
             return 1.0;
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn it_goes_there_and_back_and_is_lifted_between() {
-        // A pass takes 0.2 s of turns twice and 0.4 s between them, a rest 0.5 s.
+        // A pass takes two turns of 0.2 s and 0.4 s between them; a rest takes 0.5 s.
         assert!((motion().duration_s() - (3.0 * 0.8 + 2.0 * 0.5)).abs() < 1e-12);
         let at = |time_s: f64| {
             let Contact { position, force_n } = motion().contact_at(time_s, 3.0);
@@ -207,7 +207,7 @@ mod tests {
 
     #[test]
     fn on_a_plane_it_goes_straight_at_the_same_speed() {
-        // 300 mm long, as along the line.
+        // The distance is 300 mm, as along the line.
         let (from, to) = (Position { x_m: 0.3, y_m: 0.25 }, Position { x_m: 0.06, y_m: 0.07 });
         let plane = Motion { from, to, ..motion() };
         for time_s in [0.1, 0.2, 0.35, 0.7, 1.45] {

@@ -79,7 +79,7 @@ proptest! {
     #[test]
     fn the_closed_gradient_is_the_differenced_one(x in 0.0..=0.4_f64, a in 0.0..=0.4_f64) {
         const STEP_M: f64 = 4e-6;
-        // Strain has a kink over its sensor, and the slope one in its derivative.
+        // The strain has a kink over the sensor, and so has the derivative of the slope.
         prop_assume!((x - a).abs() > 2.0 * STEP_M && (STEP_M..=0.4 - STEP_M).contains(&a));
         for kind in SensorKind::ALL {
             let (sensor, contact) = (Position::along(x), Position::along(a));

@@ -1,4 +1,4 @@
-//! Predictions from points eight side by side: their correlations with a place, sums weighted by them, and products with triangles.
+//! Predictions from points in blocks of eight: correlations with a place, weighted sums, and products with triangles.
 
 use super::Kernel;
 use crate::simd::{Arithmetic, InstructionSet, Kernel as Work, Simd, Vector};
@@ -10,14 +10,14 @@ pub(super) struct Blocks {
     kernel: Kernel,
     coordinates: usize,
     outputs: usize,
-    /// u of eight points, coordinate by coordinate, block by block; the last is filled up with zeros.
+    /// u of eight points, coordinate by coordinate, block by block; the last block is padded with zeros.
     points: Vec<[f64; 8]>,
-    /// α of eight points, output by output, block by block; zeros where no point is.
+    /// α of eight points, output by output, block by block, padded with zeros.
     weights: Vec<[f64; 8]>,
 }
 
 impl Blocks {
-    /// From u, d×n, and α, m×n.
+    /// Blocks from u, d×n, and α, m×n.
     pub fn new(kernel: Kernel, scaled: &ArrayView2<f64>, weights: &ArrayView2<f64>) -> Self {
         Self {
             kernel,
@@ -40,7 +40,7 @@ impl Blocks {
     }
 }
 
-/// Columns of a matrix, eight side by side.
+/// Columns of a matrix in blocks of eight.
 fn in_blocks(matrix: &ArrayView2<f64>) -> Vec<[f64; 8]> {
     let (rows, columns) = matrix.dim();
     let mut blocks = vec![[0.0; 8]; rows * columns.div_ceil(8)];
@@ -72,7 +72,7 @@ impl Work for Sums<'_> {
 }
 
 impl Sums<'_> {
-    /// Blocks of outputs whose sums stay in registers.
+    /// Number of blocks of outputs with their sums in registers.
     const OUTPUTS: usize = 4;
 
     #[inline(always)]
@@ -122,15 +122,15 @@ fn squared_exponential<V: Vector<8, Real = f64>>(r2: V) -> V {
     (V::splat(-0.5) * r2).exponential()
 }
 
-/// A lower triangle, its rows eight side by side.
+/// A lower triangle, with its rows in blocks of eight.
 #[derive(Clone, Debug)]
 pub(super) struct Triangle {
-    /// Column by column as far as the diagonal of its last row, block by block; rows beyond the last are 0.
+    /// Each block column by column, up to the diagonal of its last row; rows beyond the last are 0.
     blocks: Vec<Vec<[f64; 8]>>,
 }
 
 impl Triangle {
-    /// From a matrix of which the lower triangle is read.
+    /// The lower triangle of a matrix.
     pub fn new(matrix: &ArrayView2<f64>) -> Self {
         let size = matrix.nrows();
         let block = |first: usize| {
@@ -145,7 +145,7 @@ impl Triangle {
         Self { blocks: (0..size).step_by(8).map(block).collect() }
     }
 
-    /// T·x into the first numbers of `out`, in blocks; x is as long as the triangle's side. Returns |T·x|².
+    /// T·x into the first numbers of `out`, in blocks; the length of x is the size of the triangle. Returns |T·x|².
     pub fn product_into(&self, x: &[f64], out: &mut [[f64; 8]]) -> f64 {
         InstructionSet::best().run(Product { triangle: self, x, out })
     }
@@ -165,7 +165,7 @@ impl Work for Product<'_> {
     fn run<S: Simd>(self) -> f64 {
         let mut square = S::F64::splat(0.0);
         for (block, out) in self.triangle.blocks.iter().zip(self.out) {
-            // Four sums hide what a multiply-add takes.
+            // Four sums hide the latency of a multiply-add.
             let mut sums = [S::F64::splat(0.0); 4];
             let (columns, rest) = block.as_chunks::<4>();
             let (x, x_rest) = self.x.as_chunks::<4>();
@@ -174,7 +174,7 @@ impl Work for Product<'_> {
                     *sum = S::F64::load(column).mul_add(S::F64::splat(*x), *sum);
                 }
             }
-            // A block that ends within four columns is the last one.
+            // Only the last block ends within four columns.
             let x_rest = x.get(columns.len()).map_or(x_rest, |x| &x[..]);
             for (column, x) in rest.iter().zip(x_rest) {
                 sums[0] = S::F64::load(column).mul_add(S::F64::splat(*x), sums[0]);
@@ -187,7 +187,7 @@ impl Work for Product<'_> {
     }
 }
 
-/// Correlations of some places with some points, a row a place; both d×….
+/// Correlations of places (rows) with points (columns); both arguments are d×….
 pub(super) fn cross_correlations(
     kernel: Kernel,
     places: &ArrayView2<f64>,

@@ -1,9 +1,9 @@
-//! The covariance of the rows, factored.
+//! The factored covariance of the rows.
 //!
 //! With S = C + b²·H·Hᵀ the signal's covariance over s² and D the noise's, C_ij = c(x_i, x_j), every computation needs
 //! P = (K + b²·H·Hᵀ)⁻¹, K = C + D. The matrix inversion lemma gives it from the factors of K, n×n, and of
-//! A = Hᵀ·K⁻¹·H + I/b², q×q: P = K⁻¹ − K⁻¹·H·A⁻¹·Hᵀ·K⁻¹ (Rasmussen and Williams, section 2.7). b² does not have to be
-//! small enough to add, so the trend's prior can be broad without losing digits.
+//! A = Hᵀ·K⁻¹·H + I/b², q×q: P = K⁻¹ − K⁻¹·H·A⁻¹·Hᵀ·K⁻¹ (Rasmussen and Williams, section 2.7). b² is never
+//! added to C, so the trend's prior can be broad without a loss of digits.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -14,12 +14,12 @@ use crate::{Cholesky, NotPositiveDefinite};
 
 /// b²: the prior variance of the trend's coefficients over the signal's, for standardized coordinates.
 pub(super) const TREND_VARIANCE: f64 = 1e8;
-/// Added to the diagonal of C, so that a covariance without noise has a factor despite rounding.
+/// Addition to the diagonal of C, so that a covariance without noise has a factor despite rounding.
 pub(super) const NUGGET: f64 = 1e-12;
-/// Largest value that is added where that is not enough.
+/// Largest such addition.
 const LARGEST_NUGGET: f64 = 1e-6;
 
-/// Rows as a covariance needs them.
+/// Points of the rows, scaled for a covariance.
 #[derive(Clone, Debug)]
 pub(super) struct Points {
     /// u = (x − centre)/ℓ, d×n.
@@ -29,7 +29,7 @@ pub(super) struct Points {
 }
 
 impl Points {
-    /// From coordinates, d×n, their centre and spread, and the length scales.
+    /// Points from coordinates, d×n, their centre and spread, and the length scales.
     pub fn new(
         coordinates: &ArrayView2<f64>,
         centre: &[f64],
@@ -44,12 +44,12 @@ impl Points {
         Self { scaled: over(length_scales), basis: trend.basis(&over(spread).view()) }
     }
 
-    /// All points of some groups.
+    /// All points of `groups`.
     pub fn of_groups(groups: &Groups, length_scales: &[f64], trend: Trend) -> Self {
         Self::new(&groups.coordinates.view(), &groups.centre, &groups.spread, length_scales, trend)
     }
 
-    /// C, and dC/d(r²) where `slopes` wants it; lower triangles.
+    /// C, and dC/d(r²) into `slopes`; lower triangles.
     pub fn correlations(&self, kernel: Kernel, mut slopes: Option<&mut Array2<f64>>) -> Array2<f64> {
         let n = self.scaled.ncols();
         let mut c = Array2::zeros((n, n));
@@ -72,19 +72,19 @@ impl Points {
 /// K + b²·H·Hᵀ in factors.
 #[derive(Clone, Debug)]
 pub(super) struct Covariance {
-    /// Of K = L·Lᵀ.
+    /// Factor L of K = L·Lᵀ.
     pub factor: Cholesky,
     /// L⁻¹·H, n×q.
     pub basis: Array2<f64>,
-    /// Of A.
+    /// Factor of A.
     pub trend: Cholesky,
 }
 
 impl Covariance {
-    /// From C, of which the lower triangle is read, the noise variance of every row over the signal's, and H.
+    /// The factors from the lower triangle of C, the noise variance of every row over the signal's, and H.
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`] when rounding leaves no factor.
+    /// [`NotPositiveDefinite`] when no factor exists because of rounding.
     pub fn new(
         mut correlations: Array2<f64>,
         noise: &[f64],
@@ -102,10 +102,10 @@ impl Covariance {
         Ok(Self { factor, basis, trend })
     }
 
-    /// As [`Self::new`], with the least nugget that leaves a factor.
+    /// Factors as [`Self::new`] does, with the smallest sufficient nugget.
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`] when even the largest leaves none.
+    /// [`NotPositiveDefinite`] when even the largest nugget is insufficient.
     pub fn regularised(points: &Points, kernel: Kernel, noise: &[f64]) -> Result<Self, NotPositiveDefinite> {
         let mut nugget = NUGGET;
         loop {
@@ -141,7 +141,7 @@ impl Covariance {
     }
 }
 
-/// Factors A. Collinear coordinates make it singular but for 1/b², which rounding can swallow; then a little more is
+/// Factors A. For collinear coordinates only 1/b² keeps A regular, and rounding can remove it; then a small multiple of the trace is
 /// added.
 fn factor_with_nugget(a: &Array2<f64>) -> Result<Cholesky, NotPositiveDefinite> {
     let trace = a.diag().sum();

@@ -1,13 +1,13 @@
 //! The log evidence of some samples, and its gradient.
 //!
-//! For N rows and output j, with the total covariance s_j²·(S + η·V) of the rows as they came (V their relative noise
-//! variances), ln p(y_j) = −½·(N·ln 2πs_j² + ln det(S + η·V) + y_jᵀ·(S + η·V)⁻¹·y_j / s_j²) (Rasmussen and Williams, eq.
-//! 5.8). Collapsing the rows of one point into groups (n of them, precision p_i, scatter Σ_i) leaves
+//! Let s_j²·(S + η·V) be the total covariance of the N original rows of output j, with their relative noise
+//! variances V. Then ln p(y_j) = −½·(N·ln 2πs_j² + ln det(S + η·V) + y_jᵀ·(S + η·V)⁻¹·y_j / s_j²) (Rasmussen and Williams, eq.
+//! 5.8). Collapsing the rows of one point into groups (n of them, precision p_i, scatter Σ_i) gives
 //!
 //! - ln det(S + η·V) = ln det(S + η·D) + (N − n)·ln η + Σ ln p_i + Σ ln v_r, with D = diag(1/p_i), and
 //! - the quadratic form Q_j = ȳ_jᵀ·P·ȳ_j + Σ_i scatter_ij/η, with P = (S + η·D)⁻¹.
 //!
-//! Where the noise is fitted, every s_j² is at its best, s_j² = Q_j/N. Where it is given in units of the outputs, s² = 1/η.
+//! Where the noise is fitted, every s_j² has its optimum, s_j² = Q_j/N. Where it is given in units of the outputs, s² = 1/η.
 
 use std::f64::consts::PI;
 
@@ -18,10 +18,10 @@ use super::groups::Groups;
 use super::{Hyperparameters, Kernel, Trend};
 use crate::NotPositiveDefinite;
 
-/// Added to every Q_j, so that an output without any variance has a logarithm; outputs are of order 1 there.
+/// Addition to every Q_j, so that an output without any variance has a logarithm; outputs are of order 1 there.
 const LEAST_QUADRATIC: f64 = 1e-10;
 
-/// Samples and model whose evidence is computed.
+/// Samples and model of an evidence.
 pub(super) struct Evidence<'a> {
     pub groups: &'a Groups,
     pub kernel: Kernel,
@@ -29,10 +29,10 @@ pub(super) struct Evidence<'a> {
 }
 
 impl Evidence<'_> {
-    /// ln p of all outputs, and its gradient by the logarithms of the hyperparameters.
+    /// ln p of all outputs, and its gradient with respect to the logarithms of the hyperparameters.
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`] where rounding leaves the covariance no factor.
+    /// [`NotPositiveDefinite`] where the covariance has no factor because of rounding.
     pub fn with_gradient(
         &self,
         hyperparameters: &Hyperparameters,
@@ -110,7 +110,7 @@ fn quadratic_forms(groups: &Groups, ratio: f64, alpha: &Array2<f64>) -> Vec<f64>
     with_scatter(groups, ratio, &of_means)
 }
 
-/// Q_j, given what the means of the points add to it.
+/// Q_j, given the contribution of the means of the points.
 pub(super) fn with_scatter(groups: &Groups, ratio: f64, of_means: &[f64]) -> Vec<f64> {
     let least = if groups.noise_given { 0.0 } else { LEAST_QUADRATIC };
     let of_output =
@@ -118,7 +118,7 @@ pub(super) fn with_scatter(groups: &Groups, ratio: f64, of_means: &[f64]) -> Vec
     of_means.iter().enumerate().map(of_output).collect()
 }
 
-/// d ln p/dK_il with i and l apart: ½·(Σ_j α_j·α_jᵀ/s_j² − m·P) (Rasmussen and Williams, eq. 5.9).
+/// d ln p/dK_il for i ≠ l: ½·(Σ_j α_j·α_jᵀ/s_j² − m·P) (Rasmussen and Williams, eq. 5.9).
 fn by_covariance(covariance: &Covariance, alpha: &Array2<f64>, inverse_variances: &[f64]) -> Array2<f64> {
     let mut derivative = covariance.inverse();
     let mut weighted = alpha.clone();
@@ -140,7 +140,7 @@ fn by_length_scales(out: &mut [f64], g: &Array2<f64>, slopes: &Array2<f64>, scal
         for (out, u) in out.iter_mut().zip(scaled.outer_iter()) {
             let here = u[i];
             let sum: f64 = product.iter().zip(u).take(i).map(|(p, u)| p * (u - here) * (u - here)).sum();
-            // Both triangles, so twice.
+            // Both triangles: twice.
             *out -= 4.0 * sum;
         }
     }

@@ -1,4 +1,4 @@
-//! Samples, checked and collapsed: one group for every distinct point.
+//! Samples, checked and collapsed to one group for every distinct point.
 
 use std::cmp::Ordering;
 
@@ -6,19 +6,19 @@ use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 
 use super::RegressionError;
 
-/// Rows to learn from.
+/// Samples: coordinates, outputs and noise of n rows.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'a> {
-    /// x, n×d: one row a sample, one column a coordinate; finite.
+    /// x, n×d: one row for each sample, one column for each coordinate; finite.
     pub coordinates: ArrayView2<'a, f64>,
-    /// y, n×m: one column an output; finite.
+    /// y, n×m: one column for each output; finite.
     pub outputs: ArrayView2<'a, f64>,
-    /// The noise variance of every row, in the square of the outputs' unit and the same for all outputs, at least 0;
-    /// `None` where it is to be fitted, one for all rows.
+    /// The noise variance of every row, in the square of the outputs' unit and equal for all outputs, at least 0;
+    /// `None` to fit one variance for all rows.
     pub noise_variance: Option<&'a [f64]>,
 }
 
-/// The distinct points of some samples, n of them now, in the order in which they first occur.
+/// The n distinct points of some samples, in the order of their first rows.
 ///
 /// Rows r of a point with relative noise variances v_r (1 where the noise is fitted) become one row of precision
 /// p = Σ 1/v_r, mean ȳ = Σ y_r/v_r / p and scatter Σ (y_r − ȳ)²/v_r.
@@ -30,29 +30,29 @@ pub(super) struct Groups {
     pub centre: Vec<f64>,
     /// Standard deviation of each coordinate over the points; 1 where it does not vary.
     pub spread: Vec<f64>,
-    /// ȳ, n×m, less the offset and over the scale.
+    /// ȳ, n×m, minus the offset and divided by the scale.
     pub means: Array2<f64>,
     /// n×m, over the square of the scale.
     pub scatter: Array2<f64>,
-    /// p, n of them.
+    /// p, n values.
     pub precision: Vec<f64>,
-    /// Rows in each.
+    /// Number of rows of each group.
     pub rows: Vec<usize>,
-    /// Σ ln v_r of each.
+    /// Σ ln v_r of each group.
     pub log_variance: Vec<f64>,
     /// Value subtracted from each output.
     pub offset: Vec<f64>,
     /// Divisor of each output; 1 where the noise is given, which is in the outputs' unit.
     pub scale: Vec<f64>,
-    /// Whether the noise of every row was given.
+    /// True when the noise of every row was given.
     pub noise_given: bool,
 }
 
-/// The least noise variance a row can have, over the outputs' mean square about their means: what rounding leaves.
+/// Smallest noise variance of a row, over the outputs' mean square about their means: the size of rounding errors.
 const LEAST_VARIANCE: f64 = 1e-14;
 
 impl Groups {
-    /// Checks and collapses.
+    /// Checks and collapses samples.
     pub fn new(samples: Samples) -> Result<Self, RegressionError> {
         check(samples)?;
         let outputs = samples.outputs;
@@ -85,12 +85,12 @@ impl Groups {
         self.rows.iter().sum()
     }
 
-    /// Noise variance of each over the signal's, η/p_i, for a single row's η = `ratio`.
+    /// Noise variance of each group over the signal's, η/p_i, for a single row's η = `ratio`.
     pub fn noise_ratios(&self, ratio: f64) -> Vec<f64> {
         self.precision.iter().map(|p| ratio / p).collect()
     }
 
-    /// Mean square of the outputs, so standardized, averaged over outputs.
+    /// Mean square of the standardized outputs, averaged over outputs.
     pub fn mean_square(&self) -> f64 {
         let weights = self.rows.iter().map(|rows| *rows as f64);
         let sum: f64 =
@@ -98,7 +98,7 @@ impl Groups {
         sum / (self.total_rows() * self.means.ncols()) as f64
     }
 
-    /// These of them.
+    /// The groups with these indices.
     pub fn subset(&self, chosen: &[usize]) -> Self {
         Self {
             coordinates: self.coordinates.select(Axis(1), chosen),
@@ -140,7 +140,7 @@ fn collapse(coordinates: &ArrayView2<f64>, outputs: &Array2<f64>, relative: &[f6
             let mean = weighted.sum::<f64>() / groups.precision[i];
             let scatter = rows.iter().map(|r| (outputs[[*r, j]] - mean).powi(2) / relative[*r]);
             groups.means[[i, j]] = mean;
-            // One row alone does not scatter; the division may leave a rounding error that says it does.
+            // The scatter of a single row is 0; the division may leave a rounding error.
             groups.scatter[[i, j]] = if rows.len() > 1 { scatter.sum() } else { 0.0 };
         }
     }
@@ -153,16 +153,16 @@ fn moments(table: &ArrayView2<f64>, axis: Axis) -> (Vec<f64>, Vec<f64>) {
         let count = lane.len() as f64;
         let mean = lane.sum() / count;
         let variance = lane.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
-        // Values that are all alike may leave a rounding error that says they are not.
+        // The variance of equal values is 0, but may contain a rounding error.
         let rounding = (4.0 * f64::EPSILON * mean).powi(2);
         (mean, if variance > rounding { variance } else { 0.0 })
     };
     table.axis_iter(axis).map(moments).unzip()
 }
 
-/// Rows of each distinct point, points in the order of their first rows.
+/// Rows of each distinct point; points in the order of their first rows.
 fn members(coordinates: &ArrayView2<f64>) -> Vec<Vec<usize>> {
-    // −0 and 0 are one place.
+    // −0 and 0 are the same place.
     let order = |a: &usize, b: &usize| {
         let (a, b) = (coordinates.row(*a), coordinates.row(*b));
         let by_coordinate = a.iter().zip(b).map(|(a, b)| (a + 0.0).total_cmp(&(b + 0.0)));

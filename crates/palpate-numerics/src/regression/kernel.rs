@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView2};
 
 use super::RegressionError;
 
-/// A correlation of two points as a function of r² = Σ_k ((x_k − x′_k)/ℓ_k)², with a length scale ℓ_k a coordinate.
+/// A correlation of two points as a function of r² = Σ_k ((x_k − x′_k)/ℓ_k)², with a length scale ℓ_k for each coordinate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kernel {
@@ -27,7 +27,7 @@ impl Kernel {
     pub fn correlation_and_slope(self, r2: f64) -> (f64, f64) {
         match self {
             Self::Matern52 => {
-                // Beyond 1000 the decay is 0, and an infinity must not meet it.
+                // Beyond 1000 the decay is 0, and its product with infinity would be NaN.
                 let scaled = (5.0 * r2).sqrt().min(1000.0);
                 let decay = (-scaled).exp();
                 ((1.0 + scaled + scaled * scaled / 3.0) * decay, -5.0 / 6.0 * (1.0 + scaled) * decay)
@@ -45,14 +45,14 @@ impl Kernel {
     }
 }
 
-/// Mean function: what a prediction returns to far from every row.
+/// Mean function: the limit of a prediction far from every row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Trend {
-    /// h = (1): it returns to a constant.
+    /// h = (1): the limit is a constant.
     #[default]
     Constant,
-    /// h = (1, z_1 … z_d), z the coordinates standardized: it returns to a plane.
+    /// h = (1, z_1 … z_d), z the coordinates standardized: the limit is a plane.
     Linear,
 }
 
@@ -75,11 +75,11 @@ impl Trend {
     }
 }
 
-/// Length scales of the functions, which say how smooth they are, and noise ratio of the rows.
+/// Length scales of the functions, which determine their smoothness, and noise ratio of the rows.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hyperparameters {
-    /// ℓ_k, one a coordinate, in the coordinate's unit; greater than 0.
+    /// ℓ_k, one for each coordinate, in the coordinate's unit; greater than 0.
     pub length_scales: Vec<f64>,
     /// η, greater than 0: the noise variance of a row over the signal variance s². Where the noise of every row is
     /// given, it is 1/s², in the unit of 1 over the outputs' square.
@@ -87,7 +87,7 @@ pub struct Hyperparameters {
 }
 
 impl Hyperparameters {
-    /// Checks them for rows of `coordinates` coordinates.
+    /// Checks the hyperparameters for rows of `coordinates` coordinates.
     pub(super) fn check(&self, coordinates: usize) -> Result<(), RegressionError> {
         let found = self.length_scales.len();
         if found != coordinates {
@@ -105,7 +105,7 @@ impl Hyperparameters {
         Ok(())
     }
 
-    /// From their logarithms: the length scales', then the noise ratio's.
+    /// Hyperparameters from their logarithms: those of the length scales, then that of the noise ratio.
     pub(super) fn from_logarithms(logarithms: &[f64]) -> Self {
         let mut values: Vec<f64> = logarithms.iter().map(|value| value.exp()).collect();
         let noise_ratio = values.pop().unwrap_or(1.0);

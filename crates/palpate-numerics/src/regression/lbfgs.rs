@@ -1,23 +1,23 @@
-//! Minimising a smooth function of a few variables: L-BFGS (Nocedal and Wright, *Numerical Optimization*, algorithm
+//! Minimisation of a smooth function of a few variables: L-BFGS (Nocedal and Wright, *Numerical Optimization*, algorithm
 //! 7.5) with a backtracking line search.
 
 use std::collections::VecDeque;
 
 use crate::small::{add_multiple, dot};
 
-/// Pairs of steps and gradient changes that are remembered.
+/// Number of stored pairs of steps and gradient changes.
 const MEMORY: usize = 12;
-/// No step changes a variable by more than this; the variables are logarithms, so that is a factor of 7.
+/// Largest change of a variable in one step; the variables are logarithms, so it is a factor of 7.
 const LONGEST_STEP: f64 = 2.0;
-/// The share of the decrease promised by the gradient that a step must bring.
+/// Smallest decrease of a step, as a share of the decrease that the gradient predicts.
 const SUFFICIENT: f64 = 1e-4;
 
 /// Stopping criterion of a minimisation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stop {
-    /// After this many evaluations.
+    /// Largest number of evaluations.
     pub evaluations: usize,
-    /// When two steps in a row bring less than this.
+    /// Smallest decrease in two consecutive steps.
     pub decrease: f64,
 }
 
@@ -26,20 +26,20 @@ pub(super) struct Stop {
 pub(super) struct Minimum {
     /// The variables.
     pub point: Vec<f64>,
-    /// The function there.
+    /// The value of the function at the point.
     pub value: f64,
 }
 
-/// The step taken and by how much the gradient changed over it.
+/// A step, and the change of the gradient over it.
 struct Pair {
     step: Vec<f64>,
     change: Vec<f64>,
 }
 
-/// Minimises from `start`. `function` writes its gradient and gives its value, an infinity where it has none.
+/// Minimises from `start`. `function` writes its gradient and returns its value, or infinity where it is undefined.
 ///
 /// # Errors
-/// The first that `function` returns, which ends the search at once.
+/// The first error of `function`, which ends the search at once.
 pub(super) fn minimise<E>(
     start: &[f64],
     stop: Stop,
@@ -53,7 +53,7 @@ pub(super) fn minimise<E>(
     while value.is_finite() && evaluations < stop.evaluations && small_steps < 2 {
         let direction = direction(&gradient, &pairs);
         let slope = dot(&direction, &gradient);
-        // Not downhill: the memory is stale, or the gradient is rounding error.
+        // Not a descent direction: the stored pairs are outdated, or the gradient is rounding error.
         if slope >= 0.0 || !slope.is_finite() {
             if pairs.is_empty() {
                 break;
@@ -112,7 +112,7 @@ fn direction(gradient: &[f64], pairs: &VecDeque<Pair>) -> Vec<f64> {
     q
 }
 
-/// By what to shorten a step: to the minimum of the parabola through value, slope and next value.
+/// Factor that shortens a step to the minimum of the parabola through value, slope and next value.
 fn shrink(value: f64, slope: f64, next_value: f64) -> f64 {
     let curvature = next_value - value - slope;
     if next_value.is_finite() && curvature > 0.0 { (-0.5 * slope / curvature).clamp(0.1, 0.5) } else { 0.25 }
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_cliff_is_backed_away_from() {
-        // Defined for x > 0 only, least at x = 0.01.
+        // Defined for x > 0 only, with the minimum at x = 0.01.
         let cliff = |x: &[f64], g: &mut [f64]| {
             g[0] = 1.0 - 0.01 / x[0];
             Ok::<f64, Infallible>(if x[0] > 0.0 { x[0] - 0.01 * x[0].ln() } else { f64::INFINITY })

@@ -1,11 +1,11 @@
 //! Regression by Gaussian processes: smooth functions of a few coordinates from noisy samples, with their uncertainty.
 //!
-//! f_j(x) = h(x)·β_j + g_j(x) for output j = 1…m, where h is the [`Trend`]'s basis, β_j ~ N(0, s_j²·b²·I) with b² so
+//! f_j(x) = h(x)·β_j + g_j(x) for output j = 1…m. Here h is the [`Trend`]'s basis, β_j ~ N(0, s_j²·b²·I) with b² so
 //! large that it hardly matters, and g_j is a Gaussian process of covariance s_j²·c(x, x′), c a [`Kernel`]. The outputs
-//! share c and each has a signal variance s_j² of its own. A row is y_j = f_j(x) + noise.
+//! share c, and each has its own signal variance s_j². A row is y_j = f_j(x) + noise.
 //!
-//! Rows at the same coordinates are collapsed to their weighted mean before anything is factored. That is exact: the
-//! posterior and the evidence are those of all rows, the scatter of the repeats included, so repeats teach the noise.
+//! Rows at equal coordinates are collapsed to their weighted mean before any factorisation. This is exact: the
+//! posterior and the evidence are those of all rows, including the scatter of the repeats, so repeats determine the noise.
 //!
 //! ```
 //! use ndarray::Array2;
@@ -42,10 +42,10 @@ pub use search::Regression;
 use crate::NotPositiveDefinite;
 use crate::watch::Cancelled;
 
-/// Samples that no Gaussian process can be fitted to.
+/// Error of samples that no Gaussian process can be fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RegressionError {
-    /// Nothing to learn from.
+    /// Too few rows, coordinates or outputs.
     #[error(
         "there are {rows} rows of {coordinates} coordinates and {outputs} outputs; at least 1 of each is needed"
     )]
@@ -62,42 +62,42 @@ pub enum RegressionError {
     Count {
         /// Content of the list.
         what: &'static str,
-        /// Length that the rest asks for.
+        /// Length that the other lists require.
         needed: usize,
         /// Length of the list.
         found: usize,
     },
-    /// An infinity, or not a number.
+    /// An infinite value, or NaN.
     #[error("{what} {column} of row {row} is {value}; it must be finite")]
     NotFinite {
         /// Coordinate or output.
         what: &'static str,
-        /// Which row, from 1.
+        /// Index of the row, from 1.
         row: usize,
-        /// Which coordinate or output, from 1.
+        /// Index of the coordinate or output, from 1.
         column: usize,
         /// The value.
         value: f64,
     },
-    /// A variance that is none.
+    /// A variance that is negative or not finite.
     #[error("the noise variance of row {row} is {value}; it must be finite and at least 0")]
     NoiseVariance {
-        /// Which row, from 1.
+        /// Index of the row, from 1.
         row: usize,
         /// The value.
         value: f64,
     },
-    /// A hyperparameter that is out of its range.
+    /// A hyperparameter out of range.
     #[error("{what} {number} is {value}; it must be finite and greater than 0")]
     Hyperparameter {
         /// Length scale or noise ratio.
         what: &'static str,
-        /// Which one, from 1.
+        /// Index of the hyperparameter, from 1.
         number: usize,
         /// The value.
         value: f64,
     },
-    /// The covariance matrix of the rows does not factor.
+    /// The covariance matrix of the rows has no factor.
     #[error("the rows' covariance cannot be factored: {0}")]
     Singular(#[from] NotPositiveDefinite),
     /// The search for hyperparameters was stopped.

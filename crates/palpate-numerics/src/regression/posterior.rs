@@ -13,9 +13,9 @@ use super::{Hyperparameters, Kernel, RegressionError, Trend};
 use crate::watch::Watch;
 use crate::{Cholesky, NotPositiveDefinite};
 
-/// The posterior of m functions of d coordinates: exact up to [`MOST_EXACT`] points, that of a thousand well-chosen ones beyond.
+/// The posterior of m functions of d coordinates: exact up to [`MOST_EXACT`] points, beyond that with a thousand inducing points.
 ///
-/// It is written without what can be computed from it, which is made again when it is read.
+/// The serialized form contains only the data that cannot be recomputed.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(into = "PosteriorData", try_from = "PosteriorData")]
 pub struct GaussianProcess {
@@ -27,26 +27,26 @@ pub struct GaussianProcess {
     weights: Array2<f64>,
     /// β, m×q.
     trend: Array2<f64>,
-    /// Covariance of the process at its points and of β over the signal's variance: of one that some points tell and that was just fitted.
+    /// Covariance of the process at its points and of β over the signal's variance; only for a sparse process directly after its fit.
     covariance: Option<Array2<f64>>,
 }
 
-/// Points up to which the posterior is that of all of them.
+/// Largest number of points with an exact posterior.
 pub const MOST_EXACT: usize = 4096;
-/// Points up to which its variance is.
+/// Largest number of points with an exact variance.
 const MOST_EXACT_VARIANCE: usize = 512;
 
 /// Variance of a posterior.
 #[derive(Clone, Debug)]
 enum Variance {
-    /// Of all points: L⁻¹, with L⁻¹·H and the factor of A.
+    /// From all points: L⁻¹, with L⁻¹·H and the factor of A.
     Exact { whiten: Triangle, basis: Array2<f64>, trend: Cholesky },
-    /// Of some.
+    /// From chosen points.
     Reduced(Reduced),
 }
 
 impl Variance {
-    /// Of all points or the best of them, whichever are few enough.
+    /// The variance from all points if there are few enough, otherwise from chosen ones.
     fn of_points(
         points: &Points,
         kernel: Kernel,
@@ -68,21 +68,21 @@ impl Variance {
     }
 }
 
-/// Room for predictions of one [`GaussianProcess`].
+/// Buffers for predictions of one [`GaussianProcess`].
 #[derive(Clone, Debug)]
 pub struct PredictionScratch {
     /// u.
     point: Vec<f64>,
-    /// h, then what the trend leaves unexplained.
+    /// h, then the part of it that the points do not explain.
     basis: Vec<f64>,
-    /// The correlations with every point, in blocks.
+    /// The correlations with all points, in blocks.
     correlations: Vec<[f64; 8]>,
     reduced: ReducedScratch,
     /// dc/d(r²).
     slopes: Vec<f64>,
     /// L⁻¹ times the correlations; or r², then the product of the slopes with u − u_i.
     product: Vec<[f64; 8]>,
-    /// One number an output.
+    /// One number for each output.
     outputs: Vec<f64>,
 }
 
@@ -122,7 +122,7 @@ impl GaussianProcess {
         Ok(Self::assemble(data, points, variance))
     }
 
-    /// The posterior of all groups through the best of their points.
+    /// The posterior of all groups with inducing points.
     pub(super) fn of_chosen(
         groups: &Groups,
         kernel: Kernel,
@@ -190,17 +190,17 @@ impl GaussianProcess {
         self.weights.nrows()
     }
 
-    /// Distinct points that it has learnt from.
+    /// Number of distinct points in the samples.
     pub fn points(&self) -> usize {
         self.data.sparse.as_ref().map_or(self.kept(), |sparse| sparse.points)
     }
 
-    /// Distinct points that its mean is told by, n: all, or well-chosen ones where there are more than [`MOST_EXACT`].
+    /// Number of distinct points that represent the mean, n: all, or inducing points where there are more than [`MOST_EXACT`].
     pub fn kept(&self) -> usize {
         self.points.scaled.ncols()
     }
 
-    /// Hyperparameters that maximise the evidence.
+    /// Hyperparameters of the process, as fitted or given.
     pub fn hyperparameters(&self) -> &Hyperparameters {
         &self.data.hyperparameters
     }
@@ -221,7 +221,7 @@ impl GaussianProcess {
         self.data.log_evidence
     }
 
-    /// Room for its predictions.
+    /// Buffers for predictions of this process.
     pub fn scratch(&self) -> PredictionScratch {
         let n = self.kept();
         let reduced = match &self.variance {
@@ -289,7 +289,7 @@ impl GaussianProcess {
         }
     }
 
-    /// E f_j(x) and Var f_j(x) for every output; a new row there would scatter by its noise besides.
+    /// E f_j(x) and Var f_j(x) for every output; the variance excludes the noise of a new row.
     ///
     /// # Panics
     /// When `point` is not d long, or `means` or `variances` not m.
@@ -326,8 +326,8 @@ impl GaussianProcess {
         }
     }
 
-    /// E f_j(x) for every output; returns Var f_j(x) over the signal's variance, for tables that are made once after a fit: where the points
-    /// that tell the variance are not all, also by the nearest, and the less of both.
+    /// Writes E f_j(x) for every output and returns Var f_j(x) over the signal's variance, for tables that are computed once after a fit. Where
+    /// chosen points give the variance, it is also computed from the nearest points, and the smaller value is returned.
     ///
     /// # Panics
     /// When `point` is not d long, or `means` not m.
@@ -345,7 +345,7 @@ impl GaussianProcess {
         by_nearest.map_or(variance, |near| near.min(variance))
     }
 
-    /// The nearest points, in no order, with their correlations.
+    /// The nearest points, in no particular order, with their correlations.
     fn nearest(correlations: &[f64]) -> (Vec<usize>, Array1<f64>) {
         const NEAREST: usize = 32;
         let mut order: Vec<usize> = (0..correlations.len()).collect();
@@ -356,7 +356,7 @@ impl GaussianProcess {
         (order, here)
     }
 
-    /// Variance over the signal's, from the rows at the nearest points, never less than that of all; `None` where they have no factor.
+    /// Variance over the signal's from the rows at the nearest points, never less than from all rows; `None` where their covariance has no factor.
     fn variance_by_nearest(&self, correlations: &[f64], h: &[f64]) -> Option<f64> {
         let (nearest, here) = Self::nearest(correlations);
         let points = Points {
@@ -370,8 +370,8 @@ impl GaussianProcess {
         Some((1.0 - half.dot(&half) + rest.dot(&rest)).max(0.0))
     }
 
-    /// Variance over the signal's, from the values that all rows tell at the nearest points and what these leave open; `None` where they
-    /// have no factor.
+    /// Variance over the signal's from the posterior values at the nearest points and the conditional variance given these values; `None`
+    /// where their covariance has no factor.
     fn variance_by_nearest_values(
         &self,
         covariance: &Array2<f64>,
@@ -408,7 +408,7 @@ impl GaussianProcess {
         (means, variances)
     }
 
-    /// u and h.
+    /// Computes u and h.
     fn place(&self, point: &[f64], scratch: &mut PredictionScratch) {
         assert_eq!(point.len(), self.coordinates(), "a point has as many coordinates as a row");
         let PosteriorData { centre, spread, hyperparameters, .. } = &self.data;
@@ -421,7 +421,7 @@ impl GaussianProcess {
         }
     }
 
-    /// Correlations with the points, and means from them and h.
+    /// Computes the correlations with the points, and the means from them and h.
     fn means(&self, means: &mut [f64], scratch: &mut PredictionScratch) {
         assert_eq!(means.len(), self.outputs(), "there is one mean an output");
         self.blocks.sums_into(&scratch.point, &mut scratch.correlations, means);
@@ -467,12 +467,12 @@ fn packed(lower: &ArrayView2<f64>, size: usize) -> Vec<f64> {
     (0..size).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|at| lower[at]).collect()
 }
 
-/// The matrix whose lower triangle a list is, row by row.
+/// The matrix with this lower triangle, given row by row.
 fn unpacked(list: &[f64], size: usize) -> Array2<f64> {
     Array2::from_shape_fn((size, size), |(i, j)| if j <= i { list[i * (i + 1) / 2 + j] } else { 0.0 })
 }
 
-/// Everything that predictions need, but for what can be computed from it. Lists of lists are flat, row by row.
+/// All data of a posterior that cannot be recomputed. Matrices are flat, row by row.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PosteriorData {
@@ -487,7 +487,7 @@ struct PosteriorData {
     pub inputs: Vec<f64>,
     /// Noise variance of each point over the signal's.
     pub noise: Vec<f64>,
-    /// That of a single row, where it was fitted.
+    /// Noise variance of a single row over the signal's; `None` where the noise was given.
     pub row_noise: Option<f64>,
     pub offset: Vec<f64>,
     pub scale: Vec<f64>,
@@ -497,22 +497,22 @@ struct PosteriorData {
     /// m×q.
     pub trend_coefficients: Vec<f64>,
     pub log_evidence: f64,
-    /// The sparse form, where the points are some of many.
+    /// The data of a sparse posterior; `None` for an exact one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sparse: Option<SparseData>,
 }
 
-/// Remainder of all points that chosen ones do not tell.
+/// Data of a sparse posterior about all points, beyond the chosen ones.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SparseData {
     /// Number of all points.
     points: usize,
-    /// R of those that tell the variance, row by row.
+    /// R of the chosen points for the variance, row by row.
     factor: Vec<f64>,
 }
 
-/// A posterior from a file, whose numbers do not fit together.
+/// Error of a posterior from a file with inconsistent numbers.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PosteriorFault {
     /// A list has the wrong length.
@@ -520,33 +520,33 @@ pub enum PosteriorFault {
     Count {
         /// Content of the list.
         what: &'static str,
-        /// Length that the rest asks for.
+        /// Length that the other lists require.
         needed: usize,
         /// Length of the list.
         found: usize,
     },
-    /// A number that is infinite, not a number, or beyond its bound.
+    /// A number that is infinite, NaN, or out of range.
     #[error("the Gaussian process's {what} number {number} is {value}; it must be {bound}")]
     BadNumber {
         /// Content of the list.
         what: &'static str,
-        /// Which one, from 1.
+        /// Index of the number, from 1.
         number: usize,
         /// Value.
         value: f64,
         /// Bound.
         bound: &'static str,
     },
-    /// Covariance does not factor.
+    /// The covariance has no factor.
     #[error("the Gaussian process's covariance cannot be factored: {0}")]
     Singular(#[from] NotPositiveDefinite),
-    /// Its variance cannot be computed.
+    /// The variance cannot be computed.
     #[error(transparent)]
     Regression(#[from] RegressionError),
 }
 
 impl PosteriorData {
-    /// From what all posteriors have; noise and evidence are still to be filled in.
+    /// The data that all posteriors share; noise and evidence are set afterwards.
     fn new(
         groups: &Groups,
         (kernel, trend): (Kernel, Trend),

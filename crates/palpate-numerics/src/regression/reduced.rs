@@ -1,14 +1,14 @@
-//! The posterior that some of the points tell: of the variance where there are more than a few hundred, of everything where there are more
+//! The sparse posterior from chosen points: of the variance for more than a few hundred points, of the mean as well for more
 //! than a few thousand.
 //!
-//! With u the chosen points, C_uu = L·Lᵀ and φ(x) = L⁻¹·c(u, x), the process is φ·w + h·β and a rest of variance 1 − |φ|² that is
+//! With u the chosen points, C_uu = L·Lᵀ and φ(x) = L⁻¹·c(u, x), the process is φ·w + h·β and a remainder of variance 1 − |φ|² that is
 //! independent from place to place: Snelson and Ghahramani's sparse process (*Sparse Gaussian Processes using Pseudo-inputs*, 2006). For rows of
-//! noise D_i that is regression on z = (φ, h) with row variances Λ_i = D_i + 1 − |φ_i|²,
+//! noise D_i this is a regression on z = (φ, h) with row variances Λ_i = D_i + 1 − |φ_i|²,
 //!
 //! A = diag(1 … 1, 1/b² …) + Σ z_i·z_iᵀ/Λ_i = R·Rᵀ, and a variance of 1 − |φ|² + |R⁻¹·z|² at a place.
 //!
-//! The points are chosen one after the other where the others leave the greatest variance, which is a Cholesky factorisation with
-//! pivots. It ends where what is left is a small part of the noise: the process is then that of all points but for rounding.
+//! The points are chosen one after the other, each at the greatest variance given the chosen ones, which is a Cholesky factorisation with
+//! pivots. The selection ends when the remaining variance is a small part of the noise: the process is then that of all points except for rounding.
 
 use super::blocks::{Triangle, cross_correlations};
 use super::covariance::{NUGGET, TREND_VARIANCE};
@@ -18,18 +18,18 @@ use crate::{Cholesky, NotPositiveDefinite, random_order};
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 
-/// Points that tell the variance.
+/// Largest number of points for the variance.
 pub(super) const OF_VARIANCE: usize = 256;
-/// Points that tell the mean of a process, where all are too many.
+/// Largest number of points for the mean of a sparse process.
 pub const INDUCING: usize = 1000;
-/// Points among which those are looked for.
+/// Number of candidates for the chosen points.
 const CANDIDATES: usize = 4000;
-/// Share of the noise below which a variance that is left does not matter.
+/// Share of the noise below which a remaining variance is negligible.
 const SMALL: f64 = 0.02;
-/// Rows that are taken at a time.
+/// Number of rows in one product.
 const ROWS: usize = 512;
 
-/// Numbers of the points to choose, each where those before leave the greatest variance.
+/// Indices of the chosen points, each at the greatest variance given the previous ones.
 pub(super) fn chosen(kernel: Kernel, scaled: &ArrayView2<f64>, ratio: f64, most: usize) -> Vec<usize> {
     let n = scaled.ncols();
     let mut candidates = random_order(n, 0);
@@ -66,7 +66,7 @@ pub(super) fn chosen(kernel: Kernel, scaled: &ArrayView2<f64>, ratio: f64, most:
 /// Variance of the process from some of its points.
 #[derive(Clone, Debug)]
 pub(super) struct Reduced {
-    /// Numbers of the points.
+    /// Indices of the points.
     chosen: Vec<usize>,
     /// L⁻¹.
     whiten: Triangle,
@@ -74,7 +74,7 @@ pub(super) struct Reduced {
     shrink: Triangle,
 }
 
-/// Room for a variance.
+/// Buffers for one variance.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReducedScratch {
     correlations: Vec<f64>,
@@ -83,7 +83,7 @@ pub(super) struct ReducedScratch {
 }
 
 impl Reduced {
-    /// From chosen points and R, of which the lower triangle is read.
+    /// The variance from chosen points and the lower triangle of R.
     pub fn new(
         kernel: Kernel,
         scaled: &ArrayView2<f64>,
@@ -98,7 +98,7 @@ impl Reduced {
         })
     }
 
-    /// Room for its variances.
+    /// Buffers for this variance.
     pub fn scratch(&self) -> ReducedScratch {
         let size = self.chosen.len();
         ReducedScratch {
@@ -108,7 +108,7 @@ impl Reduced {
         }
     }
 
-    /// Variance at a place over the signal's, from its correlations with all points and the trend's basis h.
+    /// Variance at a place over the signal's, from the correlations of the place with all points and the trend's basis h.
     pub fn variance(&self, all: &[f64], h: &[f64], scratch: &mut ReducedScratch) -> f64 {
         let ReducedScratch { correlations, basis, product } = scratch;
         correlations.iter_mut().zip(&self.chosen).for_each(|(c, point)| *c = all[*point]);
@@ -127,7 +127,7 @@ fn factor_of(kernel: Kernel, points: &ArrayView2<f64>) -> Result<Cholesky, NotPo
     Cholesky::factor(correlations)
 }
 
-/// Rows that a sparse process is learnt from.
+/// Rows of a sparse process.
 #[derive(Clone, Copy)]
 pub(super) struct Rows<'a> {
     /// u, d×n.
@@ -140,7 +140,7 @@ pub(super) struct Rows<'a> {
     pub noise: &'a [f64],
 }
 
-/// Sums over the rows that determine a sparse process.
+/// Result of the regression for a sparse process.
 pub(super) struct Learnt {
     /// α of the chosen points, k×m, and β, q×m.
     pub weights: Array2<f64>,
@@ -155,7 +155,7 @@ pub(super) struct Learnt {
     pub covariance: Array2<f64>,
 }
 
-/// Regression on the functions of the chosen points, those of greatest variance first.
+/// Regression on the functions of the chosen points, in the order of decreasing variance.
 pub(super) fn learn(
     kernel: Kernel,
     rows: Rows,
@@ -219,7 +219,7 @@ pub(super) fn learn(
     })
 }
 
-/// A, and Σ z_i·ȳ_iᵀ/Λ_i.
+/// Sums over the rows: A, and Σ z_i·ȳ_iᵀ/Λ_i.
 struct Sums {
     precision: Array2<f64>,
     scores: Array2<f64>,

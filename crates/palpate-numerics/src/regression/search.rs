@@ -1,4 +1,4 @@
-//! Finding the hyperparameters: the evidence, with a weak prior, at its greatest.
+//! Fit of the hyperparameters: the maximum of the evidence with a weak prior.
 
 use ndarray::Axis;
 
@@ -9,7 +9,7 @@ use super::{GaussianProcess, Hyperparameters, Kernel, RegressionError, Samples, 
 use crate::random_order;
 use crate::watch::{Cancelled, Watch};
 
-/// Settings by which a Gaussian process is fitted.
+/// Settings of a Gaussian process fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Regression {
@@ -17,11 +17,11 @@ pub struct Regression {
     pub kernel: Kernel,
     /// Basis of the mean.
     pub trend: Trend,
-    /// The hyperparameters are found from at most this many distinct points, drawn at random; at least 2. Whatever
-    /// their number, the posterior is that of all rows: exactly up to [`MOST_EXACT`](super::MOST_EXACT) points, beyond through a
-    /// thousand of them.
+    /// Largest number of distinct points, drawn at random, in the fit of the hyperparameters; at least 2. For any
+    /// number of them the posterior is that of all rows: exactly up to [`MOST_EXACT`](super::MOST_EXACT) points, beyond that with a
+    /// thousand inducing points.
     pub search_points: usize,
-    /// Fixes the draw.
+    /// Seed of the draw.
     pub seed: u64,
 }
 
@@ -31,33 +31,33 @@ impl Default for Regression {
     }
 }
 
-/// Points on which the starts are tried.
+/// Number of points in the trials of the starts.
 const TRIAL_POINTS: usize = 160;
-/// Stopping rules of the trial of a start, and of the search that continues from the best.
+/// Stopping criteria of the trial of a start, and of the search that continues from the best.
 const TRIAL: Stop = Stop { evaluations: 30, decrease: 0.05 };
 const FINAL: Stop = Stop { evaluations: 60, decrease: 0.01 };
 /// Starts: length scales over the coordinates' spread, and the noise ratio.
 const STARTS: [(f64, f64); 3] = [(1.0, 1e-2), (0.3, 1e-3), (3.0, 1e-5)];
 
 impl Regression {
-    /// Finds the hyperparameters and the posterior.
+    /// Fits the hyperparameters and computes the posterior.
     ///
     /// All outputs share length scales and noise ratio; each has its own signal variance. The logarithms of the
-    /// hyperparameters have normal priors so wide (a factor of e² for length scales, e⁵ for a fitted noise ratio, one
-    /// standard deviation each way) that they matter only where a handful of rows say nothing.
+    /// hyperparameters have wide normal priors: one standard deviation is a factor of e² for length scales, and e⁵ for a fitted
+    /// noise ratio. The priors matter only where a handful of rows contain no information.
     ///
     /// # Errors
-    /// [`RegressionError`], with the row or value that no regression can use; or when `watch` stopped it.
+    /// [`RegressionError`], with the invalid row or value; or when `watch` stopped the fit.
     pub fn fit(&self, samples: Samples, watch: Watch) -> Result<GaussianProcess, RegressionError> {
         let groups = Groups::new(samples)?;
         let found = self.search(&groups, watch)?;
         GaussianProcess::of_groups(&groups, self.kernel, self.trend, &found, watch)
     }
 
-    /// The hyperparameters alone that [`Self::fit`] finds.
+    /// Fits the hyperparameters only, as [`Self::fit`] does.
     ///
     /// # Errors
-    /// [`RegressionError`], with the row or value that no regression can use; or when `watch` stopped it.
+    /// [`RegressionError`], with the invalid row or value; or when `watch` stopped the fit.
     pub fn hyperparameters(
         &self,
         samples: Samples,
@@ -66,10 +66,10 @@ impl Regression {
         Ok(self.search(&Groups::new(samples)?, watch)?)
     }
 
-    /// As [`Self::fit`], every output with hyperparameters of its own: one process an output.
+    /// Fits as [`Self::fit`] does, but each output with its own hyperparameters: one process for each output.
     ///
     /// # Errors
-    /// [`RegressionError`], with the row or value that no regression can use.
+    /// [`RegressionError`], with the invalid row or value.
     pub fn fit_each(&self, samples: Samples, watch: Watch) -> Result<Vec<GaussianProcess>, RegressionError> {
         let mut processes = Vec::with_capacity(samples.outputs.ncols());
         for column in samples.outputs.axis_chunks_iter(Axis(1), 1) {
@@ -78,10 +78,10 @@ impl Regression {
         Ok(processes)
     }
 
-    /// The posterior with hyperparameters that are known.
+    /// The posterior with given hyperparameters.
     ///
     /// # Errors
-    /// [`RegressionError`], with the row or value that no regression can use; or when `watch` stopped it.
+    /// [`RegressionError`], with the invalid row or value; or when `watch` stopped the work.
     pub fn condition(
         &self,
         samples: Samples,
@@ -114,7 +114,7 @@ impl Regression {
         Ok(Hyperparameters::from_logarithms(&best.0))
     }
 
-    /// Logarithms of the hyperparameters that maximise posterior density from `start`, and minus its logarithm.
+    /// Logarithms of the hyperparameters at the maximum of the posterior density from `start`, and minus the logarithm of the density.
     fn follow(
         &self,
         groups: &Groups,
@@ -128,7 +128,7 @@ impl Regression {
             watch.round()?;
             let hyperparameters = Hyperparameters::from_logarithms(logarithms);
             let log_evidence = evidence.with_gradient(&hyperparameters, gradient);
-            // No factor: a cliff for the search to back away from.
+            // No factor: infinity, so that the search steps back.
             let Some(log_evidence) = log_evidence.ok().filter(|value| value.is_finite()) else {
                 return Ok(f64::INFINITY);
             };
@@ -139,18 +139,18 @@ impl Regression {
     }
 }
 
-/// Normal priors of the logarithms.
+/// Normal priors of the logarithms of the hyperparameters.
 struct Prior {
     centre: Vec<f64>,
     deviation: Vec<f64>,
-    /// ln η of a signal as large as the outputs are, where the noise is given: every search starts there.
+    /// ln η for a signal as large as the outputs, where the noise is given: the start of every search.
     known_start: Option<f64>,
 }
 
 impl Prior {
     fn new(groups: &Groups) -> Self {
         let d = groups.spread.len();
-        // Points in d dimensions are about √d spreads apart.
+        // The distance of points in d dimensions is about √d spreads.
         let apart = (d as f64).sqrt();
         let scales = groups.spread.iter().map(|spread| (spread * apart).ln());
         let known_start = groups.noise_given.then(|| -groups.mean_square().max(f64::MIN_POSITIVE).ln());

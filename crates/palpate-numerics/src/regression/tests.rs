@@ -1,4 +1,4 @@
-//! Properties of the regression, against a dense computation on every row as it came.
+//! Properties of the regression, against a dense computation on the original rows.
 
 use crate::watch::{Cancelled, Watch};
 use ndarray::{Array1, Array2, Axis, array};
@@ -41,7 +41,7 @@ fn logarithms(h: &Hyperparameters) -> Vec<f64> {
     h.length_scales.iter().chain([&h.noise_ratio]).map(|value| value.ln()).collect()
 }
 
-/// Evidence and prediction at `at`, from all rows as they came: the textbook, without collapsing or lemmas.
+/// Evidence and prediction at `at`, from all original rows by the textbook formulas, without collapsing or lemmas.
 struct Dense {
     log_evidence: f64,
     mean: Vec<f64>,
@@ -63,7 +63,7 @@ fn dense(process: &GaussianProcess, regression: Regression, samples: Samples, at
                 trend += z(a[k]) * z(b[k]);
             }
         }
-        // What rounding needs is part of the model.
+        // The nugget against rounding is part of the model.
         let nugget = if a == b { 1e-12 } else { 0.0 };
         regression.kernel.correlation(r2) + nugget + TREND_VARIANCE * trend
     };
@@ -104,7 +104,7 @@ fn collapsing_repeats_changes_neither_evidence_nor_posterior() {
                 assert_eq!(process.points(), 12);
                 let truth = dense(&process, regression, samples(&x, &y, noise), [0.4, 1.1]);
                 let (mean, variance) = process.predict(&[0.4, 1.1]);
-                // The dense matrix has entries of 10⁹ beside a noise of 10⁻², which costs it 11 of 16 digits.
+                // The dense matrix has entries of 10⁹ beside a noise of 10⁻², which costs 11 of 16 digits.
                 let off = process.log_evidence() - truth.log_evidence;
                 assert!(off.abs() < 3e-3, "{trend:?} {kernel:?} {off}");
                 for j in 0..2 {
@@ -200,14 +200,14 @@ fn far_away_it_knows_what_it_knew_before() {
     let process = fit(Regression::default(), samples(&x, &y, None));
     let (mean, variance) = process.predict(&[1e4, -1e4]);
     for j in 0..2 {
-        // The constant beneath is not known exactly either.
+        // The constant trend is not known exactly either.
         let more = variance[j] / process.signal_variance(j);
         assert!((1.0..2.0).contains(&more), "{more}");
         let values = y.column(j);
         let (least, most) = values.iter().fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)));
         assert!(least < mean[j] && mean[j] < most);
     }
-    // Infinitely far is no different.
+    // At a distance that overflows r² the variance is finite too.
     assert!(process.predict(&[1e300, 0.0]).1.iter().all(|v| v.is_finite()));
 }
 
@@ -234,7 +234,7 @@ fn a_sampled_functions_hyperparameters_are_recovered() {
         assert!((process.signal_variance(j) / signal).ln().abs() < 0.7);
         assert!((process.noise_variance(j).unwrap() / 0.09).ln().abs() < 0.5);
     }
-    // Where its noise is given instead, the signal variance is found all the same.
+    // With a given noise, the fit recovers the signal variance too.
     let given = vec![0.09; rows];
     let process = fit(Regression::default(), samples(&x, &y, Some(&given)));
     assert!((process.signal_variance(0) / signal).ln().abs() < 0.5);
@@ -242,7 +242,7 @@ fn a_sampled_functions_hyperparameters_are_recovered() {
 
 #[test]
 fn repeats_alone_tell_the_noise() {
-    // Eight places, far too few to tell a wiggle from noise without the repeats.
+    // Eight places, far too few to distinguish a wiggle from noise without the repeats.
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     let x = Array2::from_shape_fn((160, 1), |(r, _)| (r % 8) as f64);
     let y = Array2::from_shape_fn((160, 1), |(r, _)| {
@@ -324,7 +324,7 @@ fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     let process = fit(Regression { trend: Trend::Linear, ..Regression::default() }, samples(&x, &y, None));
     let text = serde_json::to_string(&process).unwrap();
     let back: GaussianProcess = serde_json::from_str(&text).unwrap();
-    // Reading a number may round its last digit.
+    // Parsing a number may round its last digit.
     let (here, there) = (process.predict(&[0.1, 0.2]), back.predict(&[0.1, 0.2]));
     for j in 0..2 {
         assert!((here.0[j] - there.0[j]).abs() < 1e-9 && (here.1[j] - there.1[j]).abs() < 1e-9);
@@ -336,7 +336,7 @@ fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     }
 }
 
-/// Eight bell-shaped features of a position with noise, and the position: what regression of positions sees.
+/// Eight bell-shaped features of a position with noise, and the position: the input of a regression of positions.
 fn features(rows: usize, seed: u64) -> (Array2<f64>, Array2<f64>) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let y = Array2::from_shape_fn((rows, 1), |_| rng.random_range(0.0..1.0));
@@ -377,7 +377,7 @@ fn chosen_points_tell_what_all_do() {
         let groups = Groups::new(all).unwrap();
         let kernel = Kernel::Matern52;
         let sparse = GaussianProcess::of_chosen(&groups, kernel, trend, found, Watch::NONE).unwrap();
-        // The textbook's variance, of all rows.
+        // The textbook's variance, from all rows.
         let noise = groups.noise_ratios(found.noise_ratio);
         let scales = &found.length_scales;
         let points = Points::of_groups(&groups, scales, trend);
@@ -417,7 +417,7 @@ fn chosen_points_tell_what_all_do() {
 
 #[test]
 fn tables_of_a_rough_process_are_as_sure_as_all_rows_make_them() {
-    // Too rough for the few points that tell the variance of a prediction.
+    // Too rough for the few points that give the variance of a prediction.
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(13);
     let x = Array2::<f64>::from_shape_fn((2500, 2), |_| rng.random_range(0.0..1.0));
     let y = Array2::from_shape_fn((2500, 1), |(i, _)| (9.0 * x[[i, 0]]).sin() * (7.0 * x[[i, 1]]).cos());

@@ -1,13 +1,13 @@
-//! Vectors as arrays: for every machine, and the reference of those made of instructions.
+//! Vectors as arrays: for every machine, and as the reference of the vectors made of instructions.
 
 use super::{Arithmetic, Eight, Number, Real, Vector};
 use std::ops::{Add, Div, Mul, Sub};
 
-/// N numbers in an array. With `FUSED` a multiply-add rounds once, which is fast only where the instruction exists.
+/// N numbers in an array. With `FUSED` a multiply-add rounds once, which is fast only on machines with the instruction.
 #[derive(Clone, Copy, Debug)]
 pub struct Array<R, const N: usize, const FUSED: bool>([R; N]);
 
-/// Calls to `std::array::from_fn` may stay calls; a loop over a filled array never does.
+/// The compiler may not inline calls to `std::array::from_fn`; a loop over a filled array needs no calls.
 macro_rules! each_lane {
     ($any:expr, $lane:ident => $value:expr) => {{
         let mut lanes = $any.0;

@@ -1,7 +1,7 @@
 //! Several numbers at a time: the instruction sets of the machine, and vectors of eight f64 and sixteen f32 in each.
 //!
-//! Work is written once, as a [`Kernel`] over the vectors of whatever set it is compiled for ([`Simd`]). [`InstructionSet::run`] compiles it
-//! for every set and calls the one that is asked for:
+//! Work is written once, as a [`Kernel`] over the vectors of an instruction set ([`Simd`]). [`InstructionSet::run`] compiles it
+//! for every set and calls the version for the chosen one:
 //!
 //! ```
 //! use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
@@ -26,12 +26,12 @@
 //! assert_eq!(y, [[7.0; 8]]);
 //! ```
 //!
-//! Every operation rounds as IEEE 754 says, lane by lane, and sums over lanes have one order, so a kernel gives the same bits with every set
-//! that a machine has: a multiply-add rounds once on a machine that can fuse it, there also in the portable set.
+//! Every operation rounds according to IEEE 754, lane by lane, and sums over lanes have one order. So a kernel gives the same bits with every set
+//! of a machine: a multiply-add rounds once on a machine that can fuse it, also in the portable set.
 //!
-//! Why vectors are instructions on x86, not arrays that the compiler may vectorise: with arrays under `#[target_feature]` training on a Xeon
+//! On x86 vectors are instructions, not arrays that the compiler may vectorise: with arrays under `#[target_feature]` training on a Xeon
 //! runs at 0.6 (f64) and 0.3 (f32) of its rate with AVX-512 and at 0.8 to 0.9 with AVX2, batches through a network at 0.07 and 0.46, and the
-//! influence estimator at 0.7. Where arrays do as well, loops over them are compiled for AVX2 by [`run_loops`].
+//! influence estimator at 0.7. Where arrays are as fast, [`run_loops`] compiles loops over them for AVX2.
 #![allow(unsafe_code, reason = "instructions that the machine was asked for")]
 
 mod array;
@@ -46,9 +46,9 @@ pub use vector::{Abreast, Arithmetic, Eight, LOOK_UP, Number, Real, Vector};
 pub trait Kernel {
     /// Result of the work.
     type Output;
-    /// Whether it uses [`Vector::mul_add`] or [`Vector::mul_sub`]. One that does not is compiled once less.
+    /// True for a kernel with [`Vector::mul_add`] or [`Vector::mul_sub`]. Other kernels need one compilation less.
     const FUSED: bool;
-    /// Does the work with the vectors of `S`. To be `#[inline(always)]`, as all that it spends its time in.
+    /// Does the work with the vectors of `S`. It must be `#[inline(always)]`, and so must its time-critical functions.
     fn run<S: Simd>(self) -> Self::Output;
 }
 
@@ -58,13 +58,13 @@ pub trait Simd {
     type F64: Eight;
     /// Sixteen f32.
     type F32: Vector<16, Real = f32>;
-    /// N numbers in an array, which multiplies and adds as the vectors do.
+    /// N numbers in an array, with the multiplication and addition of the vectors.
     type Array<R: Real, const N: usize>: Vector<N, Real = R>;
-    /// Number of vectors that the registers hold.
+    /// Number of vectors that fit into the registers.
     const REGISTERS: usize;
 }
 
-/// An instruction set that this machine has.
+/// An instruction set of this machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InstructionSet(Set);
 
@@ -78,10 +78,10 @@ enum Set {
 }
 
 impl InstructionSet {
-    /// Arrays, which every machine has.
+    /// Arrays, available on every machine.
     pub const PORTABLE: Self = Self(Set::Portable);
 
-    /// The widest that this machine has.
+    /// The widest set of this machine.
     #[inline]
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
@@ -106,7 +106,7 @@ impl InstructionSet {
         wide.chain([Self::PORTABLE]).collect()
     }
 
-    /// Does `kernel`'s work with this set.
+    /// Does the work of `kernel` with this set.
     #[inline(always)]
     pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self.0 {
@@ -134,7 +134,7 @@ impl std::fmt::Display for InstructionSet {
     }
 }
 
-/// Does the work of a kernel whose loops over arrays the compiler makes vector instructions of: AVX2 and FMA where the machine has them.
+/// Does the work of a kernel with loops over arrays that the compiler vectorises: AVX2 and FMA where the machine has them.
 #[inline(always)]
 pub fn run_loops<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
@@ -145,7 +145,7 @@ pub fn run_loops<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Portable<NATIVE_FMA>>()
 }
 
-/// Whether every machine of this architecture fuses multiplications and additions.
+/// True when every machine of this architecture fuses multiplications and additions.
 const NATIVE_FMA: bool = cfg!(target_arch = "aarch64");
 
 #[cfg(target_arch = "x86_64")]
@@ -178,7 +178,7 @@ unsafe fn compiled_for_avx2<K: Kernel, S: Simd>(kernel: K) -> K::Output {
     kernel.run::<S>()
 }
 
-/// One register a vector.
+/// One register for each vector.
 #[cfg(target_arch = "x86_64")]
 struct Avx512;
 
@@ -190,7 +190,7 @@ impl Simd for Avx512 {
     const REGISTERS: usize = 32;
 }
 
-/// Two registers a vector: two halves in step hide the latency that one would wait for.
+/// Two registers for each vector: two interleaved halves hide the latency of one.
 #[cfg(target_arch = "x86_64")]
 struct Avx2;
 
@@ -202,7 +202,7 @@ impl Simd for Avx2 {
     const REGISTERS: usize = 8;
 }
 
-/// Arrays. A multiply-add rounds once if `FUSED`, which is fast only where the instruction exists.
+/// Arrays. With `FUSED` a multiply-add rounds once, which is fast only on machines with the instruction.
 struct Portable<const FUSED: bool>;
 
 impl<const FUSED: bool> Simd for Portable<FUSED> {

@@ -1,4 +1,4 @@
-//! Every vector computes as arrays do, and an array's lane as a number does.
+//! Every vector gives the results of arrays, and every lane of an array those of a number.
 
 use super::*;
 use std::fmt::Debug;
@@ -58,7 +58,7 @@ fn eight_operations<V: Eight>(shift: usize) -> (Vec<[f64; 8]>, Vec<u8>, f64) {
     (vectors.to_vec(), bits.to_vec(), a.sum())
 }
 
-/// All of them, of one instruction set.
+/// All operations of one instruction set.
 struct Operations;
 
 impl Kernel for Operations {

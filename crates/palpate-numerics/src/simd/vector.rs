@@ -1,4 +1,4 @@
-//! Operations on numbers side by side. Every operation is lane by lane and rounds as IEEE 754 says.
+//! Operations on numbers side by side. Every operation acts lane by lane and rounds according to IEEE 754.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -19,9 +19,9 @@ pub trait Real:
     const EXP2: &'static [Self];
     /// The product of two exponentials of numbers up to this is finite.
     const HALF_OF_EXP: Self;
-    /// Rounds to this precision.
+    /// Rounds to the precision of this type.
     fn from_f64(x: f64) -> Self;
-    /// The same number.
+    /// Converts to f64 without rounding.
     fn to_f64(self) -> f64;
     /// `self` · `factor` + `term`, rounded once.
     fn fused_mul_add(self, factor: Self, term: Self) -> Self;
@@ -91,7 +91,7 @@ pub trait Arithmetic:
 {
     /// The number in one lane.
     type Real: Real;
-    /// The same number in every lane.
+    /// This number in every lane.
     fn splat(value: Self::Real) -> Self;
     /// The larger; `other` where they cannot be compared.
     fn max(self, other: Self) -> Self;
@@ -99,17 +99,17 @@ pub trait Arithmetic:
     fn min(self, other: Self) -> Self;
 }
 
-/// An f64, or up to eight side by side, with a bit for each lane: what is written against this gives the same bits for one and for eight.
+/// An f64, or up to eight side by side, with a bit for each lane. Code for this trait gives the same bits for one and for eight.
 pub trait Number: Arithmetic<Real = f64> {
-    /// Without what is after the point.
+    /// The integer part, without the digits after the point.
     fn truncate(self) -> Self;
-    /// Bit i is set where lane i is at most `other`'s.
+    /// Bit i is set where lane i is at most that of `other`.
     fn at_most(self, other: Self) -> u8;
     /// `self` where the lane's bit is set, `other` where it is not.
     fn or(self, bits: u8, other: Self) -> Self;
 }
 
-/// Numbers that [`Vector::look_up`] looks among: as many as two AVX-512 registers of f32 hold.
+/// Length of the table of [`Vector::look_up`]: as many numbers as two AVX-512 registers of f32 contain.
 pub const LOOK_UP: usize = 32;
 
 /// N numbers side by side.
@@ -127,8 +127,8 @@ pub trait Vector<const N: usize>: Arithmetic {
     /// 2ⁿ of `self` = n + [`Real::ROUNDER`], where that is a normal number.
     fn power_of_two(self) -> Self;
 
-    /// eᶻ, by 2^x = 2^n · 2^r with n the whole number next to x and a polynomial in r; that of the nearest z between plus and minus twice
-    /// [`Real::HALF_OF_EXP`] where it would be infinite or subnormal.
+    /// eᶻ, by 2^x = 2^n · 2^r with n the whole number next to x and a polynomial in r. Where it would be infinite or subnormal, z is first
+    /// clamped to plus or minus twice [`Real::HALF_OF_EXP`].
     #[inline(always)]
     fn exponential(self) -> Self {
         let number = |x: f64| Self::splat(Self::Real::from_f64(x));
@@ -145,7 +145,7 @@ pub trait Vector<const N: usize>: Arithmetic {
         power * shifted.power_of_two()
     }
 
-    /// The number that each lane picks, of whose pick only the low bits count.
+    /// For each lane, the number at the index in its pick; only the low bits of the pick count.
     #[inline(always)]
     fn look_up(numbers: &[Self::Real; LOOK_UP], picks: &[u32; N]) -> Self {
         let mut lanes = [numbers[0]; N];
@@ -172,10 +172,10 @@ pub trait Vector<const N: usize>: Arithmetic {
 
 /// Eight f64 side by side.
 pub trait Eight: Number + Vector<8> {
-    /// Bit i is set where lane i is below `other`'s.
+    /// Bit i is set where lane i is below that of `other`.
     fn below(self, other: Self) -> u8;
 
-    /// `value` where the lane of `self` is below that of `bound`, `other` where it is not.
+    /// `value` where the lane of `self` is below that of `bound`, `other` elsewhere.
     #[inline(always)]
     fn where_below(self, bound: Self, value: Self, other: Self) -> Self {
         value.or(self.below(bound), other)
@@ -188,7 +188,7 @@ pub trait Eight: Number + Vector<8> {
         ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]))
     }
 
-    /// [`Eight::sum`] of each.
+    /// [`Eight::sum`] of each of eight vectors.
     #[inline(always)]
     fn sums(eight: &[Self; 8]) -> Self {
         let mut sums = [0.0; 8];
@@ -230,17 +230,17 @@ impl Number for f64 {
     }
 }
 
-/// One number each of rows that are worked on side by side, one row or eight, whose own numbers lie in `V`. What is written against this gives
-/// the same bits for one row and for eight.
+/// One number for each of the rows in a joint computation, one row or eight, with `V` as the type of a row's vectors. Code for this trait
+/// gives the same bits for one row and for eight.
 pub trait Abreast<V: Copy>: Number {
     /// Number of rows.
     const COUNT: usize;
-    /// The bits of all of them.
+    /// The bits of all rows.
     const ALL: u8 = (u8::MAX as u32 >> (8 - Self::COUNT)) as u8;
-    /// Something of each row.
+    /// A value of each row.
     type Each<T: Copy>: AsRef<[T]> + AsMut<[T]>;
 
-    /// The same for each.
+    /// `value` for each row.
     fn each<T: Copy>(value: T) -> Self::Each<T>;
     /// The numbers.
     fn lanes(self) -> Self::Each<f64>;

@@ -1,7 +1,7 @@
 //! Vectors made of the instructions of AVX-512 and AVX2.
 //!
-//! Safety of every block that calls instructions: [`super::InstructionSet`] hands these types to a kernel only after it has found that the
-//! machine has the instructions, and nothing else can name them.
+//! Safety of every block that calls instructions: [`super::InstructionSet`] passes these types to a kernel only after it has detected
+//! the instructions on the machine, and no other code can name them.
 #![allow(unsafe_code, reason = "instructions that the machine was asked for")]
 #![allow(
     clippy::missing_transmute_annotations,
@@ -13,7 +13,7 @@ use std::arch::x86_64::*;
 use std::mem::transmute;
 use std::ops::{Add, Div, Mul, Sub};
 
-/// A vector each of whose registers is the value for register `$r`.
+/// A vector from the value `$value` for each register `$r`.
 macro_rules! each_register {
     ($any:expr, $r:ident => $value:expr) => {{
         let mut registers = $any.0;
@@ -75,7 +75,7 @@ macro_rules! vector {
             #[inline(always)]
             fn load(values: &[$real; $lanes]) -> Self {
                 // SAFETY: both are 64 bytes of numbers, and any bits are a number. A copy of the array would be stored in halves before it
-                // is loaded as a whole, for which the machine waits.
+                // is loaded as a whole, which stalls the machine.
                 Self(unsafe { values.as_ptr().cast::<[$register; $registers]>().read_unaligned() })
             }
             #[inline(always)]
@@ -106,13 +106,13 @@ macro_rules! vector {
     };
 }
 
-/// Turns squares of 4 × 4 numbers about, as many side by side as a register has quarters.
+/// Transposes squares of 4 × 4 numbers, as many side by side as a register has quarters.
 macro_rules! transpose {
     ($quarters:literal quarters: $low:ident, $high:ident, $shuffle:ident) => {
         #[inline(always)]
         fn transpose(rows: &[[f32; 8]; 16]) -> [Self; 8] {
             let mut columns = [Self::splat(0.0); 8];
-            // SAFETY: see the head of this file; what is transmuted is as many numbers, and any bits are a number.
+            // SAFETY: see the head of this file; the transmuted types contain the same number of values, and any bits are a number.
             unsafe {
                 let rows = transmute::<[[f32; 8]; 16], [[__m128; 2]; 16]>(*rows);
                 for (r, rows) in rows.as_chunks::<{ 4 * $quarters }>().0.iter().enumerate() {
@@ -294,7 +294,7 @@ impl Eight for Avx2F64 {
     fn below(self, other: Self) -> u8 {
         each_register!(self, r => _mm256_cmp_pd::<_CMP_LT_OQ>(self.0[r], other.0[r])).signs()
     }
-    // Without the way through bits and back, which would take as long as eight additions.
+    // Without the conversion to bits and back, which would take as long as eight additions.
     #[inline(always)]
     fn where_below(self, bound: Self, value: Self, other: Self) -> Self {
         each_register!(self, r => {

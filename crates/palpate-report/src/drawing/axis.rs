@@ -1,4 +1,4 @@
-//! An axis: what it shows, where its values lie along it, and its round numbers with their labels.
+//! An axis: its range, the positions of values along it, and its round numbers with their labels.
 
 use super::geometry::Rect;
 use super::svg::{Anchor, Label, QUIET_INK};
@@ -9,13 +9,13 @@ use super::text;
 pub struct Axis {
     /// Quantity along the axis, with its unit: "load position, mm".
     pub label: String,
-    /// First and last value shown, in either order. `None`, a span of nothing, and ends that the scale cannot show (not finite, or not
-    /// positive on a logarithmic axis): from the data and marks, with padding; a linear axis then ends on round numbers and is not
-    /// padded across zero.
+    /// First and last value shown, in either order. For `None`, the range follows from the data and marks, with padding. This also applies
+    /// to equal ends, and to ends that the scale cannot show (not finite, or not positive on a logarithmic axis). A linear axis
+    /// then ends on round numbers and is not padded across zero.
     pub range: Option<(f64, f64)>,
     /// Mapping of values to lengths.
     pub scale: Scale,
-    /// Values with a labelled tick, each with its label, where they lie in the range; one whose label would touch its neighbour's is
+    /// Values with a labelled tick, each with its label, as far as they are in the range; a label that would touch its neighbour's is
     /// left out. `None`: round numbers, as many as are readable.
     pub ticks: Option<Vec<(f64, String)>>,
 }
@@ -31,17 +31,17 @@ impl Axis {
         Axis { label: label.into(), scale: Scale::Log10, ..Axis::default() }
     }
 
-    /// The same axis from `low` to `high`.
+    /// Sets the range from `low` to `high`.
     pub fn from_to(self, low: f64, high: f64) -> Self {
         Axis { range: Some((low, high)), ..self }
     }
 
-    /// The same axis with names instead of numbers.
+    /// Sets names instead of numbers.
     pub fn named(self, names: Vec<(f64, String)>) -> Self {
         Axis { ticks: Some(names), ..self }
     }
 
-    /// The same axis with ticks at `values` only.
+    /// Sets ticks at `values` only.
     pub fn ticks_at(self, values: impl IntoIterator<Item = f64>) -> Self {
         self.named(values.into_iter().map(|value| (value, plain(value))).collect())
     }
@@ -64,7 +64,7 @@ const SMALLEST: f64 = 1e-300;
 /// Share of the range that an automatic axis leaves free at each end.
 const PADDING: f64 = 0.04;
 
-/// An axis with its ends settled: `low` < `high`, and both positive on a logarithmic axis.
+/// An axis with definite ends: `low` < `high`, and both positive on a logarithmic axis.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct AxisScale {
     pub low: f64,
@@ -73,19 +73,19 @@ pub(crate) struct AxisScale {
 }
 
 impl AxisScale {
-    /// The ends that the axis asks for, or those that its values need.
+    /// The ends of the axis's own range, or those that `values` need.
     pub fn new(axis: &Axis, values: &[f64]) -> Self {
         let (low, high) = fixed_ends(axis).unwrap_or_else(|| automatic_ends(axis.scale, values));
         AxisScale { low, high, scale: axis.scale }
     }
 
-    /// Position of a value of the data: 0 at the low end, 1 at the high end, outside them beyond (held within
-    /// ±1e6). `None` where the scale cannot show it.
+    /// Position of a value of the data: 0 at the low end, 1 at the high end, and beyond them for values outside (limited to
+    /// ±1e6). `None` for a value that the scale cannot show.
     pub fn share(&self, value: f64) -> Option<f64> {
         drawable(self.scale, value).then(|| self.tick_share(value))
     }
 
-    /// Position as of [`AxisScale::share`], for a value on the axis itself, whose rounded ends may exceed what data may be.
+    /// Position as of [`AxisScale::share`], for a value on the axis itself; its rounded ends may exceed the bounds of data.
     pub fn tick_share(&self, value: f64) -> f64 {
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
@@ -179,14 +179,14 @@ pub(crate) const LABEL_GAP: f64 = 14.0;
 const LEAST_X_PITCH: f64 = 40.0;
 const LEAST_Y_PITCH: f64 = 26.0;
 
-/// A value with a line of the grid and a label.
+/// A value with a grid line and a label.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Tick {
     pub value: f64,
     pub label: String,
 }
 
-/// The ticks that are asked for where they fit; else the finest round ones that `fits` accepts. `fits` must accept a single tick.
+/// The ticks `asked`, as far as they fit; without them the finest round ones that `fits` accepts. `fits` must accept a single tick.
 pub(crate) fn choose_ticks(
     axis: &AxisScale,
     asked: Option<&[(f64, String)]>,
@@ -199,7 +199,7 @@ pub(crate) fn choose_ticks(
     }
 }
 
-/// Positions of unlabelled grid lines between the decades of a logarithmic axis; none where the ticks are not
+/// Positions of unlabelled grid lines between the decades of a logarithmic axis; empty if the ticks are not
 /// successive decades.
 pub(crate) fn minor_ticks(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
     let decades =
@@ -210,7 +210,7 @@ pub(crate) fn minor_ticks(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
     multiples_of_decades(axis, &[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], 1)
 }
 
-/// Ticks that are asked for, less those off the axis and those without room.
+/// The ticks `asked`, without those off the axis and those without room.
 fn chosen(axis: &AxisScale, asked: &[(f64, String)], fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
     let on_axis = asked.iter().filter(|(value, _)| is_on_axis(axis, *value));
     let mut asked: Vec<Tick> =
@@ -366,12 +366,12 @@ pub(crate) fn tick_labels(
     columns.chain(rows).collect()
 }
 
-/// Whether labels above each other leave room between them on an axis of that height.
+/// Whether labels above each other are far enough apart on an axis of this height.
 pub(crate) fn rows_fit(axis: &AxisScale, ticks: &[Tick], height: f64) -> bool {
     pairs(axis, ticks).all(|(pitch, _, _)| pitch * height >= LEAST_Y_PITCH)
 }
 
-/// Whether labels beside each other leave room between them on an axis of that width.
+/// Whether labels beside each other are far enough apart on an axis of this width.
 pub(crate) fn columns_fit(axis: &AxisScale, ticks: &[Tick], width: f64) -> bool {
     pairs(axis, ticks).all(|(pitch, before, after)| {
         let labels = text::width(&before.label, TICK_SIZE) / 2.0 + text::width(&after.label, TICK_SIZE) / 2.0;
@@ -379,7 +379,7 @@ pub(crate) fn columns_fit(axis: &AxisScale, ticks: &[Tick], width: f64) -> bool 
     })
 }
 
-/// Neighbouring ticks and how far apart they are as a share of the axis.
+/// Neighbouring ticks with their distance as a share of the axis.
 fn pairs<'t>(axis: &AxisScale, ticks: &'t [Tick]) -> impl Iterator<Item = (f64, &'t Tick, &'t Tick)> {
     ticks.windows(2).map(|pair| {
         let pitch = axis.tick_share(pair[1].value) - axis.tick_share(pair[0].value);

@@ -1,18 +1,18 @@
-//! The chart as data: series, marks and what they span, with no drawing in it.
+//! The chart as data: series, marks and their range, without any drawing.
 
 use super::axis::Axis;
 
 /// A chart of one plot area, its title, axes, series and legend.
 ///
-/// Any data can be drawn: values that are not finite (or beyond ±1e300) break a line and are otherwise left
-/// out, as are values that are not positive on a logarithmic axis. A chart without data shows empty axes.
+/// Any data can be drawn. Values that are not finite (or beyond ±1e300) break a line and are otherwise left
+/// out, and so are values that are not positive on a logarithmic axis. A chart without data shows empty axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
     /// Heading; wrapped onto at most two lines. Empty for none.
     pub title: String,
     /// Horizontal axis.
     pub x: Axis,
-    /// Vertical axis. Its label stands above the plot, unrotated.
+    /// Vertical axis; the label stands above the plot, unrotated.
     pub y: Axis,
     /// Data to draw, later series over earlier ones within each kind: bands lie under lines, lines under points.
     pub series: Vec<Series>,
@@ -36,18 +36,18 @@ impl Chart {
         Chart { title: title.into(), x, y, series, marks: Vec::new(), width_px: 720, height_px: 440 }
     }
 
-    /// The same chart in another height.
+    /// Sets the height of the image.
     pub fn with_height(self, height_px: u32) -> Self {
         Chart { height_px, ..self }
     }
 
-    /// The same chart with these marks.
+    /// Sets the marks.
     pub fn with_marks(self, marks: Vec<Mark>) -> Self {
         Chart { marks, ..self }
     }
 }
 
-/// One thing that is drawn, with one entry in the legend.
+/// Data that are drawn in one way, with one entry in the legend.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     /// Name in the legend; empty keeps the series out of it.
@@ -90,7 +90,7 @@ impl Series {
         Series::new(label, colour, SeriesKind::ErrorBars { points, marker })
     }
 
-    /// Whether it is an area between two curves.
+    /// Whether the series is an area between two curves.
     pub fn is_band(&self) -> bool {
         matches!(self.kind, SeriesKind::Band { .. })
     }
@@ -181,7 +181,7 @@ pub struct ErrorPoint {
 
 /// A reference behind the data.
 ///
-/// Labels of vertical marks stand above the plot, in at most three rows; one that finds no room is left out
+/// Labels of vertical marks stand above the plot, in at most three rows; a label without room is left out
 /// while its mark stays. A horizontal mark is named in the legend.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {
@@ -210,10 +210,10 @@ pub enum Mark {
     },
 }
 
-/// Positive values whose greatest is this many times the least are drawn on a logarithmic axis.
+/// Least ratio of the greatest to the least of positive values for a logarithmic axis.
 const LOGARITHMIC_FROM: f64 = 10.0;
 
-/// The least and the greatest of some values; zeros where none of them is a number.
+/// The least and the greatest of some values; zeros without a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Extremes {
     pub least: f64,
@@ -243,7 +243,7 @@ impl Extremes {
         self.least > 0.0 && self.greatest >= LOGARITHMIC_FROM * self.least
     }
 
-    /// An axis that shows both ends: logarithmic where they are far apart.
+    /// An axis that shows both ends: logarithmic if they are far apart.
     pub fn axis(self, label: &str) -> Axis {
         if self.are_far_apart() { Axis::log10(label) } else { Axis::linear(label) }
     }

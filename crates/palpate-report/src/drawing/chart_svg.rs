@@ -11,7 +11,7 @@ const REFERENCE_WIDTH: f64 = 1.2;
 const ERROR_BAR_WIDTH: f64 = 1.5;
 const CAP_HALF_WIDTH: f64 = 4.0;
 const MARKER_RADIUS: f64 = 4.2;
-/// White rim that keeps a marker apart from what lies under it.
+/// White rim that separates a marker from the shapes under it.
 const MARKER_RIM: f64 = 1.2;
 const CROSS_WIDTH: f64 = 2.0;
 const BAND_OPACITY: f64 = 0.2;
@@ -19,8 +19,8 @@ const SPAN_OPACITY: f64 = 0.05;
 
 /// Draws the chart as one self-contained SVG document, `width_px` × `height_px` in size.
 ///
-/// The legend stands beneath the plot; where even that leaves no room for all names, its last entry says how many
-/// are missing. Texts are set in the reader's sans-serif font.
+/// The legend stands beneath the plot. If it has too little room for all names, its last entry gives the number of
+/// missing ones. Texts are set in the reader's sans-serif font.
 pub fn chart_to_svg(chart: &Chart) -> String {
     let layout = Layout::new(chart);
     let mut painter = Painter { svg: Svg::new(layout.width_px, layout.height_px), layout: &layout };
@@ -195,7 +195,7 @@ impl Painter<'_> {
         }
     }
 
-    /// A sample of how the series is drawn.
+    /// Draws a sample of the series for the legend.
     fn swatch(&mut self, series: &Series, area: Rect) {
         let colour = palette(series.colour);
         let Rect { left, right, top, bottom } = area;
@@ -214,7 +214,7 @@ impl Painter<'_> {
     }
 }
 
-/// The longest stretches without a gap.
+/// The longest runs of items without a gap.
 fn runs<T>(items: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     let mut runs = vec![Vec::new()];
     for item in items {
@@ -236,7 +236,7 @@ fn draw_marker(svg: &mut Svg, at: Point, marker: Marker, colour: Colour) {
     draw_shape(svg, at, marker, MARKER_RADIUS, CROSS_WIDTH, colour);
 }
 
-/// Shapes that look equally large at the same `radius`.
+/// Draws a marker; all shapes look equally large at the same `radius`.
 fn draw_shape(svg: &mut Svg, at: Point, marker: Marker, radius: f64, cross_width: f64, colour: Colour) {
     match marker {
         Marker::Circle => svg.disc(at, radius, colour),

@@ -21,7 +21,7 @@ impl Rect {
         self.bottom - self.top
     }
 
-    /// The same rectangle, further right and down.
+    /// Moves the rectangle to the right and down.
     pub fn moved(&self, right: f64, down: f64) -> Rect {
         Rect {
             left: self.left + right,
@@ -36,7 +36,7 @@ impl Rect {
         (self.left..=self.right).contains(&x) && (self.top..=self.bottom).contains(&y)
     }
 
-    /// The four half-planes whose intersection is this rectangle: signed distances, positive inside.
+    /// The four half-planes that intersect in this rectangle: signed distances, positive inside.
     fn insides(&self) -> [impl Fn(Point) -> f64 + use<>; 4] {
         let Rect { left, top, right, bottom } = *self;
         let half_plane =
@@ -79,7 +79,7 @@ impl Rect {
         (enter <= leave).then_some((first, last))
     }
 
-    /// The part of a polygon that lies inside (Sutherland and Hodgman); empty where nothing does.
+    /// The part of a polygon that lies inside (Sutherland and Hodgman); empty for a polygon outside.
     pub fn clip_polygon(&self, points: &[Point]) -> Vec<Point> {
         let mut clipped = points.to_vec();
         for inside in self.insides() {

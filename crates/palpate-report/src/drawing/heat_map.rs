@@ -1,4 +1,4 @@
-//! A quantity over a plane as colours: one map, or several of the same plane and scale beside each other.
+//! A quantity over a plane in colours: one map, or several of one plane and scale beside each other.
 
 use super::axis::{Axis, AxisScale, TICK_SIZE, Tick, choose_ticks, columns_fit, rows_fit, tick_labels};
 use super::chart::Extremes;
@@ -12,7 +12,7 @@ const TITLE_SIZE: f64 = 15.0;
 const TITLE_LINE: f64 = 26.0;
 const NAME_SIZE: f64 = 12.5;
 const NAME_LINE: f64 = 28.0;
-/// Distance from the top of a map or of the colour bar up to the middle of its name, clear of the uppermost label beside it.
+/// Distance from the top of a map or of the colour bar up to the middle of its name, above the uppermost label beside it.
 const NAME_RISE: f64 = 17.0;
 /// Room left of a map for the labels of its ticks, and beneath it.
 const GUTTER: f64 = 40.0;
@@ -26,7 +26,7 @@ const BAR_LABELS: f64 = 54.0;
 const LEAST_WIDTH: f64 = 120.0;
 /// Greatest height of one map.
 const MOST_HEIGHT: f64 = 420.0;
-/// Cells overlap by this much, or a line of background would show between them.
+/// Overlap of neighbouring cells; without it a line of background would show between them.
 const OVERLAP: f64 = 0.5;
 
 /// A quantity over a plane.
@@ -34,7 +34,7 @@ const OVERLAP: f64 = 0.5;
 pub struct HeatMap {
     /// Heading, in one line or two.
     pub title: String,
-    /// The plane, parted into cells of one value each.
+    /// The plane, divided into cells of one value each.
     pub cells: Cells,
     /// The maps.
     pub panels: Vec<HeatPanel>,
@@ -42,7 +42,7 @@ pub struct HeatMap {
     pub dots_mm: Vec<(f64, f64)>,
     /// Meaning of the colours, with its unit: "limit, mm".
     pub label: String,
-    /// Larger values have the colour of this one.
+    /// Upper end of the scale; larger values have its colour.
     pub most: f64,
     /// Width of the image in pixels at scale 1; drawn within 320 to 4,000. The height follows from the plane.
     pub width_px: u32,
@@ -53,7 +53,7 @@ pub struct HeatMap {
 pub struct HeatPanel {
     /// Name; empty for none.
     pub name: String,
-    /// A value a cell; one that is not finite leaves its cell grey.
+    /// A value for each cell; a cell with a value that is not finite is grey.
     pub values: Vec<f64>,
 }
 
@@ -64,8 +64,8 @@ impl HeatPanel {
     }
 }
 
-/// Draws the maps as one self-contained SVG document: x to the right, y upward, a millimetre as long both ways, with one
-/// colour bar for all. The scale is logarithmic where the largest value is ten times the smallest, and all are positive.
+/// Draws the maps as one self-contained SVG document: x to the right, y upward, with equal scales, and one
+/// colour bar for all. The scale is logarithmic if the largest value is ten times the smallest, and all are positive.
 ///
 /// ```
 /// use palpate_estimators::load_profile::Cells;
@@ -171,7 +171,7 @@ impl Layout {
     /// Room for the name of a map.
     fn name_room(&self, plot: Rect) -> f64 {
         let is_last_of_row = !self.plots.iter().any(|other| other.top == plot.top && other.left > plot.left);
-        // To the right of the name the next map's axis has its own, or the colour bar.
+        // To the right of the name stands the name of the next map's axis, or the colour bar.
         let is_beneath_bar = plot.top > self.bar.bottom;
         if is_last_of_row && is_beneath_bar {
             self.width - MARGIN - plot.left
@@ -197,7 +197,7 @@ impl Layout {
             colour: INK,
             ..label(&name, (plot.left, above), Anchor::Start)
         });
-        // The lowest map of a column names the axis beneath it.
+        // The axis is named beneath the lowest map of a column.
         if !self.plots.iter().any(|other| other.left == plot.left && other.top > plot.top) {
             let at = (plot.left.midpoint(plot.right), plot.bottom + FOOT + 0.5 * NAME_LINE - 1.0);
             labels.push(label("x, mm", at, Anchor::Middle));
@@ -251,7 +251,7 @@ fn draw_cells(svg: &mut Svg, map: &HeatMap, panel: &HeatPanel, plot: Rect, colou
     }
 }
 
-/// White rings with a dark middle, which are seen on any colour.
+/// Draws white rings with a dark middle, which are visible on any colour.
 fn draw_dots(svg: &mut Svg, map: &HeatMap, plot: Rect) {
     let (rim, middle) = if plot.width() < 200.0 { (3.2, 1.9) } else { (4.8, 3.0) };
     let [length_mm, width_mm] = sides_mm(map);
@@ -262,8 +262,8 @@ fn draw_dots(svg: &mut Svg, map: &HeatMap, plot: Rect) {
     }
 }
 
-/// Viridis at ten even steps (van der Walt and Smith, 2015; public domain): colours that rise in lightness with a value, so that
-/// readers who see few colours can tell them, and print without any.
+/// Viridis at ten even steps (van der Walt and Smith, 2015; public domain): the lightness of the colours rises with the value. So
+/// readers who see few colours can distinguish them, also in print without any.
 const VIRIDIS: [Colour; 10] = [
     Colour::opaque(68, 1, 84),
     Colour::opaque(72, 40, 120),
@@ -277,7 +277,7 @@ const VIRIDIS: [Colour; 10] = [
     Colour::opaque(253, 231, 37),
 ];
 
-/// The colour of a share of the scale, 0 to 1; beyond it the colour of its end.
+/// The colour for a share of the scale, 0 to 1; beyond it the colour of the nearer end.
 fn colour_of(share: f64) -> Colour {
     let place = share.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
     let below = (place as usize).min(VIRIDIS.len() - 2);

@@ -1,4 +1,4 @@
-//! Layout of a chart, in pixels: settled before anything is drawn, so that it can be tested.
+//! Layout of a chart, in pixels, determined before the drawing, so that it can be tested.
 //!
 //! From top to bottom: title, label of the vertical axis, names of vertical marks, plot, tick labels, label of
 //! the horizontal axis, legend. Each has a strip of its own, so no text can lie over data.
@@ -27,7 +27,7 @@ const MARK_ROWS: usize = 3;
 const LEAST_PLOT_SHARE: f64 = 0.25;
 /// Least room left of the plot: half of the widest label of a tick.
 const LEAST_GUTTER: f64 = 44.0;
-/// Half of the widest label of a tick, which may stand at the right end of the axis.
+/// Half of the widest label of a tick, for one at the right end of the axis.
 const OVERHANG: f64 = 36.0;
 
 /// The places of all parts of one chart.
@@ -46,7 +46,7 @@ pub(crate) struct Layout<'a> {
 }
 
 impl<'a> Layout<'a> {
-    /// Settles every place.
+    /// Determines all places.
     pub fn new(chart: &'a Chart) -> Self {
         let (width_px, height_px) = (chart.width_px.clamp(320, 4000), chart.height_px.clamp(280, 4000));
         let (width, height) = (f64::from(width_px), f64::from(height_px));
@@ -85,7 +85,7 @@ impl<'a> Layout<'a> {
         Layout { width_px, height_px, plot, x, y, x_ticks, y_ticks, labels, legend }
     }
 
-    /// Point of the drawing for a point of the data; `None` where an axis cannot show it.
+    /// Point of the drawing for a point of the data; `None` for a point that an axis cannot show.
     pub fn place(&self, x: f64, y: f64) -> Option<Point> {
         Some((self.x_px(self.x.share(x)?), self.y_px(self.y.share(y)?)))
     }
@@ -115,7 +115,7 @@ fn line_if(text: &str, line: f64) -> f64 {
     if text.trim().is_empty() { 0.0 } else { line }
 }
 
-/// Title and label of the vertical axis, and where the room beneath them begins.
+/// Title and label of the vertical axis, and the top of the room beneath them.
 fn header(chart: &Chart, width: f64) -> (Vec<Label>, f64) {
     let room = width - 2.0 * MARGIN;
     let at_left = |text: String, top: f64, line: f64, size: f64, colour| Label {
@@ -151,7 +151,7 @@ fn x_axis_label(chart: &Chart, plot: &Rect, width: f64) -> Option<Label> {
     })
 }
 
-/// Middle (in data) and name of every vertical mark that has a name.
+/// Middle (in data) and name of every vertical mark with a name.
 fn vertical_names(chart: &Chart) -> impl Iterator<Item = ((f64, f64), &str)> {
     chart
         .marks
@@ -164,7 +164,7 @@ fn vertical_names(chart: &Chart) -> impl Iterator<Item = ((f64, f64), &str)> {
         .filter(|(_, label)| !label.trim().is_empty())
 }
 
-/// Names of the vertical marks between `left` and `right`, the lowest row first, and how many rows they take.
+/// Names of the vertical marks between `left` and `right`, the lowest row first, and the number of rows.
 fn mark_labels(chart: &Chart, x: &AxisScale, (left, right): (f64, f64), top: f64) -> (usize, Vec<Label>) {
     let mut rows = text::Rows::default();
     let mut placed = Vec::new();
@@ -207,7 +207,7 @@ fn overhang(axis: &AxisScale, ticks: &[Tick], width: f64) -> f64 {
     reach.clamp(4.0, OVERHANG)
 }
 
-/// Values of x and of y that the chart's data and marks name.
+/// All values of x and of y in the chart's data and marks.
 fn values(chart: &Chart) -> (Vec<f64>, Vec<f64>) {
     let (mut xs, mut ys) = (Vec::new(), Vec::new());
     for series in &chart.series {
@@ -246,7 +246,7 @@ const SWATCH_WIDTH: f64 = 24.0;
 const INDENT: f64 = 31.0;
 const GAP: f64 = 18.0;
 
-/// Series or mark that an entry names.
+/// Series or mark of an entry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Named<'a> {
     Series(&'a Series),
@@ -258,7 +258,7 @@ pub(crate) enum Named<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry<'a> {
     pub named: Named<'a>,
-    /// Box for the sample of its drawing.
+    /// Box for the sample of the drawing.
     pub swatch: Rect,
     pub label: Label,
     /// Room of swatch and name.
@@ -269,7 +269,7 @@ pub(crate) struct Entry<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Legend<'a> {
     pub entries: Vec<Entry<'a>>,
-    /// Remark on how many names found no room.
+    /// Remark with the number of names without room.
     pub remainder: Option<Label>,
     pub width: f64,
     pub height: f64,
@@ -301,7 +301,7 @@ impl<'a> Legend<'a> {
         }
     }
 
-    /// The legend with its left upper corner elsewhere.
+    /// Moves the legend by `left` and `top`.
     pub fn moved(mut self, left: f64, top: f64) -> Self {
         for entry in &mut self.entries {
             entry.swatch = entry.swatch.moved(left, top);
@@ -321,7 +321,7 @@ struct Place {
     width: f64,
 }
 
-/// Places of the first `kept` names and, if that is not all of them, of the remark about the others.
+/// Places of the first `kept` names and, if these are not all, of the remark about the others.
 fn arrange(names: &[(Named<'_>, String)], kept: usize, width: f64) -> Vec<Place> {
     let mut widths: Vec<f64> =
         names[..kept].iter().map(|(_, name)| INDENT + text::width(name, NAME_SIZE)).collect();

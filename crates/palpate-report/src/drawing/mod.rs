@@ -1,7 +1,7 @@
-//! Charts and heat maps as SVG: plain data in, text out, and no word of what is drawn.
+//! Charts and heat maps as SVG: plain data in, text out, independent of the subject of the data.
 //!
-//! A chart is laid out before it is drawn (`layout`): axes settle their ends and their labels (`axis`), names find room
-//! beneath the plot, and only then lines and shapes are written (`chart_svg`, `svg`).
+//! A chart is laid out before it is drawn (`layout`). The ends and labels of the axes are determined (`axis`), names get room
+//! beneath the plot. Only then are lines and shapes written (`chart_svg`, `svg`).
 
 pub(crate) mod axis;
 pub(crate) mod chart;

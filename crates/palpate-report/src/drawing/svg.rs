@@ -22,7 +22,7 @@ pub(crate) const MINOR_GRID: Colour = Colour::opaque(243, 243, 243);
 pub(crate) const WHITE: Colour = Colour::opaque(255, 255, 255);
 pub(crate) const BLACK: Colour = Colour::opaque(0, 0, 0);
 
-/// Okabe and Ito's colours, less the yellow that is lost on white.
+/// Okabe and Ito's colours, without the yellow, which is hard to see on white.
 const PALETTE: [Colour; 7] = [
     Colour::opaque(0, 114, 178),
     Colour::opaque(213, 94, 0),
@@ -33,7 +33,7 @@ const PALETTE: [Colour; 7] = [
     BLACK,
 ];
 
-/// Every colour of a drawing, and the one that takes its place on a dark page. Colours of a map's values are the same on both.
+/// Every colour of a drawing, and its replacement on a dark page. Colours of a map's values are the same on both.
 pub(crate) const IN_THE_DARK: [(Colour, Colour); 13] = [
     (INK, Colour::opaque(227, 230, 232)),
     (QUIET_INK, Colour::opaque(176, 182, 187)),
@@ -50,7 +50,7 @@ pub(crate) const IN_THE_DARK: [(Colour, Colour); 13] = [
     (PALETTE[5], Colour::opaque(255, 200, 87)),
 ];
 
-/// The colour with that index; the palette starts over at its end.
+/// The colour with this index; the palette starts over at its end.
 pub(crate) fn palette(index: usize) -> Colour {
     PALETTE[index % PALETTE.len()]
 }
@@ -65,7 +65,7 @@ impl Colour {
     }
 }
 
-/// "#0072b2"; opacity is an attribute of its own.
+/// Written as "#0072b2"; opacity is an attribute of its own.
 impl fmt::Display for Colour {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [red, green, blue] = self.rgb;
@@ -91,11 +91,11 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// A text and where it goes.
+/// A text with its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Label {
     pub text: String,
-    /// Horizontally where `anchor` says, vertically the middle of the capitals.
+    /// Horizontally the position of `anchor`, vertically the middle of the capitals.
     pub at: Point,
     pub anchor: Anchor,
     /// Font size in pixels.
@@ -103,7 +103,7 @@ pub(crate) struct Label {
     pub colour: Colour,
 }
 
-/// An SVG document of some pixels; what lies beyond its edge is not seen.
+/// An SVG document with a size in pixels; parts beyond its edge are invisible.
 pub(crate) struct Svg {
     text: String,
 }
@@ -127,12 +127,12 @@ impl Svg {
         self.text
     }
 
-    /// A line through the points; nothing for fewer than two.
+    /// Draws a line through the points, unless there are fewer than two.
     pub fn line(&mut self, points: &[Point], width: f64, colour: Colour) {
         self.polyline(points, width, colour, "");
     }
 
-    /// A broken line through the points.
+    /// Draws a broken line through the points.
     pub fn dashed_line(&mut self, points: &[Point], width: f64, colour: Colour) {
         self.polyline(points, width, colour, " stroke-dasharray=\"6 5\"");
     }
@@ -146,7 +146,7 @@ impl Svg {
         }
     }
 
-    /// A filled polygon; nothing for fewer than three corners.
+    /// Draws a filled polygon, unless there are fewer than three corners.
     pub fn polygon(&mut self, corners: &[Point], colour: Colour) {
         if corners.len() > 2 {
             let (corners, fill) = (point_list(corners), Fill(colour));
@@ -154,7 +154,7 @@ impl Svg {
         }
     }
 
-    /// A filled rectangle.
+    /// Draws a filled rectangle.
     pub fn rectangle(&mut self, rect: Rect, colour: Colour) {
         let [x, y, width, height] = [rect.left, rect.top, rect.width(), rect.height()].map(decimal);
         let fill = Fill(colour);
@@ -163,14 +163,14 @@ impl Svg {
         ));
     }
 
-    /// A filled disc.
+    /// Draws a filled disc.
     pub fn disc(&mut self, (x, y): Point, radius: f64, colour: Colour) {
         let [x, y, radius] = [x, y, radius].map(decimal);
         let fill = Fill(colour);
         self.element(format_args!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" {fill}/>"));
     }
 
-    /// A text; characters that XML cannot hold become spaces.
+    /// Draws a text; characters that are not allowed in XML become spaces.
     pub fn text(&mut self, label: &Label) {
         let Label { text, at, anchor, size, colour } = label;
         let [x, y, size] = [at.0, at.1 + CAPITALS_HALF_HEIGHT * size, *size].map(decimal);
@@ -190,7 +190,7 @@ impl Svg {
     }
 }
 
-/// A hundredth of a pixel is more than any screen shows.
+/// Writes a number with two decimals: a hundredth of a pixel is finer than any screen.
 fn decimal(value: f64) -> String {
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

@@ -1,7 +1,7 @@
-//! Room that a text takes, without looking at a font.
+//! Size of a text, estimated without a font.
 //!
-//! An SVG is shown with whatever sans-serif font its reader has. The widths here follow the wider of the common
-//! ones (DejaVu Sans, Verdana), so that a layout made with them holds for the narrower ones (Arial, Noto Sans).
+//! An SVG is shown with the reader's own sans-serif font. The widths here follow the wider of the common ones (DejaVu Sans,
+//! Verdana). So a layout made with them is also valid for the narrower ones (Arial, Noto Sans).
 
 /// Estimated width in pixels of `text` at a font size of `size` pixels; rather too wide than too narrow.
 pub(crate) fn width(text: &str, size: f64) -> f64 {
@@ -22,7 +22,7 @@ fn em(character: char) -> f64 {
     }
 }
 
-/// `text` itself where it is no wider than `room` pixels, else as much of its beginning as fits, with an ellipsis.
+/// `text` itself if it is at most `room` pixels wide, else as much of its beginning as fits, with an ellipsis.
 pub(crate) fn fit(text: &str, size: f64, room: f64) -> String {
     if width(text, size) <= room {
         return text.to_owned();
@@ -38,7 +38,7 @@ pub(crate) fn fit(text: &str, size: f64, room: f64) -> String {
     format!("{}…", kept.trim_end())
 }
 
-/// `text` broken at spaces onto at most `lines` lines of at most `room` pixels; what is left over is cut off
+/// `text` broken at spaces onto at most `lines` lines of at most `room` pixels; the remainder is cut off
 /// with an ellipsis. No line for an empty text.
 pub(crate) fn wrap(text: &str, size: f64, room: f64, lines: usize) -> Vec<String> {
     let mut wrapped: Vec<String> = Vec::new();
@@ -60,13 +60,13 @@ pub(crate) fn wrap(text: &str, size: f64, room: f64, lines: usize) -> Vec<String
 pub(crate) struct Rows(Vec<Vec<(f64, f64)>>);
 
 impl Rows {
-    /// The first row in which nothing lies between `left` and `right`; a new one where all are taken there.
+    /// The first row that is free between `left` and `right`; a new one if all rows are occupied there.
     pub fn first_free(&self, left: f64, right: f64) -> usize {
         let free = |row: &Vec<(f64, f64)>| row.iter().all(|&(start, end)| right <= start || end <= left);
         self.0.iter().position(free).unwrap_or(self.0.len())
     }
 
-    /// Takes the room between `left` and `right` in the first free row, which is returned.
+    /// Occupies the room between `left` and `right` in the first free row, and returns that row.
     pub fn place(&mut self, left: f64, right: f64) -> usize {
         let row = self.first_free(left, right);
         if row == self.0.len() {

@@ -1,4 +1,4 @@
-//! The paper's figures 2 to 6 redrawn over our seeds, and two of our own.
+//! The paper's figures 2 to 6 redrawn over the study's seeds, and two further ones.
 
 use maud::html;
 
@@ -11,10 +11,10 @@ use palpate_estimators::evaluation::Quantiles;
 use palpate_studies::ArmResults;
 use palpate_studies::paper::COUNTS;
 
-/// A way to train, at each number of training positions.
+/// A rule of training, at each number of training positions.
 #[derive(Clone, Copy)]
 struct Family {
-    /// Beginning of its arms' names.
+    /// Beginning of the arms' names.
     name: &'static str,
     label: &'static str,
     colour: usize,
@@ -40,9 +40,9 @@ struct Measure {
     key: &'static str,
 }
 
-/// Families stand this far apart, so that their bars do not meet.
+/// Distance between families, so that their bars do not meet.
 const PITCH: f64 = 1.3;
-/// A published point stands this far beside its family's.
+/// Distance of a published point from its family's.
 const BESIDE: f64 = 0.5;
 
 impl Paper<'_> {
@@ -145,7 +145,7 @@ impl Paper<'_> {
         error_chart(self.report, title, &lines)
     }
 
-    /// Each family's medians with bars, and the paper's points beside them; `None` where no arm was run.
+    /// Each family's medians with bars, and the paper's points beside them; `None` if no arm was run.
     fn against_count(&self, measure: &Measure, families: &[Family]) -> Option<Chart> {
         let middle = (families.len() - 1) as f64 / 2.0;
         let families: Vec<(Family, f64)> =

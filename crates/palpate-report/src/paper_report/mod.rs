@@ -1,4 +1,4 @@
-//! The report of the founding paper's study, for readers who never saw the paper.
+//! The report of the founding paper's study, for readers who do not know the paper.
 
 mod figures;
 mod tables;
@@ -19,7 +19,7 @@ const DOI: &str = "https://doi.org/10.5772/53567";
 
 /// Reports the paper's study: `report.html`, one self-contained page, and its figures as SVG files.
 ///
-/// Figures 2 to 6 and tables 1 to 3 have the paper's numbers. Arms that were not run leave out what needs them.
+/// Figures 2 to 6 and tables 1 to 3 have the paper's numbers. Parts that need an arm without a fit are left out.
 pub fn paper_report(report: &StudyReport) -> Vec<ReportFile> {
     let paper = Paper {
         report,
@@ -70,7 +70,7 @@ impl Paper<'_> {
                 .table(self.published_table()),
             Section::new("claims", "The paper's claims").text(self.about_claims()).table(self.claims_table()),
             Section::new("not-replicated", "What does not replicate").text(self.not_replicated()),
-            Section::new("open", "What the paper leaves open")
+            Section::new("open", "What the paper does not specify")
                 .text(self.about_open())
                 .table(self.open_table()),
             Section::new("arms", "All arms").table(arms_table(self.report)),
@@ -105,7 +105,7 @@ impl Paper<'_> {
         let Agreement { agreeing, within_seeds, compared } = Agreement::new(&self.published);
         html! {
             @if compared == 0 {
-                "No arm with a published figure was run, so nothing is compared."
+                "No arm with a published figure was run, so no figure is compared."
             } @else if agreeing == compared {
                 "All of the " a href="#published" { (counted(compared, "published figure", "published figures")) }
                 " with an arm here agree with the medians found here, as far as was fixed beforehand; " (within_seeds)
@@ -140,20 +140,20 @@ impl Paper<'_> {
         }
     }
 
-    /// The published figure of an arm with the key, beside ours.
+    /// The published figure of an arm with this key, beside that of the study.
     fn published(&self, arm: &str, key: &str) -> Option<&PublishedFigure> {
         let id = format!("{arm}.{key}");
         self.published.iter().find(|figure| figure.id == id)
     }
 
-    /// Rig, beam and force in newtons, where the surface is a beam. All arms of the paper share it.
+    /// Rig, beam and force in newtons; `None` for another surface. All arms of the paper share them.
     fn setup(&self) -> Option<(&Rig, Beam, f64)> {
         let rig = &self.report.study.study.arms.first()?.rig;
         let SurfaceSpec::Beam(beam) = rig.setup.surface() else { return None };
         Some((rig, *beam, rig.setup.force_n()?))
     }
 
-    /// Distance of neighbouring sensors in mm, where it is the same for all.
+    /// Distance of neighbouring sensors in mm; `None` if the distances differ.
     fn sensor_pitch_mm(&self) -> Option<String> {
         let (rig, ..) = self.setup()?;
         let positions: Vec<f64> =
@@ -216,7 +216,7 @@ fn training() -> Markup {
             "Each way to train is an " b { "arm" } " of the study, named after what the output stands for or where the \
              training positions are, and after their number: " code { "position-10" } " has the plain position as its output \
              and ten training positions, " code { "normalized-20" } " the position divided by the length and twenty, "
-            code { "middle4-30" } " thirty, four of which lie in the middle portion, and again a normalized output."
+            code { "middle4-30" } " thirty, with four in the middle portion, and again a normalized output."
         }
     }
 }
@@ -245,7 +245,7 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
     }
 }
 
-/// "deflection", or more where the sensors differ.
+/// "deflection", or several names if the sensors differ.
 fn kinds(rig: &Rig) -> String {
     let mut names: Vec<&str> = rig.setup.layout().sensors().iter().map(|sensor| sensor.kind.name()).collect();
     names.dedup();

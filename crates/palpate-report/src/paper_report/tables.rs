@@ -1,5 +1,5 @@
-//! The paper's tables 1 to 3 computed again; published against replicated, the claims and what does not replicate; and what the
-//! paper leaves open.
+//! The paper's tables 1 to 3 computed again; published against replicated figures; the claims; results that do not replicate; and
+//! settings that the paper does not state.
 
 use maud::{Markup, html};
 
@@ -24,7 +24,7 @@ struct Set<'a> {
 }
 
 impl Paper<'_> {
-    /// The sets of training positions that `keep` wants, each once.
+    /// The sets of training positions that `keep` accepts, each once.
     fn sets(&self, keep: impl Fn(&Arrangement) -> bool) -> Vec<Set<'_>> {
         let mut sets: Vec<Set> = Vec::new();
         for arm in &self.report.study.study.arms {
@@ -152,7 +152,7 @@ impl<'a> EdgeDense<'a> {
     }
 }
 
-/// " (100–300 mm)" where every set has the same middle portion.
+/// " (100–300 mm)" if every set has this middle portion.
 fn middle_in_words(sets: &[Set], length_m: f64) -> String {
     let mut portions: Vec<String> = sets
         .iter()
@@ -177,7 +177,7 @@ fn run_of(positions: &[Position]) -> String {
     }
 }
 
-/// A share of seeds below this is worth a remark where the medians hold.
+/// Share of seeds below which a claim that is true of the medians gets a remark.
 const MOST_SEEDS: f64 = 0.5;
 
 impl Paper<'_> {
@@ -326,7 +326,7 @@ fn share(share: f64) -> String {
 /// Young's modulus as the paper prints it, in pascals.
 const PRINTED_MODULUS_PA: f64 = 200e6;
 
-/// Statement of the paper on each setting of an estimator, by its key; the keys in the order of the table.
+/// Statement of the paper about each setting of an estimator, by its key; the keys in the order of the table.
 const OF_THE_NETWORK: [(&str, &str); 13] = [
     ("input_scale", "not stated"),
     ("biases", "not stated"),
@@ -369,10 +369,10 @@ impl Paper<'_> {
             .words("setting", |[setting, ..]| setting.clone())
             .words("the paper", |[_, paper, _]| paper.clone())
             .words("this study", |[.., study]| study.clone())
-            .caption(html! { "Settings of this study, beside what the paper says of them." })
+            .caption(html! { "Settings of this study, beside those of the paper." })
     }
 
-    /// Remark on how far the beam would bend with the modulus as printed, unless the study uses it.
+    /// Remark on the deflection with the modulus as printed, unless the study uses that modulus.
     fn why_not_the_printed_modulus(&self) -> Markup {
         let Some((_, beam, force_n)) = self.setup() else { return Markup::default() };
         if (beam.youngs_modulus_pa() / PRINTED_MODULUS_PA - 1.0).abs() < 1e-6 {
@@ -393,7 +393,7 @@ impl Paper<'_> {
         }
     }
 
-    /// The setting with that key, with every value that an arm gives it.
+    /// The setting with this key, with every value that an arm gives it.
     fn network_row(&self, key: &str, paper: &str) -> Option<[String; 3]> {
         let arms = self.report.study.study.arms.iter();
         let found: Vec<Setting> = arms

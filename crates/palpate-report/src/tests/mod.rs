@@ -16,7 +16,7 @@ use crate::drawing::text;
 /// A drawing read back.
 struct Drawing {
     image: Rect,
-    /// Every text and the box of its line, as wide as it is estimated to be.
+    /// Every text and the box of its line, with the estimated width.
     texts: Vec<(String, Rect)>,
     /// The box of every line and shape, with its stroke.
     shapes: Vec<(Paint, Rect)>,
@@ -47,7 +47,7 @@ fn see(svg: &str) -> Drawing {
 
 fn number(element: roxmltree::Node, name: &str) -> f64 {
     let text = element.attribute(name).unwrap_or_else(|| panic!("{element:?} has no {name}"));
-    text.parse().unwrap_or_else(|_| panic!("{name} of {element:?} is no number"))
+    text.parse().unwrap_or_else(|_| panic!("{name} of {element:?} is not a number"))
 }
 
 fn text_box(element: roxmltree::Node) -> Rect {

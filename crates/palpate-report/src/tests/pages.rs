@@ -1,4 +1,4 @@
-//! Whole reports: what a reader and a browser need is there, whatever was run.
+//! Whole reports: they are complete for a reader and a browser, for any run.
 
 use std::collections::BTreeSet;
 
@@ -71,7 +71,7 @@ fn attributes<'a>(html: &'a str, name: &str) -> Vec<&'a str> {
     html.split(&start).skip(1).filter_map(|rest| rest.split('"').next()).collect()
 }
 
-/// The text between the tags, but for styles.
+/// The text between the tags, without styles.
 fn shown_text(html: &str) -> String {
     let body = html.split_once("<body>").unwrap().1;
     body.split('<')
@@ -97,7 +97,7 @@ fn assert_sound(files: &[ReportFile], figures: usize) {
     let text = shown_text(html);
     let bare = |word: &str| word.trim_matches(|c: char| !c.is_alphanumeric()).to_owned();
     let no_number = |word: String| word == "inf" || word.contains("NaN");
-    assert!(!text.split_whitespace().map(bare).any(no_number), "the page shows what is no number");
+    assert!(!text.split_whitespace().map(bare).any(no_number), "the page shows what is not a number");
     let mut names: Vec<String> = (1..=figures).map(|number| format!("figure-{number}.svg")).collect();
     names.insert(0, "report.html".to_owned());
     assert_eq!(files.iter().map(|file| &file.name).collect::<Vec<_>>(), names.iter().collect::<Vec<_>>());
@@ -204,7 +204,7 @@ fn a_study_of_sensors_shows_its_layouts_and_the_limit() {
     assert!(!text.contains("iterations") && !text.contains("did not converge"), "{text}");
 }
 
-/// The rig of the paper, whose network is trained for a few epochs.
+/// The rig of the paper, with a network that is trained for a few epochs.
 fn quick_rig(max_epochs: u32) -> Rig {
     let mut rig = Rig::from_toml(include_str!("../../../../examples/paper.toml")).unwrap();
     let Estimator::Network(network) = &mut rig.estimator else { panic!("the paper has a network") };
@@ -263,7 +263,7 @@ fn an_evaluation_of_nothing_has_a_report() {
     assert_sound(&files, 2);
 }
 
-/// The report of the limit of the paper's beam over these sensors, for what is known of the force.
+/// The report of the limit of the paper's beam over these sensors, for a known or unknown force.
 fn limits(sensors: SensorGroup, force: Force) -> Vec<ReportFile> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
     let setup = Setup::new(beam).sensors(sensors).unwrap();

@@ -1,4 +1,4 @@
-//! Properties of the parts that a chart is laid out with.
+//! Properties of the parts of a chart's layout.
 
 use crate::Axis;
 use crate::drawing::axis::{AxisScale, Tick, choose_ticks, minor_ticks};

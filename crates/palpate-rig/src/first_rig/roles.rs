@@ -1,4 +1,4 @@
-//! Guesses which column of a table is what, by names in English and German, by units, and by what is in the columns.
+//! Guesses the roles of a table's columns, by names in English and German, by units, and by the columns' contents.
 
 use palpate_estimators::recording::{Content, Header, Heading, Table};
 use palpate_mechanics::units::{Dimension, Unit};
@@ -24,7 +24,7 @@ const PLACE: &[&str] = &[
     "druckstelle",
     "kontaktposition",
 ];
-/// Names that may be those of a position where there is no better one.
+/// Names of a position, if no column has a better one.
 const DISTANCE: &[&str] = &["distance", "abstand", "weg", "strecke"];
 const FORCE: &[&str] = &[
     "force",
@@ -80,7 +80,7 @@ const UNTOUCHED: &[&str] = &[
     "nullpunkt",
     "nulllinie",
 ];
-/// Words that may stand beside one of the others and say nothing of their own.
+/// Words that may accompany another name and have no meaning of their own here.
 const FILLERS: &[&str] = &[
     "true", "actual", "measured", "ist", "soll", "contact", "kontakt", "press", "applied", "normal", "axis",
     "achse", "achsen", "richtung", "der", "des", "of", "the", "und", "and", "in", "am", "z",
@@ -122,7 +122,7 @@ const COUNTERS: &[&str] = &[
     "step",
     "schritt",
 ];
-/// Names of what else may be known of a press.
+/// Names of other properties of a press.
 const CIRCUMSTANCES: &[&str] = &[
     "depth",
     "tiefe",
@@ -155,14 +155,14 @@ const CIRCUMSTANCES: &[&str] = &[
 pub(super) struct Roles {
     pub position: PositionRole,
     pub force: Option<usize>,
-    /// Columns that may all be the force, where there are several.
+    /// Candidates for the force, if there are several.
     pub many_forces: Vec<usize>,
     pub time: Option<usize>,
     pub nuisance: Option<usize>,
     /// The column that marks untouched rows.
     pub untouched: Option<usize>,
     pub channels: Vec<usize>,
-    /// The columns without a role, and why they have none.
+    /// The columns without a role, with the reasons.
     pub left: Vec<(usize, Left)>,
 }
 
@@ -178,31 +178,31 @@ pub(super) enum Left {
     Empty,
     /// No field is a number.
     Words,
-    /// A field is no number.
+    /// A field is not a number.
     Word {
         line: usize,
         text: String,
     },
-    /// A row has nothing.
+    /// A field is empty.
     Gap {
         line: usize,
     },
-    /// The name is that of another column, or there is none.
+    /// The column has no heading of its own.
     Unnamed,
-    /// A circumstance that is always the same.
+    /// A circumstance with one value in every row.
     Constant(f64),
-    /// A channel that never changes, with its value.
+    /// A channel with one value in every row.
     Dead(f64),
     Counter,
-    /// Something else about the press.
+    /// Another property of the press.
     Circumstance,
-    /// Not one of a numbered row of channels.
+    /// Not one of a numbered series of channels.
     Single,
-    /// Another column has the role that its name suggests.
+    /// Another column has the role that the name suggests.
     Second,
     /// Other columns may be the force as well.
     OneOfForces,
-    /// Of a unit in which the role that its name suggests is not read.
+    /// In a unit that the suggested role does not have.
     Unit(String),
 }
 
@@ -217,10 +217,10 @@ impl PositionRole {
 }
 
 impl Roles {
-    /// The roles that are said, and the most likely others.
+    /// The roles in the hints, and the most likely others.
     ///
     /// # Errors
-    /// [`FirstRigError`] where no column, or more than one, may be the position, or none a channel, or where a hint names none.
+    /// [`FirstRigError`] without a unique position, without a channel, or for a hint that matches no column.
     pub fn guess(table: &Table, hints: &Hints) -> Result<Self, FirstRigError> {
         let names: Vec<Name> = (0..table.columns.len()).map(|i| Name::new(table, i)).collect();
         let guess = Guess { table, names: &names };
@@ -245,7 +245,7 @@ impl Roles {
         }
         let roles = position.columns().into_iter().chain(force).chain(time).chain(told.nuisance);
         let roles: Vec<usize> = roles.chain(untouched).chain(channels.iter().copied()).collect();
-        // Separators at the ends of lines make columns that are no columns.
+        // Separators at the ends of lines make empty columns without a heading.
         let blank = |i: &usize| names[*i].words.is_empty() && table.columns[*i].content == Content::Empty;
         let left = (0..names.len()).filter(|i| !roles.contains(i) && !blank(i));
         let reason = |i: usize| match forces.contains(&i) {
@@ -273,7 +273,7 @@ impl Told {
         let find = |flag: &'static str, name: &Option<String>| {
             name.as_ref().map(|name| find(table, flag, name)).transpose()
         };
-        // Untouched rows may have nothing there.
+        // Untouched rows may have empty fields there.
         let numbers = |flag: &'static str, name: &Option<String>| {
             let found = find(flag, name)?;
             found
@@ -305,7 +305,7 @@ impl Told {
     }
 }
 
-/// The column of this heading, of this name but for the unit, or of this number from 1.
+/// The column with this heading, with this name apart from the unit, or with this number from 1.
 fn find(table: &Table, flag: &'static str, name: &str) -> Result<usize, FirstRigError> {
     let name = name.trim();
     let exact = |heading: &str| heading == name;
@@ -337,7 +337,7 @@ fn checked(table: &Table, flag: &'static str, column: usize) -> Result<usize, Fi
     }
 }
 
-/// Columns with what is in them, in words: all, or the first hundred.
+/// Columns with their contents, in words: all, or the first hundred.
 pub(super) fn described(table: &Table) -> String {
     const MOST: usize = 100;
     let words = table.columns.iter().take(MOST).map(|column| {
@@ -348,7 +348,7 @@ pub(super) fn described(table: &Table) -> String {
                 let (low, high) = range(numbers);
                 format!("{low} to {high}")
             }
-            Content::Gaps { line, .. } => format!("numbers, but nothing on line {line}"),
+            Content::Gaps { line, .. } => format!("numbers, but empty on line {line}"),
             Content::Other { numbers: 0, .. } | Content::Marks(_) => "words".to_owned(),
             Content::Other { line, text, .. } => format!("numbers, but `{text}` on line {line}"),
         };
@@ -365,14 +365,14 @@ pub(super) fn range(numbers: &[f64]) -> (f64, f64) {
     (low, numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
-/// A heading taken apart.
+/// The parts of a heading.
 struct Name {
-    /// Words in small letters, the unit left out.
+    /// Words in small letters, without the unit.
     words: Vec<String>,
     /// Heading without the number at its end, and whether there is one.
     stem: (String, bool),
     unit: Option<Unit>,
-    /// Text in the place of the unit that is none.
+    /// Text in the place of the unit that is not a known unit.
     foreign_unit: Option<String>,
     /// Whether the column has a heading.
     has_heading: bool,
@@ -395,20 +395,20 @@ impl Name {
         }
     }
 
-    /// Whether some word is one of these, and all others are fillers.
+    /// Whether some word is among `names`, and all others are fillers or in the lists `beside`.
     fn is(&self, names: &[&str], beside: &[&[&str]]) -> bool {
         let among = |word: &String, lists: &[&[&str]]| lists.iter().any(|list| list.contains(&word.as_str()));
         let others = |word: &String| among(word, &[names, FILLERS]) || among(word, beside);
         self.words.iter().any(|word| names.contains(&word.as_str())) && self.words.iter().all(others)
     }
 
-    /// True of a name that says that a row is untouched.
+    /// True for a name of a column that marks untouched rows.
     fn is_of_untouched(&self) -> bool {
         let words: Vec<&str> = self.words.iter().map(String::as_str).filter(|word| *word != "is").collect();
         UNTOUCHED.contains(&words.concat().as_str())
     }
 
-    /// Whether its values can be read as ones of this dimension.
+    /// Whether the values can be read in this dimension.
     fn measures(&self, dimension: Dimension) -> bool {
         match (&self.unit, &self.foreign_unit) {
             (Some(unit), _) => unit.dimension() == dimension,
@@ -423,7 +423,7 @@ struct Guess<'a> {
 }
 
 impl Guess<'_> {
-    /// The columns that are free, have a heading, and whose names `fit`.
+    /// The free columns that have a heading and a name that satisfies `fit`.
     fn columns(&self, taken: &[usize], fit: impl Fn(&Name) -> bool) -> Vec<usize> {
         let free = (0..self.names.len()).filter(|i| !taken.contains(i) && self.names[*i].has_heading);
         free.filter(|i| fit(&self.names[*i])).collect()
@@ -440,7 +440,7 @@ impl Guess<'_> {
         self.numbers(column).map(range).is_some_and(|(low, high)| low < high)
     }
 
-    /// The column of marks that has the name of one, with a mark in some rows and none in others.
+    /// The column that has the name of a mark, with a mark in some rows and none in others.
     fn untouched(&self, told: &Told) -> Option<usize> {
         let taken: Vec<usize> = [told.force, told.time, told.nuisance].into_iter().flatten().collect();
         let taken = [taken.as_slice(), told.channels.as_slice()].concat();
@@ -452,7 +452,7 @@ impl Guess<'_> {
         named.into_iter().find(marks)
     }
 
-    /// Columns that have a number in every row, and not always the same; those that have none in some rows where there are no others.
+    /// Columns that have a number in every row, and at least two different ones. If there are none, columns with gaps qualify too.
     fn places(&self, columns: Vec<usize>) -> Vec<usize> {
         let (full, gaps): (Vec<usize>, Vec<usize>) =
             columns.into_iter().partition(|i| self.numbers(*i).is_some());
@@ -497,8 +497,8 @@ impl Guess<'_> {
         }
     }
 
-    /// The reason that no column is the position: that whose name is one's is in a unit that is no length's, has something else than numbers, or
-    /// the same number in every row.
+    /// The reason that no column is the position. The column with the name of a position has a unit that is not a length, contains other
+    /// text than numbers, or has one number in every row.
     fn no_position(&self, taken: &[usize]) -> FirstRigError {
         let place = |name: &Name| name.is(PLACE, &[]) || name.is(&["x", "y"], &[PLACE]);
         let Some(named) = self.columns(taken, place).first().copied() else {
@@ -517,7 +517,7 @@ impl Guess<'_> {
         }
     }
 
-    /// Columns that may be the force; rows without one must be untouched by a mark, or have no position either.
+    /// Candidates for the force; rows without one must be marked as untouched, or have no position either.
     fn forces(&self, taken: &[usize], position: PositionRole, untouched: Option<usize>) -> Vec<usize> {
         let places: Vec<_> =
             position.columns().into_iter().map(|i| self.table.columns[i].numbers()).collect();
@@ -549,7 +549,7 @@ impl Guess<'_> {
         stamps.or_else(|| named().into_iter().find(|i| self.numbers(*i).is_some()))
     }
 
-    /// The columns of numbers that vary and have no other name: where some are numbered alike, those.
+    /// The columns of numbers that vary and have no other name; if some of them form a numbered series, only those.
     fn channels(&self, taken: &[usize]) -> Vec<usize> {
         let mut columns = self.columns(taken, |name| !is_no_channel(name));
         columns.retain(|i| self.varies(*i) && !self.counts(*i));
@@ -560,14 +560,14 @@ impl Guess<'_> {
         let families: Vec<usize> =
             columns.iter().copied().filter(|i| self.in_family(&self.names[*i])).collect();
         if families.is_empty() {
-            // A length, a force or a time beside raw channels is something else.
+            // A column with a unit beside raw channels, such as a length, a force or a time, has another role.
             columns.retain(|i| self.names[*i].unit.is_none() || columns_agree(self.names, *i));
             return columns;
         }
         families
     }
 
-    /// Whether the column has consecutive whole numbers, and enough of them that a channel would not.
+    /// Whether the column contains at least 10 consecutive whole numbers, as a counter does and a channel does not.
     fn counts(&self, column: usize) -> bool {
         self.numbers(column).is_some_and(|numbers| {
             numbers.len() >= 10
@@ -576,7 +576,7 @@ impl Guess<'_> {
         })
     }
 
-    /// Whether another column has the same name but for the number at its end.
+    /// Whether another column has the same name apart from the number at its end.
     fn in_family(&self, name: &Name) -> bool {
         name.stem.1 && self.names.iter().filter(|other| other.stem == name.stem).count() > 1
     }
@@ -618,7 +618,7 @@ impl Guess<'_> {
     }
 }
 
-/// The name in a heading and its unit, which may also stand as in `position_mm`.
+/// The name and the unit in a heading; the unit may also stand as in `position_mm`.
 pub(super) fn name_and_unit(heading: Heading<'_>) -> (&str, Option<Unit>) {
     match suffixed(heading.name).filter(|_| heading.unit.is_none()) {
         Some((name, unit)) => (name, Some(unit)),
@@ -626,7 +626,7 @@ pub(super) fn name_and_unit(heading: Heading<'_>) -> (&str, Option<Unit>) {
     }
 }
 
-/// The parts of a name with a unit behind it, as palpate itself writes them: `position_mm`, `force_n`.
+/// The parts of a name that ends in a unit, as palpate itself writes them: `position_mm`, `force_n`.
 fn suffixed(name: &str) -> Option<(&str, Unit)> {
     let (name, unit) = name.rsplit_once('_').filter(|(name, _)| !name.is_empty())?;
     let unit = Unit::from_symbol(if unit == "n" { "N" } else { unit })?;
@@ -639,7 +639,7 @@ fn is_no_channel(name: &Name) -> bool {
     others || name.is(&["x", "y"], &[PLACE]) || name.is_of_untouched()
 }
 
-/// Whether another column is in the unit of this one, as sensors of one kind are.
+/// Whether another column has the unit of this one, as sensors of one kind do.
 fn columns_agree(names: &[Name], column: usize) -> bool {
     let same = |other: &&Name| other.unit == names[column].unit;
     names.iter().filter(same).count() > 1

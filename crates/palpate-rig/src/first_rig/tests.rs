@@ -1,6 +1,6 @@
 use super::*;
 
-/// Thirty presses of a line, five times at six places, whose columns are said by `heading` and `row` of place, force and number.
+/// Thirty presses of a line, five times at six places. `heading` gives the columns, and `row` the fields by place, force and number.
 fn presses(heading: &str, row: impl Fn(f64, f64, usize) -> String) -> String {
     let rows = (0..30).map(|i| row(20.0 * (i % 6) as f64 + 10.0, 1.0 + (i % 4) as f64, i) + "\n");
     format!("{heading}\n{}", rows.collect::<String>())
@@ -10,7 +10,7 @@ fn guess(text: &str, hints: &Hints) -> Result<FirstRig, FirstRigError> {
     FirstRig::guess("presses.csv", text.as_bytes(), hints)
 }
 
-/// The rig, read back; reading its own recording is what guessing it has done already.
+/// The guessed rig, read back; the guess includes reading the recording with it.
 fn rig(text: &str) -> Rig {
     Rig::from_toml(&guess(text, &Hints::default()).unwrap().to_toml("rig.toml")).unwrap()
 }
@@ -180,7 +180,7 @@ fn very_many_columns_are_refused_and_not_all_listed() {
     assert!(listed.ends_with("`c99` (1 to 1), and 50 more"), "{listed}");
 }
 
-/// What is said of a recording of four channels below a heading, and the roles of its columns.
+/// The messages about a recording of four channels below a heading, and the roles of its columns.
 fn said_of_heading(heading: &str) -> String {
     let text = presses(heading, |x, force, i| {
         let noise = ((i * 7919) % 13) as f64 / 13.0;
@@ -247,7 +247,7 @@ fn a_load_cell_that_is_never_0_is_written_down() {
     let text = pressed + &air.collect::<String>();
     let toml = guess(&text, &Hints::default()).unwrap().to_toml("rig.toml");
     assert!(toml.contains("force_zero = \"0.2 N\""), "{toml}");
-    // The hand in the air is not on the surface.
+    // Rows in the air do not extend the surface.
     assert!(!toml.contains("origin"), "{toml}");
     let rig = Rig::from_toml(&toml).unwrap();
     let recording = rig.setup.read_recording("presses.csv", text.as_bytes()).unwrap();
@@ -268,5 +268,5 @@ fn tables_below_a_preamble_become_rigs() {
     assert_eq!((recording.rows.len(), recording.rows[0].position.x_m), (30, 0.01));
     let thousands = presses("Ort;S1;S2", |x, _, i| format!("{x};{};1.{:03}", 503 + i, 3 + i)) + "10;5;900\n";
     let error = guess(&thousands, &Hints::default()).unwrap_err();
-    assert_eq!(error.help(), Some("--decimal point takes it for the second"), "{error}");
+    assert_eq!(error.help(), Some("--decimal point chooses the second"), "{error}");
 }

@@ -1,4 +1,4 @@
-//! Two coordinates: pairs, grids, and what is said where they are mixed up with lines.
+//! Two coordinates: pairs, grids, and the errors for keys of lines on planes.
 
 use super::*;
 use palpate_estimators::arrangement::Arrangement;

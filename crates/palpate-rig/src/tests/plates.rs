@@ -1,4 +1,4 @@
-//! Plates: edges, supports at points, and what is said of those that cannot be.
+//! Plates: edges, supports at points, and the errors for invalid ones.
 
 use super::*;
 use palpate_estimators::simulate::clean_reading;

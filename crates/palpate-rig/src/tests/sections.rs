@@ -1,7 +1,7 @@
 use super::*;
 use std::path::Path;
 
-/// The sections of a rig that `wanted` names, and no others.
+/// Only the sections of a rig that `wanted` names.
 fn only(rig: &str, wanted: &[&str]) -> String {
     let mut kept = false;
     let lines = rig.lines().filter(|line| {
@@ -75,7 +75,7 @@ fn a_section_is_refused_with_a_caret_where_it_is_built() {
         }),
     ];
     insta::assert_snapshot!(shown.join("\n"));
-    // What no rig can have is refused before anything is built.
+    // An unknown key is refused before a section is built.
     let error = RigSections::from_toml("training = { cuont = 10 }").unwrap_err();
     assert_eq!(error.to_string(), "unknown key `cuont`, did you mean `count`?");
 }

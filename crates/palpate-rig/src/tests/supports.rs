@@ -53,7 +53,7 @@ fn every_support_and_section_can_be_said() {
         supports: supports.map(|(at_m, kind)| BeamSupport { at_m, kind }).to_vec(),
     };
     assert_eq!(spec(SUPPORTED), expected);
-    // Sections that say everything themselves leave the beam nothing to say.
+    // If every section has its width and thickness, the beam needs none.
     let whole = SUPPORTED
         .replace("width = \"40 mm\"\nthickness = \"1.2 mm\"\n", "")
         .replace("thickness = \"2 mm\"", "thickness = \"2 mm\", width = \"40 mm\"")

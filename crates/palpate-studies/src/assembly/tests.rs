@@ -1,4 +1,4 @@
-//! A small study in many parts, in any order, beside the same study run whole; and every reason to refuse parts.
+//! Compares a small study in many parts, in any order, with a whole run of it; and checks every reason to refuse parts.
 
 use super::*;
 use crate::run::RunOptions;
@@ -49,7 +49,7 @@ const SMALL: &str = r#"
     estimator = { kind = "centroid" }
 "#;
 
-/// Seeds that fill no whole number of lanes.
+/// Number of seeds that is not a multiple of the lanes.
 const SEEDS: u64 = 11;
 /// Arms of [`SMALL`].
 const ARMS: usize = 5;
@@ -73,7 +73,7 @@ fn in_blocks(block: u64) -> FitRows {
     rows
 }
 
-/// Tables of all shards, each made by so many threads.
+/// Tables of all shards, each made by `threads` threads.
 fn shards(of: u64, threads: usize) -> Vec<ShardTables> {
     (1..=of).map(|number| shard(Shard::new(number, of).unwrap(), SEEDS, threads)).collect()
 }
@@ -255,7 +255,7 @@ fn rows_that_are_wrong_are_refused_with_their_line_and_cell() {
         evaluations(&move |cells| cells[i] = text.clone())
     };
     assert_eq!(cell(0, "nobody"), "the study has no arm `nobody`");
-    assert_eq!(cell(0, "lanes"), "arm `lanes` is of networks, of which networks.csv keeps all");
+    assert_eq!(cell(0, "lanes"), "arm `lanes` is of networks, and networks.csv keeps all of them");
     assert_eq!(cell(1, "-1"), "seed: `-1` is not a whole number");
     assert_eq!(cell(2, "0.1 0.2"), "estimates_m: there are 2 values; the arm is judged by 20 readings");
     assert_eq!(cell(2, "0.1 NaN"), "estimates_m: `NaN` is not a finite number");

@@ -1,4 +1,4 @@
-//! Dead areas are there for an array's centroid where its sensors see too little, and not for the influence estimator.
+//! An array's centroid has dead areas if the range of its sensors is too small; the influence estimator has none.
 
 use super::*;
 use palpate_estimators::evaluation::{Evaluation, Located};
@@ -29,15 +29,15 @@ fn dead_areas_are_the_interpretations_and_not_the_counts() {
         })
         .unwrap()
     };
-    // Few sensors under one surface, interpreted well: no dead area; more of them change nothing.
+    // Sensors under one surface, with a suitable estimator: no dead area, neither with few sensors nor with many.
     for sensors in [4, 16] {
         let row = row("distributive", "influence", sensors);
         assert!(row.effective_percent > 97.0 && row.folded.dead_percent < 3.0, "{row:?}");
         assert!(row.folded.between_m < 2.0 * row.folded.at_sensors_m, "{row:?}");
     }
-    // The same sensors, interpreted as an array's are: dead.
+    // With the estimator of an array, these sensors have dead areas.
     assert!(row("distributive", "centroid", 16).effective_percent < 60.0);
-    // An array whose sensors see 10 mm: dead between four, alive between sixteen.
+    // An array with a point spread of 10 mm: dead areas between four sensors, few between sixteen.
     let sparse = row("array, spread 10 mm", "centroid", 4);
     assert!(sparse.folded.dead_percent > 60.0, "{sparse:?}");
     let dense = row("array, spread 10 mm", "centroid", 16);

@@ -10,23 +10,23 @@ use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::ResponseGradient;
 use palpate_numerics::symmetric_eigen;
 
-/// The components of a recording's readings: with d a reading less the mean m, each channel over its noise, and
-/// Σ d·dᵀ = V·Λ·Vᵀ over the rows, the components of a reading are Vᵀ·d, those of the largest variance first. Whitened so,
-/// every component carries noise of variance 1, independent of the others'.
+/// The components of a recording's readings: d is a reading less the mean m, each channel over its noise, and
+/// Σ d·dᵀ = V·Λ·Vᵀ over the rows. The components of a reading are Vᵀ·d, those of the largest variance first. With this whitening,
+/// every component has independent noise of variance 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KarhunenLoeve {
     /// m, in the unit of each channel.
     mean: Array1<f64>,
     /// One over the standard deviation of each channel's noise.
     inverse_sd: Array1<f64>,
-    /// V, a component a column.
+    /// V, with a component in each column.
     components: Array2<f64>,
     /// Λ over the rows: the variance of each component, in noise variances.
     variances: Vec<f64>,
 }
 
 impl KarhunenLoeve {
-    /// The components of a recording with at least one row, whose channels have noise of these standard deviations.
+    /// The components of a recording with at least one row; `noise_sd` are the standard deviations of the channels' noise.
     pub fn new(recording: &Recording, noise_sd: &[f64]) -> Self {
         let (rows, channels) = (recording.rows.len(), recording.channels.len());
         let at = |(row, channel): (usize, usize)| recording.rows[row].reading[channel];
@@ -63,8 +63,8 @@ impl KarhunenLoeve {
         }
     }
 
-    /// Cramér–Rao bound for estimators that see the first `count` components, at a contact whose readings have these
-    /// derivatives; `None` where they do not tell the place. The force is known.
+    /// Cramér–Rao bound for estimators that use the first `count` components, at a contact with these derivatives of the readings;
+    /// `None` if the components do not determine the position. The force is known.
     pub fn bound(&self, gradients: &[ResponseGradient], count: usize) -> Option<Bound> {
         let by = |k: usize| -> Array1<f64> {
             let slopes: Array1<f64> = gradients.iter().map(|gradient| gradient.position[k]).collect();
@@ -79,12 +79,12 @@ impl KarhunenLoeve {
     }
 }
 
-/// Channels without a model, a component each.
+/// Channels without a model, one for each component.
 pub(super) fn raw_layout(count: usize) -> Layout {
     Layout::even(SensorKind::Raw, count, 0.0)
 }
 
-/// A bench as one knows it who sees components of readings only: where its surface ends, and the force.
+/// A setup without a model, for readings that are components: the surface's extent and the force are known.
 pub(super) fn without_model(setup: &Setup, layout: Layout) -> Result<Setup, SimulateError> {
     Ok(Setup::new(setup.surface().extent()).with_layout(layout)?.with_force(setup.force_n())?)
 }

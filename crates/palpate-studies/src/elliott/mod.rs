@@ -1,9 +1,9 @@
 //! The chain of Elliott and others for a load that moves over a plate: readings of a grid of sensors, their Karhunen–Loève
-//! reduction, and a back-propagation network on the components; beside the influence locator and its tracker on the same
-//! readings, and beside the limit.
+//! reduction, and a back-propagation network on the components. It is compared with the influence locator and its tracker on the
+//! same readings, and with the limit.
 //!
-//! The chain is calibrated by the presses of a rig and judged in two ways: by one press at each of some 400 places all over
-//! the plate, of which those within its inner 90 % count, and by the readings of a load that moves as the rig's `[motion]` says.
+//! The chain is calibrated by the presses of a rig and judged in two ways. First, by one press at each of some 400 places all over
+//! the plate; those within its inner 90 % count. Second, by the readings of a load that moves as in the rig's `[motion]`.
 
 mod karhunen_loeve;
 
@@ -31,13 +31,13 @@ use palpate_rig::{Rig, RigSimulationError};
 pub const RIG_TOML: &str = include_str!("../../../../examples/elliott.toml");
 /// Numbers of components of the study.
 pub const COMPONENTS: [usize; 9] = [2, 3, 4, 5, 6, 8, 10, 15, 25];
-/// Presentations after which a network of the study stops: its readings are noisy, and no network's error becomes 0.
+/// Presentations after which a network of the study stops: its readings are noisy, so its error does not become 0.
 pub const PRESENTATIONS: u32 = 3_000_000;
 /// Nodes of the network's hidden layer.
 const HIDDEN: usize = 12;
-/// Step along the gradient: noisy readings want a smaller one than the founding paper's.
+/// Step along the gradient; noisy readings need a smaller one than the founding paper's.
 const LEARNING_RATE: f64 = 0.1;
-/// Offset of the moving load's seed from that of its calibration, so that it moves under noise of its own.
+/// Offset of the moving load's seed from that of its calibration, so that their noise differs.
 const OTHER_NOISE: u64 = 1 << 32;
 /// Share of length and width, about the middle, within which contacts are judged.
 pub const INNER: f64 = 0.9;
@@ -47,29 +47,29 @@ pub const INNER: f64 = 0.9;
 pub struct Elliott {
     /// Plate, sensors, known force, training positions and motion; the sensors have noise and no other errors.
     pub rig: Rig,
-    /// Numbers of components that a network sees, one after the other; at most as many as there are sensors.
+    /// Numbers of components that are inputs of a network, one after the other; at most as many as there are sensors.
     pub components: Vec<usize>,
     /// Presentations after which a network stops.
     pub presentations: u32,
     /// Calibrations, each with noise and networks of its own; at least 1.
     pub calibrations: u64,
-    /// An error up to this, in metres, is good enough for the effective area.
+    /// Largest error in metres that counts for the effective area.
     pub tolerance_m: f64,
     /// Seed of noise and networks.
     pub seed: u64,
 }
 
-/// A way from readings to places.
+/// A method of locating contacts from readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Chain {
-    /// A network on so many components.
+    /// A network with this number of components as inputs.
     Components(usize),
-    /// A network on the readings themselves.
+    /// A network with the readings themselves as inputs.
     Readings,
     /// The influence locator, reading by reading.
     Influence,
-    /// The influence locator's tracker, as readings come.
+    /// The influence locator's tracker, with the readings up to each time.
     Filter,
     /// The influence locator's smoother, with all readings.
     Smoother,
@@ -92,14 +92,14 @@ impl std::fmt::Display for Chain {
 pub struct ChainRow {
     /// The chain.
     pub chain: Chain,
-    /// Mean error of presses within the inner plate, in metres; nothing of a tracker, which wants readings in time.
+    /// Mean error of presses within the inner plate, in metres; `None` for a tracker, which needs readings in time.
     pub error_m: Option<Quantiles>,
-    /// Share of these presses whose error is within the tolerance, in %.
+    /// Share of these presses with an error within the tolerance, in %.
     pub effective_percent: Option<Quantiles>,
     /// Mean error of readings of the moving load, in metres.
     pub moving_error_m: Quantiles,
-    /// Mean of the Cramér–Rao bound over the same presses, of what the chain sees, in metres; nothing where it does not tell
-    /// the place everywhere.
+    /// Mean of the Cramér–Rao bound over the same presses for the chain's inputs, in metres; `None` for a tracker, and if the
+    /// inputs do not determine the position of every press.
     pub limit_m: Option<f64>,
 }
 
@@ -108,11 +108,11 @@ pub struct ChainRow {
 pub struct ElliottResults {
     /// The share of the readings' variance that each component carries, in %, of the first calibration.
     pub variance_percent: Vec<f64>,
-    /// A row a chain.
+    /// One row for each chain.
     pub rows: Vec<ChainRow>,
 }
 
-/// Error of a study that cannot be run.
+/// Error of running the study.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ElliottError {
     /// The rig cannot be simulated.
@@ -124,26 +124,26 @@ pub enum ElliottError {
     /// A locator does not suit the readings.
     #[error(transparent)]
     Reading(#[from] ReadingError),
-    /// The influence locator cannot follow.
+    /// The influence locator cannot track contacts.
     #[error(transparent)]
     Follow(#[from] FollowError),
     /// The noise is singular.
     #[error(transparent)]
     Noise(#[from] NoiseError),
-    /// Components that are not there.
+    /// A number of components outside the range.
     #[error(
         "{components} components are asked of {sensors} sensors; there are as many as sensors, and at least 1"
     )]
     Components {
-        /// Asked for.
+        /// The number of components.
         components: usize,
         /// Sensors.
         sensors: usize,
     },
-    /// No calibration is asked for.
+    /// The number of calibrations is 0.
     #[error("no calibration is asked for; there must be at least 1")]
     NoCalibration,
-    /// The tracker never found the moving load.
+    /// The tracker did not detect the moving load.
     #[error("the tracker never found the moving load")]
     NothingTracked,
 }
@@ -160,8 +160,8 @@ impl Elliott {
     /// Runs the study.
     ///
     /// # Errors
-    /// [`ElliottError`] for a rig without a model, a known force, training positions or a motion, and for components that
-    /// are not there.
+    /// [`ElliottError`] for a rig without a model, a known force, training positions or a motion, and for a number of components
+    /// outside the range.
     pub fn run(&self, watch: Watch) -> Result<ElliottResults, ElliottError> {
         let sensors = self.rig.setup.layout().len();
         if let Some(&components) = self.components.iter().find(|count| !(1..=sensors).contains(*count)) {
@@ -189,13 +189,13 @@ impl Elliott {
         Ok(ElliottResults { variance_percent: first.variance_percent(), rows })
     }
 
-    /// The most often that [`Elliott::run`] asks whether to go on while it fits.
+    /// Greatest number of rounds of the fits in [`Elliott::run`], each reported to `watch`.
     pub fn most_rounds(&self) -> u64 {
         let networks = self.components.len() as u64 + 1;
         self.calibrations * networks * u64::from(self.network().training.max_epochs)
     }
 
-    /// Every chain, as the findings list them.
+    /// Every chain, in the order of the results.
     fn chains(&self) -> Vec<Chain> {
         let components = self.components.iter().map(|count| Chain::Components(*count));
         let others = [Chain::Readings, Chain::Influence, Chain::Filter, Chain::Smoother];
@@ -240,7 +240,7 @@ impl Elliott {
         Ok(judged)
     }
 
-    /// A locator's errors, reading by reading.
+    /// The errors of a locator, reading by reading.
     fn judge_readings(&self, locator: &Locator, setup: &TrialSetup) -> Result<ChainErrors, ElliottError> {
         let mut pressed = Evaluation::new(locator, &setup.trial.judged)?;
         let extent = self.rig.setup.surface().extent();
@@ -253,7 +253,7 @@ impl Elliott {
         })
     }
 
-    /// The errors of a locator's tracker, as readings come and with all of them.
+    /// The errors of a locator's tracker, with the readings up to each time and with all readings.
     fn judge_tracks(&self, locator: &Locator, setup: &TrialSetup) -> Result<[ChainErrors; 2], ElliottError> {
         let followed = follow(locator, TrackerConfig::default(), setup.moving)?;
         let (truths, extent) = (setup.moving.truths(), self.rig.setup.surface().extent());
@@ -311,7 +311,7 @@ impl Elliott {
     }
 }
 
-/// Setup that the chains of one calibration share.
+/// The data that the chains of one calibration share.
 #[derive(Clone, Copy)]
 struct TrialSetup<'a> {
     trial: &'a Split,

@@ -1,4 +1,4 @@
-//! The reduction is a rotation, and a chain that is given enough components does about as well as one that is given all readings.
+//! The reduction is a rotation, and a chain with enough components is about as accurate as one with all readings.
 
 use super::*;
 use palpate_estimators::recording::Recording;
@@ -39,7 +39,7 @@ fn components_are_uncorrelated_and_keep_all_that_readings_hold() {
     }
     assert!((1..25).all(|i| moment(i, i) <= moment(i - 1, i - 1) * (1.0 + 1e-9)));
     assert!((reduction.variance_percent().iter().sum::<f64>() - 100.0).abs() < 1e-9);
-    // A rotation leaves distances, in standard deviations of the noise.
+    // A rotation does not change distances, in standard deviations of the noise.
     let square = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
     let (one, other) = (&recording.rows[4].reading, &recording.rows[200].reading);
     let whitened = square(one, other) / 20e-6f64.powi(2);

@@ -1,7 +1,7 @@
-//! Claims that the paper makes in words, and whether the seeds bear them out.
+//! Claims of the paper in words, and whether the seeds confirm them.
 //!
-//! A claim is split into parts that a program can check. Each part is asked twice: of the medians over all seeds, and
-//! of every seed by itself (seed k of one arm beside seed k of another: they start from the same random stream).
+//! A claim is split into parts that a program can check. Each part is checked twice: with the medians over all seeds, and
+//! with every seed by itself (seed k of one arm beside seed k of another: they start from the same random stream).
 
 use serde::Serialize;
 
@@ -11,16 +11,16 @@ use crate::{ArmOutcome, Judging, TrainedSeed};
 use palpate_estimators::evaluation::Portion;
 use palpate_mechanics::contact::Position;
 
-/// A claim and its verdict.
+/// A claim with the results of its checks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Claim {
     /// "C1" to "C8".
     pub id: &'static str,
     /// The claim in words.
     pub claim: &'static str,
-    /// Whether every part holds in the medians.
+    /// Whether every part is true of the medians.
     pub holds: bool,
-    /// Share of the seeds for which every part holds, 0 to 1.
+    /// Share of the seeds for which every part is true, 0 to 1.
     pub share_of_seeds: f64,
     /// Parts.
     pub parts: Vec<ClaimPart>,
@@ -29,24 +29,24 @@ pub struct Claim {
 /// One checkable part of a claim.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClaimPart {
-    /// Statement that was checked, in words.
+    /// The checked statement, in words.
     pub what: String,
-    /// Whether it holds in the medians.
+    /// Whether it is true of the medians.
     pub holds: bool,
-    /// Share of the seeds for which it holds, 0 to 1.
+    /// Share of the seeds for which it is true, 0 to 1.
     pub share_of_seeds: f64,
 }
 
 /// The paper's sensor pitch, l/9, as a share of the length.
 const PITCH_PERCENT: f64 = 100.0 / 9.0;
-/// "About 1 %" is taken as between a half and one and a half.
+/// "About 1 %" is counted as between a half and one and a half.
 const ABOUT_ONE: std::ops::RangeInclusive<f64> = 0.5..=1.5;
-/// "Linear" is taken as: the two increments differ by no more than this factor.
+/// "Linear" is counted as: the two increments differ by no more than this factor.
 const LINEAR_FACTOR: f64 = 2.0;
-/// The portion that the paper finds good, in metres.
+/// The portion with good accuracy according to the paper, in metres.
 const GOOD: Portion = Portion { from_m: 0.060, to_m: 0.300 };
 
-/// Every claim, C1 to C8, checked on the outcomes of the paper's study. Claims whose arms were not all run are left out.
+/// Checks every claim, C1 to C8, with the outcomes of the paper's study. A claim is left out unless all its arms were run.
 pub fn claims(outcomes: &[ArmOutcome], judging: &Judging) -> Vec<Claim> {
     let table = Table { outcomes, judging };
     let claims = [
@@ -92,15 +92,15 @@ enum Figure {
     Error,
     /// Average error outside the good portion.
     EdgeError,
-    /// Average error inside it.
+    /// Average error inside the good portion.
     GoodError,
-    /// The largest position that the locator answers, in % of the length.
+    /// The largest estimated position, in % of the length.
     LargestPosition,
     Epochs,
     Effective,
 }
 
-/// Looks a figure up: by arm.
+/// Returns a figure of an arm.
 type Look<'a> = dyn Fn(&str, Figure) -> f64 + 'a;
 
 struct Part {
@@ -229,7 +229,7 @@ struct Table<'a> {
 }
 
 impl Table<'_> {
-    /// `None` when an arm that the claim needs has no fits.
+    /// Checks a claim; `None` when an arm that it needs has no fits.
     fn judge(&self, id: &'static str, claim: &'static str, parts: &[Part]) -> Option<Claim> {
         let seeds = self.outcomes.iter().map(|outcome| outcome.fits.len()).min().unwrap_or(0);
         let asked = std::cell::Cell::new(true);

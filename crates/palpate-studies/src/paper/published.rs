@@ -1,11 +1,11 @@
-//! The figures that the paper prints, each from one training run of the author's, beside ours.
+//! The figures that the paper prints, each from one training run, beside those of this study.
 
 use serde::Serialize;
 
 use crate::{ArmResults, StudyResults};
 use palpate_estimators::evaluation::Quantiles;
 
-/// Yardstick of agreement between our median and a published figure.
+/// Criterion of agreement between the study's median and a published figure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Yardstick {
@@ -13,7 +13,7 @@ pub enum Yardstick {
     Within(f64),
     /// The ratio, the larger to the smaller, is at most this.
     Factor(f64),
-    /// The paper gives a bound, and our median keeps it.
+    /// The paper gives a bound, and the median is below it.
     Below,
 }
 
@@ -26,7 +26,7 @@ impl Yardstick {
         }
     }
 
-    /// The yardstick in words, of a published figure that is written so: "±0.6 points".
+    /// The criterion in words; `published` is the figure as the paper prints it: "±0.6 points".
     pub fn in_words(self, published: &str) -> String {
         match self {
             Self::Within(difference) => format!("±{difference} points"),
@@ -70,7 +70,7 @@ impl Figure {
         }
     }
 
-    /// The agreed distances: errors within 0.6 points of the length (0.25 below 1 %), effective lengths within 6 points,
+    /// The criteria: errors within 0.6 points of the length (0.25 below 1 %), effective lengths within 6 points,
     /// iterations within a factor of 3.
     fn yardstick(self, published: f64) -> Yardstick {
         match self {
@@ -83,7 +83,7 @@ impl Figure {
     }
 }
 
-/// The paper's sections 3.1 to 3.3, arm by arm.
+/// The figures of the paper's sections 3.1 to 3.3, by arm.
 const PUBLISHED: [(&str, Figure, f64); 16] = [
     ("position-10", Figure::Epochs, 26_850.0),
     ("position-10", Figure::Error, 3.6),
@@ -103,7 +103,7 @@ const PUBLISHED: [(&str, Figure, f64); 16] = [
     ("middle4-30", Figure::EffectiveLength, 94.8),
 ];
 
-/// A figure that the paper prints, beside ours.
+/// A figure that the paper prints, beside that of the study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PublishedFigure {
     /// Arm and figure: "position-10.error_percent".
@@ -114,30 +114,30 @@ pub struct PublishedFigure {
     pub what: &'static str,
     /// Value that the paper prints.
     pub published: f64,
-    /// Spread of our seeds.
+    /// Quantiles over the study's seeds.
     #[serde(flatten)]
     pub found: Quantiles,
-    /// Yardstick of agreement.
+    /// Criterion of agreement.
     pub yardstick: Yardstick,
-    /// Whether our median agrees by the yardstick.
+    /// Whether the study's median agrees by the criterion.
     pub agrees: bool,
-    /// Whether the published figure lies between the 5th and 95th percentile of our seeds; of a bound, whether the 5th keeps it.
+    /// Whether the published figure lies between the 5th and 95th percentile of the seeds; for a bound, whether the 5th is within it.
     pub within_seeds: bool,
 }
 
-/// Number of published figures that agree by either yardstick, and of all.
+/// Number of published figures that agree by either criterion, and of all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Agreement {
-    /// Number of those near which our medians are.
+    /// Number of figures that agree with the medians.
     pub agreeing: usize,
-    /// Number of those within the 5–95 % of our seeds.
+    /// Number of figures within the 5–95 % of the seeds.
     pub within_seeds: usize,
-    /// Number of all.
+    /// Number of all figures.
     pub compared: usize,
 }
 
 impl Agreement {
-    /// Counts.
+    /// Counts the figures that agree.
     pub fn new(figures: &[PublishedFigure]) -> Self {
         let count =
             |holds: fn(&PublishedFigure) -> bool| figures.iter().filter(|figure| holds(figure)).count();
@@ -149,7 +149,7 @@ impl Agreement {
     }
 }
 
-/// Every published figure whose arm is among the results, beside ours.
+/// Every published figure of an arm among the results, beside that of the study.
 pub fn published_figures(results: &StudyResults) -> Vec<PublishedFigure> {
     let beside = |&(arm, figure, published): &(&'static str, Figure, f64)| {
         let found = figure.spread(results.arm(arm)?)?;

@@ -1,9 +1,9 @@
-//! Rows of `evaluations.csv`, one a fit that is no network: what it located, by reading.
+//! Rows of `evaluations.csv`: the located positions, one row for each fit of an estimator that is not a network.
 //!
-//! Columns are the arm, the seed, and three of as many values as the fit was judged by readings, in the order of the study's positions with
-//! all readings at one after the other: `estimates_m`, the located positions in metres; `held`, a character a reading, 1 where the 95 % interval
-//! holds the contact, 0 where it does not and - where there is no interval; and `interval_scores_m`, the interval scores in metres, or -.
-//! Floats are written so that they read back to the last bit.
+//! Columns are the arm, the seed, and three columns with a value for each reading, in the order of the study's positions; all readings at one
+//! position follow each other. `estimates_m` contains the located positions in metres. `held` contains a character for each reading: 1 if the
+//! 95 % interval contains the contact, 0 if it does not, and - without an interval. `interval_scores_m` contains the interval scores in metres,
+//! or -. Floats are written so that they read back to the last bit.
 
 use super::super::run::{PreparedStudy, Trained, TrainedSeed};
 use super::{RowProblem, fit_of, read_cell};
@@ -15,7 +15,7 @@ const COLUMNS: [&str; 5] = ["arm", "seed", ESTIMATES, HELD, SCORES];
 const ESTIMATES: &str = "estimates_m";
 const HELD: &str = "held";
 const SCORES: &str = "interval_scores_m";
-/// What stands for a value that is not told.
+/// Placeholder for a missing value.
 const NOT_TOLD: &str = "-";
 
 /// The header.
@@ -81,7 +81,7 @@ pub fn read(study: &PreparedStudy, row: &str) -> Result<Trained, RowProblem> {
     Ok(Trained { arm, fit: TrainedSeed { seed, training: None, weights: Vec::new(), evaluation } })
 }
 
-/// Finite numbers with blanks between them, as many as there are readings.
+/// Finite numbers separated by blanks, one for each of `readings`.
 fn numbers(column: &'static str, cell: &str, readings: usize) -> Result<Vec<Option<f64>>, RowProblem> {
     let number = |value: &str| -> Result<Option<f64>, RowProblem> {
         if value == NOT_TOLD {

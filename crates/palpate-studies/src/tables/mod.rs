@@ -1,7 +1,7 @@
-//! The two tables of a study's fits, which grow by a row as a fit is finished, and from which a study goes on, or is put together.
+//! The two tables of a study's fits. Each finished fit adds a row, and a study is continued or assembled from the rows.
 //!
 //! `networks.csv` has a row for every fit; networks are restored from the weights in it. `evaluations.csv` has a row for every fit of another
-//! estimator: what it located, reading by reading. Both begin with a comment that names what rows may stand in one file.
+//! estimator, with the located position of each reading. Both begin with a comment that identifies the run; only its rows may follow.
 
 mod evaluations;
 mod networks;
@@ -12,16 +12,16 @@ use super::run::{PreparedStudy, Trained};
 use super::task::{MOST_SEEDS, Shard, Task};
 use palpate_rig::Study;
 
-/// A fit: its arm, by the place in the study, and its seed.
+/// A fit: the index of its arm in the study, and its seed.
 type Fit = (usize, u64);
 
 /// Rows of fits in the two tables, or the whole text of both: a plain value, which may be sent to another process or machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitRows {
-    /// Of `networks.csv`.
+    /// Rows of `networks.csv`.
     pub networks: String,
-    /// Of `evaluations.csv`; empty where all fits are networks.
+    /// Rows of `evaluations.csv`; empty if all fits are networks.
     pub evaluations: String,
 }
 
@@ -76,7 +76,7 @@ impl TableKind {
         }
     }
 
-    /// Text among those of both.
+    /// The text of this table in `texts`.
     pub fn text(self, texts: &FitRows) -> &str {
         match self {
             Self::Networks => &texts.networks,
@@ -85,21 +85,21 @@ impl TableKind {
     }
 }
 
-/// Fits that tables hold.
+/// Fits read from tables.
 #[derive(Clone, Debug, Default)]
 pub struct Checkpoint {
-    /// The fits, with further seeds that an earlier run had.
+    /// The fits; they may include further seeds of an earlier run.
     pub done: Vec<Trained>,
-    /// Number of the fits in `networks.csv` that cannot be restored, as `evaluations.csv` has no row of them.
+    /// Number of fits in `networks.csv` that cannot be restored, because `evaluations.csv` has no row for them.
     pub without_evaluation: usize,
-    /// The tables whose last line was cut off, as a crash leaves it; it was passed over.
+    /// The tables with an incomplete last line, as a crash leaves it; that line was skipped.
     pub cut_off: Vec<TableKind>,
 }
 
-/// Error of reading a table that a run left.
+/// Error of reading a table of an earlier run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CheckpointError {
-    /// Another study, another file of it, another palpate, or another shard.
+    /// The table is of another study, another version of the study file or of palpate, or another shard.
     #[error("line 1 belongs to another run: it is `{found}`; this study writes `{wanted}`")]
     Heading {
         /// The table.
@@ -147,23 +147,23 @@ pub enum RowProblem {
         /// The arm.
         arm: String,
     },
-    /// A cell that does not read as what it must be.
+    /// A cell with an invalid value.
     #[error("{column}: `{found}` is not {wanted}")]
     Cell {
         /// The column.
         column: &'static str,
-        /// The cell, or what of it does not read.
+        /// The cell, or the invalid part of it.
         found: String,
-        /// What it must be.
+        /// The expected value.
         wanted: &'static str,
     },
-    /// Weights of another network.
+    /// Weights for another network.
     #[error("weights: there are {found}, which is not the network's number")]
     Weights {
         /// Number of weights.
         found: usize,
     },
-    /// Values of another number of readings.
+    /// Values for another number of readings.
     #[error("{column}: there are {found} values; the arm is judged by {wanted} readings")]
     Readings {
         /// The column.
@@ -173,13 +173,13 @@ pub enum RowProblem {
         /// Number of readings.
         wanted: usize,
     },
-    /// A network, of which the table has no rows.
-    #[error("arm `{arm}` is of networks, of which networks.csv keeps all")]
+    /// A row of a network in `evaluations.csv`, which has none.
+    #[error("arm `{arm}` is of networks, and networks.csv keeps all of them")]
     Network {
         /// The arm.
         arm: String,
     },
-    /// A second row of a fit.
+    /// A second row for a fit.
     #[error("the fit of arm `{arm}` from seed {seed} is in line {first} already; take one of the two away")]
     Twice {
         /// The arm.
@@ -189,14 +189,14 @@ pub enum RowProblem {
         /// Line of the first row.
         first: usize,
     },
-    /// A fit that is of another shard.
+    /// A fit of another shard.
     #[error("the fit of arm `{arm}` from seed {seed} is not of shard {shard}")]
     OtherShard {
         /// The arm.
         arm: String,
         /// The seed.
         seed: u64,
-        /// The shard whose table it is.
+        /// The shard of the table.
         shard: String,
     },
 }
@@ -207,34 +207,34 @@ impl<'a> StudyTables<'a> {
         Self { study, shard: None }
     }
 
-    /// The tables of a shard of so many seeds of a study.
+    /// The tables of one shard of a study with `seeds` seeds.
     pub fn of_shard(study: &'a PreparedStudy, shard: Shard, seeds: u64) -> Self {
         let block = study.lanes();
         let tasks = shard.share(study.tasks(seeds, block));
-        // A study's own tasks have its arms.
+        // Every arm of a study's own tasks is one of its arms.
         let beginning = |task: &Task| Some((study.arm(&task.arm).ok()?, task.seeds.start));
         let beginnings = tasks.iter().filter_map(beginning).collect();
         Self { study, shard: Some(ShardTasks { shard, seeds, tasks, block, beginnings }) }
     }
 
-    /// The shard with its seeds, where they are tables of one.
+    /// The shard with its number of seeds; `None` for the tables of a whole study.
     pub fn shard(&self) -> Option<(Shard, u64)> {
         self.shard.as_ref().map(|shard| (shard.shard, shard.seeds))
     }
 
-    /// The tasks whose fits the tables hold: those of the shard, or of `seeds` seeds of the whole study.
+    /// The tasks of the fits in the tables: those of the shard, or of `seeds` seeds of the whole study.
     pub fn tasks(&self, seeds: u64) -> Vec<Task> {
         self.shard
             .as_ref()
             .map_or_else(|| self.study.tasks(seeds, self.study.lanes()), |shard| shard.tasks.clone())
     }
 
-    /// Whether there is an `evaluations.csv`: where some arm's fits are no networks.
+    /// Whether the study has an `evaluations.csv`: some arm has an estimator that is not a network.
     pub fn has_evaluations(&self) -> bool {
         (0..self.study.study.arms.len()).any(|arm| !self.study.keeps_weights(arm))
     }
 
-    /// The comment and the header that the tables begin with; of `evaluations.csv` nothing where there is none.
+    /// The comment and the header at the beginning of each table; for `evaluations.csv` an empty text if the study has none.
     pub fn headings(&self) -> FitRows {
         let comment = self.comment();
         let evaluations = self.has_evaluations().then(|| comment.clone() + &evaluations::header());
@@ -266,7 +266,7 @@ impl<'a> StudyTables<'a> {
         }
     }
 
-    /// The whole tables of some fits, in the order of the arms and seeds, whatever the order that they come in.
+    /// The whole tables of some fits, sorted by arm and seed; the order of `fits` has no effect.
     pub fn whole(&self, fits: &[Trained]) -> FitRows {
         let mut sorted: Vec<&Trained> = fits.iter().collect();
         sorted.sort_by_key(|trained| (trained.arm, trained.fit.seed));
@@ -275,10 +275,10 @@ impl<'a> StudyTables<'a> {
         whole
     }
 
-    /// The fits that an earlier run of this very study, or shard, left in its tables; of a table that is not there the text is empty.
+    /// Reads the fits of an earlier run of this study, or shard, from its tables; the text of a missing table is empty.
     ///
     /// # Errors
-    /// [`CheckpointError`] when a table belongs to another run or holds a row that this study does not write.
+    /// [`CheckpointError`] when a table belongs to another run or contains a row that this study does not write.
     pub fn read(&self, texts: &FitRows) -> Result<Checkpoint, CheckpointError> {
         let headings = self.headings();
         let mut checkpoint = Checkpoint::default();
@@ -300,7 +300,7 @@ impl<'a> StudyTables<'a> {
         Ok(checkpoint)
     }
 
-    /// The networks in rows of `networks.csv`, and the other fits that there are.
+    /// Reads `networks.csv`: the networks, and the fits of other estimators.
     fn read_networks(&self, rows: &[(usize, &str)]) -> Result<(Vec<Trained>, Vec<Fit>), CheckpointError> {
         let (mut restored, mut others, mut seen) = (Vec::new(), Vec::new(), HashMap::new());
         let table = TableKind::Networks;
@@ -316,7 +316,7 @@ impl<'a> StudyTables<'a> {
         Ok((restored, others))
     }
 
-    /// The fits in rows of `evaluations.csv`.
+    /// Reads the fits in `evaluations.csv`.
     fn read_evaluations(&self, rows: &[(usize, &str)]) -> Result<Vec<Trained>, CheckpointError> {
         let (mut restored, mut seen) = (Vec::new(), HashMap::new());
         let table = TableKind::Evaluations;
@@ -329,7 +329,7 @@ impl<'a> StudyTables<'a> {
         Ok(restored)
     }
 
-    /// Checks that a fit has one row, and is of the shard whose tables they are.
+    /// Checks that a fit has one row, and that the shard of the tables includes it.
     fn check(&self, fit: Fit, line: usize, seen: &mut HashMap<Fit, usize>) -> Result<(), RowProblem> {
         let (arm, seed) = (self.study.study.arms[fit.0].name.clone(), fit.1);
         if let Some(shard) = self.shard.as_ref().filter(|shard| !shard.holds(fit)) {
@@ -342,10 +342,10 @@ impl<'a> StudyTables<'a> {
     }
 }
 
-/// Words in a shard's comment before its number.
+/// Text before the number of a shard in a table's comment.
 const SHARD: &str = ", shard ";
 
-/// The shard that a table's first line names, with its seeds; `None` where it names none.
+/// The shard in a table's first line, with its seeds; `None` without one.
 pub(crate) fn shard_in(text: &str) -> Option<(Shard, u64)> {
     let (_, told) = text.lines().next()?.rsplit_once(SHARD)?;
     let (shard, seeds) = told.strip_suffix(" seeds")?.split_once(" of ")?;
@@ -361,7 +361,7 @@ struct Rows<'a> {
     cut_off: bool,
 }
 
-/// The rows below the heading of a table; none of an empty text.
+/// The rows below the heading of a table; empty for an empty text.
 fn rows_below<'a>(table: TableKind, text: &'a str, heading: &str) -> Result<Rows<'a>, CheckpointError> {
     if text.is_empty() {
         return Ok(Rows { whole: Vec::new(), cut_off: false });
@@ -379,7 +379,7 @@ fn rows_below<'a>(table: TableKind, text: &'a str, heading: &str) -> Result<Rows
     })
 }
 
-/// The place of a row's arm in the study, and its seed.
+/// The fit of a row: the index of its arm in the study, and its seed.
 fn fit_of(study: &PreparedStudy, arm: &str, seed: &str) -> Result<Fit, RowProblem> {
     let place = study.arm(arm).map_err(|_| RowProblem::Arm { arm: shortened(arm) })?;
     let seed = read_cell("seed", seed, "a whole number")?;
@@ -394,7 +394,7 @@ fn read_cell<T: std::str::FromStr>(
     cell.parse().map_err(|_| RowProblem::Cell { column, found: shortened(cell), wanted })
 }
 
-/// A cell as long as a message can hold.
+/// A cell, shortened to the length that a message shows.
 fn shortened(cell: &str) -> String {
     const MOST: usize = 40;
     let mut shown: String = cell.chars().take(MOST).collect();

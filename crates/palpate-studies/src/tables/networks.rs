@@ -1,11 +1,10 @@
-//! Rows of `networks.csv`, one a fit.
+//! Rows of `networks.csv`, one for each fit.
 //!
-//! Columns are the arm, the seed, epochs, status and aggregate error of a network's training, the errors of the fit in % of the surface's length,
-//! the effective length, and the weights of a network. What a fit of another estimator has not is an empty cell.
+//! Columns are the arm and the seed; epochs, status and aggregate error of a network's training; the errors of the fit in % of the
+//! surface's length; the effective length; and the weights of a network. Cells that do not apply to another estimator are empty.
 //!
-//! Weights stand in the order in which `palpate_core::Network` has them: layer by layer from the input side, node by node of the layer; of
-//! each node the weights of the nodes before it, in their order, and then, where there are biases, its bias. Inputs are the channels in the
-//! layout's order.
+//! Weights are in the order of `palpate_core::Network`: layer by layer from the input side, and node by node within a layer. Each node has the
+//! weights of the nodes before it, in their order, and then its bias, if there are biases. Inputs are the channels in the layout's order.
 
 use super::super::results::percent;
 use super::super::run::{PreparedStudy, Trained};

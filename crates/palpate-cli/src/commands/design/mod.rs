@@ -1,4 +1,4 @@
-//! `palpate design`: what to build before it is built, and where to press before it is pressed.
+//! `palpate design`: what to build, and where to press, before the work begins.
 
 mod positions;
 mod sensors;
@@ -34,7 +34,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Says where the rig and the report are, as far as they were asked for.
+/// Prints the paths of the rig and the report, if they were requested.
 fn say_files(rig: Option<&Path>, report_folder: Option<&Path>) -> Result<(), Failure> {
     if let Some(path) = rig {
         output::say(format!("\nRig: {}", path.display()))?;
@@ -42,7 +42,7 @@ fn say_files(rig: Option<&Path>, report_folder: Option<&Path>) -> Result<(), Fai
     output::say_report("\n", report_folder)
 }
 
-/// The rig of `text` with a `change`, and its text, of which everything else stays as it was; `path` is where it will be.
+/// The rig of `text` with a `change`, and its text, unchanged elsewhere; `path` is its future file.
 fn changed_rig(
     path: &Path,
     text: &str,
@@ -51,7 +51,7 @@ fn changed_rig(
 ) -> Result<(Rig, String), Failure> {
     let written = with_changes(text, change)
         .map_err(|error| Complaint::new(format!("cannot put the {what} into the rig: {error}")))?;
-    // Whatever else the rig says must go with it.
+    // The rest of the rig must be consistent with the change.
     Ok((input::parse_rig(path, &written)?, written))
 }
 
@@ -60,7 +60,7 @@ fn design_complaint(error: &(dyn std::error::Error + 'static), rig: &Path, help:
     if Cancelled::caused(error) { Failure::stopped() } else { Complaint::about(rig, error).help(help).into() }
 }
 
-/// A position as a rig has it: along a line a length, on a plane a pair of them. `in_mm` rounds.
+/// A position in the form of a rig file: on a line a length, on a plane a pair of lengths. `in_mm` rounds.
 fn toml_position(position: Position, extent: Extent, in_mm: fn(f64) -> f64) -> Value {
     let lengths = extent.coordinates_m(position).map(|at_m| format!("{} mm", in_mm(at_m)));
     match extent {

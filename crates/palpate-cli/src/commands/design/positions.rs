@@ -1,4 +1,4 @@
-//! `palpate design positions`: where to press, against even positions; and the next press of a recording begun.
+//! `palpate design positions`: where to press, compared with even positions; and the next press of a recording.
 
 use super::{changed_rig, design_complaint, say_files, to_micrometre, toml_position};
 use crate::failure::Failure;
@@ -67,7 +67,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Designed positions, with what they were designed for.
+/// Designed positions, with their design task.
 struct Outcome<'a> {
     rig: &'a Path,
     estimator: &'static str,
@@ -154,7 +154,7 @@ fn help(error: &PositionError) -> &'static str {
         PositionError::NoForce => {
             "add `force = \"3 N\"` to [contact], or to [training] where it is not known afterwards"
         }
-        PositionError::Auto => "say which: `kind = \"influence\"` in [estimator]",
+        PositionError::Auto => "choose one: `kind = \"influence\"` in [estimator]",
         PositionError::TooFew { .. } => "--count takes a larger number",
         PositionError::Arrangement(_) | PositionError::Calibration(_) | PositionError::Regression(_) => {
             "check [training], [sensors] and [estimator] of the rig"
@@ -169,7 +169,7 @@ fn help(error: &PositionError) -> &'static str {
     }
 }
 
-/// The findings as people read them.
+/// Prints the results as text.
 fn print(outcome: &Outcome) -> Result<(), Failure> {
     let (problem, design) = (outcome.problem, outcome.problem.design());
     output::say(format!(
@@ -213,7 +213,7 @@ fn errors(outcome: &Outcome) -> String {
         .to_string()
 }
 
-/// Three decimals, or as many as a small number needs for two digits that matter.
+/// Three decimals, or as many as a small number needs for two significant digits.
 fn figure(value: f64) -> String {
     if value >= 0.01 || value == 0.0 { format!("{value:.3}") } else { format!("{value:.1e}") }
 }
@@ -271,10 +271,10 @@ fn in_mm(position: Position) -> impl Serialize {
     object! { "x_mm": position.x_m * 1e3, "y_mm": position.y_m * 1e3 }
 }
 
-/// Keys of [training] that say where to press.
+/// Keys of [training] that define the positions.
 const PLACES: [&str; 6] = ["arrangement", "count", "grid", "middle", "portion", "positions"];
 
-/// Puts other training positions into a rig; everything else of its text stays as it was.
+/// Replaces the training positions of a rig; the rest of its text stays as it was.
 fn place_presses(rig: &mut DocumentMut, positions: &[Position], repeats: usize, extent: Extent) {
     let own = rig.get("training").and_then(Item::as_table).cloned();
     let mut training = own.unwrap_or_else(TomlTable::new);
@@ -288,7 +288,7 @@ fn place_presses(rig: &mut DocumentMut, positions: &[Position], repeats: usize, 
     rig.insert("training", Item::Table(training));
 }
 
-/// Presses that a table shows.
+/// Number of presses in the table.
 const SHOWN: usize = 5;
 
 /// Prints advice on the next presses.
@@ -328,7 +328,7 @@ fn advice_to_json(arguments: &Arguments, advice: &Advice) -> impl Serialize {
         "stop_below_percent": advice.stop_percent,
         "enough": advice.is_enough(),
         "next": next.collect::<Vec<_>>(),
-        // Presses to come until it is enough; null where more than are looked ahead.
+        // Number of further presses until the stopping rule is met; null if it exceeds the largest number.
         "presses_to_go": advice.reaches_goal().then_some(advice.next.len()),
     }
 }

@@ -1,4 +1,4 @@
-//! `palpate design sensors`: which sensors where, against the even layout.
+//! `palpate design sensors`: kinds and places of sensors, compared with the even layout.
 
 use super::{changed_rig, design_complaint, say_files, to_micrometre, toml_position};
 use crate::cost::MemoryOption;
@@ -71,7 +71,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Designed layouts, with what they were designed for.
+/// Designed layouts, with their design task.
 struct Outcome<'a> {
     rig: &'a Path,
     problem: &'a SensorProblem<'a>,
@@ -124,7 +124,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     say_files(arguments.output.as_deref(), arguments.out.as_deref())
 }
 
-/// The rig's bench and design, with what the command line says.
+/// The rig's bench and design, with the options of the command line.
 fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesign), Failure> {
     let force_n = arguments.force.or(rig.setup.force_n());
     let setup = rig.setup.clone().with_force(force_n);
@@ -202,12 +202,12 @@ fn complaint(error: &DesignError, rig: &Path) -> Failure {
     design_complaint(error, rig, help(error))
 }
 
-/// More sensors than a curve is drawn for.
+/// Largest number of sensors in a curve.
 const MOST_COUNT: usize = 200;
 
 /// "2..16" as a range, both ends included.
 fn counts(text: &str) -> Result<RangeInclusive<usize>, String> {
-    let form = || format!("`{text}` is no range; write the least and the most, as in 2..16");
+    let form = || format!("`{text}` is not a range; write the least and the most, as in 2..16");
     let (from, to) = text.split_once("..").ok_or_else(form)?;
     let number = |text: &str| text.trim_start_matches('=').trim().parse::<usize>().map_err(|_| form());
     let (from, to) = (number(from)?, number(to)?);
@@ -257,7 +257,7 @@ pub fn help(error: &DesignError) -> &'static str {
     }
 }
 
-/// The designs as people read them.
+/// Prints the designs as text.
 fn print(outcome: &Outcome) -> Result<(), Failure> {
     let (problem, design) = (outcome.problem, outcome.problem.design());
     output::say(format!(
@@ -290,10 +290,10 @@ fn print(outcome: &Outcome) -> Result<(), Failure> {
     if outcome.counts.is_empty() { Ok(()) } else { print_counts(outcome) }
 }
 
-/// "1 contact, at 12000 mm, is over a support …": those that count for nothing; `None` where there is none.
+/// "1 contact, at 12000 mm, is over a support …": the excluded contacts; `None` if there are none.
 fn left_out_in_words(problem: &SensorProblem) -> Option<String> {
     let places = problem.contacts_over_supports();
-    let reason = "where no layout tells a force that is not known: left out of scores and limits";
+    let reason = "where no layout determines an unknown force: left out of scores and limits";
     match places.as_slice() {
         [] => None,
         [place] => Some(format!(
@@ -394,8 +394,8 @@ fn print_counts(outcome: &Outcome) -> Result<(), Failure> {
     }
 }
 
-/// JSON of a sensor design. A limit that is not there, because the readings do not tell some contact, is null. Scores of limits
-/// are in mm, of the share beyond the tolerance in %, of D-optimality ½·ln det.
+/// JSON of a sensor design. A limit is null if the readings do not determine some contact. Scores of limits are in mm, of the share
+/// beyond the tolerance in %, of D-optimality ½·ln det.
 fn to_json(outcome: &Outcome) -> impl Serialize {
     let (problem, design) = (outcome.problem, outcome.problem.design());
     let scale = design.criterion.score_scale();
@@ -417,11 +417,11 @@ fn to_json(outcome: &Outcome) -> impl Serialize {
             "measure": sensor.kind,
             "x_mm": sensor.position.x_m * 1e3,
             "y_mm": sensor.position.y_m * 1e3,
-            // Whether it is one of today's, where those are kept.
+            // Whether it is an existing sensor that is kept.
             "kept"?: (!design.kept.is_empty()).then(|| problem.is_kept(sensor)),
         }
     };
-    // Of simulated calibrations.
+    // Errors of simulated calibrations.
     let simulated = |verification: &Verification| {
         object! {
             "mean_error_mm": verification.mean_error_m * 1e3,
@@ -461,10 +461,10 @@ fn to_json(outcome: &Outcome) -> impl Serialize {
     }
 }
 
-/// Keys of a section that say where its sensors are, or which of them are dead.
+/// Keys of a section that define where its sensors are, or which of them are disabled.
 const PLACES: [&str; 4] = ["count", "grid", "positions", "dead"];
 
-/// Puts other sensors into a rig, a section a kind; everything else of its text stays as it was.
+/// Replaces the sensors of a rig, one section per kind; the rest of its text stays as it was.
 fn place_sensors(rig: &mut DocumentMut, layout: &Layout, kept: &[Sensor], extent: Extent) {
     let own = sections(rig.get("sensors"));
     let mut new = ArrayOfTables::new();
@@ -485,7 +485,7 @@ fn place_sensors(rig: &mut DocumentMut, layout: &Layout, kept: &[Sensor], extent
     if let (Some(first), Some(table)) = (own.first(), new.get_mut(0)) {
         table.decor_mut().clone_from(first.decor());
     }
-    // Where the old sections stood.
+    // The place of the old sections.
     let position = own.first().and_then(TomlTable::position);
     for table in new.iter_mut() {
         table.set_position(position);
@@ -501,7 +501,7 @@ fn sections(sensors: Option<&Item>) -> Vec<TomlTable> {
     }
 }
 
-/// The rig's section of this kind without its places, or a new one; its noise is the design's.
+/// The rig's section of this kind without its positions, or a new one; with the noise of the design.
 fn section(kind: SensorKind, own: &[TomlTable], channel: &ChannelModel) -> TomlTable {
     let measures = |table: &&TomlTable| table.get("measure").and_then(Item::as_str) == Some(kind.name());
     let mut section = own.iter().find(measures).cloned().unwrap_or_default();
@@ -520,10 +520,10 @@ fn section(kind: SensorKind, own: &[TomlTable], channel: &ChannelModel) -> TomlT
     section
 }
 
-/// Positions of some sensors of one kind, as a rig has them.
+/// Positions of some sensors of one kind, in the form of a rig file.
 fn positions(sensors: &[&Sensor], extent: Extent) -> Array {
     let written = |sensor: &&Sensor| {
-        // A reaction sensor must meet its support to the last digit; a micrometre is enough for the others.
+        // The position of a reaction sensor must equal that of its support exactly; a micrometre is enough for the others.
         let in_mm = match sensor.kind {
             SensorKind::Reaction => |at_m| at_m * 1e3,
             _ => to_micrometre,

@@ -1,4 +1,4 @@
-//! Studies that are built in beside the paper's: run whole, reported, and told as a table.
+//! Built-in studies besides the paper's: run whole, reported, and printed as a table.
 
 use super::{Arguments, EarlierRun};
 use crate::failure::{Complaint, Failure};
@@ -13,10 +13,10 @@ use palpate_studies::dead_areas::{self, DeadAreaResults, DeadAreas};
 use palpate_studies::elliott::{self, Elliott, ElliottResults};
 use std::path::Path;
 
-/// Calibrations, unless `--seeds` says another number.
+/// Default number of calibrations without `--seeds`.
 const CALIBRATIONS: u64 = 3;
 
-/// Settings and findings of a study: all that `results.json` holds.
+/// Settings and findings of a study: the content of `results.json`.
 #[derive(serde::Serialize)]
 struct Results<F> {
     palpate: &'static str,
@@ -59,7 +59,7 @@ pub fn elliott(arguments: &Arguments) -> Result<(), Failure> {
     write((arguments, &out), &results, elliott_report(&study, &results.findings), tell_elliott)
 }
 
-/// The folder of a study that fits in minutes, and keeps nothing that another run could go on from.
+/// The folder of a study that runs in minutes and cannot be resumed.
 fn folder(arguments: &Arguments, study: &str) -> Result<TargetFolder, Failure> {
     let in_shards = [(arguments.shard.is_some(), "--shard"), (!arguments.merge.is_empty(), "--merge")];
     if let Some((_, option)) = in_shards.into_iter().find(|(asked, _)| *asked) {
@@ -80,7 +80,7 @@ fn results<F>(study: &'static str, calibrations: u64, seed: u64, findings: F) ->
     Results { palpate: env!("CARGO_PKG_VERSION"), study, calibrations, seed, findings }
 }
 
-/// Runs a study that asks at most so often whether to go on.
+/// Runs a study that asks at most `most_rounds` times whether to continue.
 fn fit<F, E>(most_rounds: u64, run: impl FnOnce(Watch) -> Result<F, E>) -> Result<F, Failure>
 where
     E: std::error::Error + 'static,

@@ -1,6 +1,6 @@
-//! The fits of a study as they are finished: a row of each table for each, and a step of the bar.
+//! The finished fits of a study: for each one row in each table, and a step of the bar.
 //!
-//! The tables grow as fits are finished, survive Ctrl-C, and are sorted at the end.
+//! The tables grow with every finished fit, survive Ctrl-C, and are sorted at the end.
 
 use crate::failure::{Complaint, Failure};
 use crate::remark::remark;
@@ -17,15 +17,15 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// The tables, open for more rows.
+/// The tables, open for appending.
 pub struct FitFiles {
     networks: File,
-    /// `None` where all fits are networks.
+    /// `None` if all fits are networks.
     evaluations: Option<File>,
 }
 
 impl FitFiles {
-    /// Begins the tables of a run with the fits that it keeps of an earlier one. From here until its end the run counts as unfinished.
+    /// Starts the tables of a run with the fits of an earlier one. From here until its end the run counts as unfinished.
     pub fn begin(out: &TargetFolder, tables: &StudyTables, done: &[Trained]) -> Result<Self, Failure> {
         out.remove(RESULTS_JSON)?;
         out.remove(SHARD_JSON)?;
@@ -39,7 +39,7 @@ impl FitFiles {
         Ok(Self { networks: open(NETWORKS_CSV)?, evaluations })
     }
 
-    /// Adds the rows of a fit, each in one write, so that no other row comes between. The fit is finished with the second.
+    /// Adds the rows of a fit, each in one write, so that rows are not interleaved. The fit is finished with the second row.
     fn add(&mut self, rows: &FitRows) -> std::io::Result<()> {
         if let Some(evaluations) = &mut self.evaluations {
             evaluations.write_all(rows.evaluations.as_bytes())?;
@@ -48,7 +48,7 @@ impl FitFiles {
     }
 }
 
-/// Writes whole tables; `evaluations.csv` only where there is one.
+/// Writes complete tables; `evaluations.csv` only if there is one.
 pub fn write(out: &TargetFolder, whole: &FitRows) -> Result<(), Failure> {
     match whole.evaluations.is_empty() {
         true => out.remove(EVALUATIONS_CSV)?,
@@ -57,7 +57,7 @@ pub fn write(out: &TargetFolder, whole: &FitRows) -> Result<(), Failure> {
     out.write(NETWORKS_CSV, whole.networks.as_bytes())
 }
 
-/// The texts of the tables in a folder; nothing of one that is not there.
+/// The texts of the tables in a folder; empty for a missing file.
 pub fn read_texts(folder: &Path) -> Result<FitRows, Failure> {
     let text = |name| {
         let path = folder.join(name);
@@ -66,7 +66,7 @@ pub fn read_texts(folder: &Path) -> Result<FitRows, Failure> {
     Ok(FitRows { networks: text(NETWORKS_CSV)?, evaluations: text(EVALUATIONS_CSV)? })
 }
 
-/// The fits that an earlier run left in a folder.
+/// Fits of an earlier run in a folder.
 pub fn read(out: &TargetFolder, tables: &StudyTables) -> Result<Checkpoint, Failure> {
     let texts = read_texts(out.path())?;
     let checkpoint = tables.read(&texts).map_err(|error| {
@@ -92,7 +92,7 @@ pub fn read(out: &TargetFolder, tables: &StudyTables) -> Result<Checkpoint, Fail
     Ok(checkpoint)
 }
 
-/// Adds the place of a row that cannot be read to a complaint about it.
+/// Adds the place of an unreadable row to a complaint about it.
 pub fn at_row(complaint: Complaint, name: &str, texts: &FitRows, error: &CheckpointError) -> Complaint {
     let CheckpointError::Row { table, line, .. } = error else { return complaint };
     let text = table.text(texts);
@@ -100,7 +100,7 @@ pub fn at_row(complaint: Complaint, name: &str, texts: &FitRows, error: &Checkpo
     complaint.at_line(name, *line, row, 0..row.find(',').unwrap_or(row.len()))
 }
 
-/// Says that fits of an earlier run with more seeds stay in the tables, and that the results are without them.
+/// Reports that fits of an earlier run with more seeds stay in the tables, and that the results exclude them.
 pub fn say_surplus(earlier: &[Trained], options: RunOptions) {
     let surplus = earlier.iter().filter(|trained| trained.fit.seed >= options.seeds).count();
     if surplus > 0 {
@@ -112,7 +112,7 @@ pub fn say_surplus(earlier: &[Trained], options: RunOptions) {
     }
 }
 
-/// Progress of a run, which every training thread notes its fits in.
+/// Progress of a run; every training thread adds its fits.
 pub struct Tally<'a> {
     prepared: &'a PreparedStudy,
     tables: &'a StudyTables<'a>,
@@ -125,13 +125,13 @@ struct State {
     files: FitFiles,
     error: Option<std::io::Error>,
     arms: Vec<ArmTally>,
-    /// Presentations of this run.
+    /// Number of presentations in this run.
     presented: u64,
-    /// Fits of this run.
+    /// Number of fits in this run.
     fitted: u64,
 }
 
-/// Cost of an arm's fits: those that are left and those that are finished.
+/// Cost of an arm's fits: remaining and finished ones.
 #[derive(Clone, Copy, Default)]
 struct ArmTally {
     patterns: f64,
@@ -141,7 +141,7 @@ struct ArmTally {
 }
 
 impl<'a> Tally<'a> {
-    /// Watches a run of some tasks that has `done` behind it.
+    /// Progress of a run of some tasks, with the finished fits `done`.
     pub fn new(
         prepared: &'a PreparedStudy,
         tables: &'a StudyTables<'a>,
@@ -151,7 +151,7 @@ impl<'a> Tally<'a> {
         let arm = |arm| ArmTally { patterns: prepared.patterns(arm) as f64, ..ArmTally::default() };
         let mut arms: Vec<ArmTally> = (0..prepared.study.arms.len()).map(arm).collect();
         for task in tasks {
-            // A study's own tasks have its arms.
+            // The arms of a study's own tasks exist.
             if let Ok(arm) = prepared.arm(&task.arm) {
                 arms[arm].left += task.fits() as f64;
             }
@@ -169,7 +169,7 @@ impl<'a> Tally<'a> {
         Self { prepared, tables, bar, start: Instant::now(), state }
     }
 
-    /// A fit is finished: its rows go to the tables, and the bar goes on.
+    /// Records a finished fit: its rows go to the tables, and the bar advances.
     pub fn note(&self, trained: &Trained) {
         let rows = self.tables.rows(trained);
         let presented = self.prepared.presentations(trained);
@@ -190,7 +190,7 @@ impl<'a> Tally<'a> {
         self.state().error.is_some()
     }
 
-    /// Takes the bar away, and tells how many fits are finished.
+    /// Removes the bar, and returns the number of finished fits.
     pub fn finish(&self) -> Result<u64, Failure> {
         self.bar.finish_and_clear();
         let mut state = self.state();
@@ -214,7 +214,7 @@ impl ArmTally {
 }
 
 impl State {
-    /// "12.3 M presentations/s, 40 s left"; where no estimator is trained by epochs, "8.1 fits/s, 40 s left".
+    /// "12.3 M presentations/s, 40 s left"; without estimators trained by epochs, "8.1 fits/s, 40 s left".
     fn rate_in_words(&self, seconds: f64) -> String {
         if self.arms.iter().any(|arm| arm.patterns > 0.0) {
             let rate = self.presented as f64 / seconds;
@@ -226,8 +226,8 @@ impl State {
         format!("{rate:.1} fits/s, {} left", progress::duration(left / rate))
     }
 
-    /// An arm's networks cost what its finished ones did. Where none is finished, they cost what the others did, in
-    /// proportion to the square of the number of patterns, which is roughly how the paper's arms grow.
+    /// The remaining networks of an arm are assumed to cost as much as its finished ones. Without finished ones, they are scaled
+    /// from the other arms in proportion to the square of the number of patterns, which is roughly how the paper's arms grow.
     fn presentations_left(&self) -> f64 {
         let known: Vec<&ArmTally> =
             self.arms.iter().filter(|arm| arm.finished * arm.patterns > 0.0).collect();

@@ -1,4 +1,4 @@
-//! Shards of a study: one at its end, and all of them joined into the files of a single machine.
+//! Shards of a study: the end of a single one, and the merge of all into the files of a single machine.
 
 use super::fits;
 use super::{Arguments, Asked, time_in_words};
@@ -19,7 +19,7 @@ struct ShardFile {
     run: RunFacts,
 }
 
-/// Writes the facts of a shard, which is finished with them, and prints them.
+/// Writes the facts of a shard, which mark it as finished, and prints them.
 pub fn finish(
     shard: Shard,
     fits: usize,
@@ -77,7 +77,7 @@ fn read_facts(folder: &Path) -> Result<RunFacts, Failure> {
     Ok(file.run)
 }
 
-/// Complaint about shards that are not those of one study.
+/// Complaint about shards that do not belong to one study.
 fn complaint(error: &AssemblyError, shards: &[ShardTables]) -> Complaint {
     let complaint = Complaint::new(error);
     match error {

@@ -1,18 +1,18 @@
-//! Every contact's variance with one sensor more, summed over the contacts eight at a time: what searches spend their time in.
+//! Variance of every contact with one more sensor, summed over the contacts eight at a time: the innermost loop of the searches.
 //!
-//! [`sum_up`] is loops over the lanes of one block, so that compilers make vector instructions of them: two f64 in a register on any x86-64,
-//! four where [`run_loops`] finds AVX2 when the program runs. Both do the same operations lane by lane in the same order, each rounded as
-//! IEEE 754 says and none fused, so their sums are the same to the last bit and searches find the same layouts on every machine. (The
-//! logarithms of D-optimality are the C library's.)
+//! [`sum_up`] consists of loops over the lanes of one block, which compilers translate into vector instructions: two f64 per
+//! register on any x86-64, four where [`run_loops`] finds AVX2 at run time. Both do the same operations lane by lane in the same
+//! order, each rounded as in IEEE 754 and none fused. So the sums are equal to the last bit, and searches give the same layouts on
+//! every machine. (The logarithms of D-optimality are the C library's.)
 //!
-//! The bound is one division and one root a contact: with AVX2 2.2 ns of a 2.5 GHz Xeon, whatever their width; AVX-512 gains
-//! nothing, as it divides eight numbers in twice the time of four. Rows that are in no cache cost another 1.2 ns to fetch, so
-//! whoever judges candidates for several states does so while their rows are at hand.
+//! The limiting cost is one division and one root per contact: with AVX2 2.2 ns of a 2.5 GHz Xeon, at any width. AVX-512 is not
+//! faster, as it divides eight numbers in twice the time of four. Rows outside all caches take another 1.2 ns to fetch, so the
+//! search evaluates several states while a row is in the cache.
 
 use super::{Block, LANES, packed};
 use palpate_numerics::simd::{Kernel, Simd, run_loops};
 
-/// The contacts of a layout, and what one sensor more tells of them.
+/// Contacts of a layout, and the sensitivity of one more sensor to them.
 #[derive(Clone, Copy)]
 pub(super) struct Contacts<'a> {
     /// [entry of the covariance's lower triangle][block of contacts]
@@ -23,7 +23,7 @@ pub(super) struct Contacts<'a> {
     pub weights: &'a [Block],
 }
 
-/// Folds each contact's variance of the position, and the factor by which a sensor shrinks det C there, into sums.
+/// Folds two values of each contact into sums: its variance of the position, and the factor by which a sensor shrinks det C.
 pub(super) fn folded<const P: usize, const FIRST: usize, S: Sums>(contacts: Contacts, sums: &S) -> [f64; 2] {
     run_loops(Fold::<P, FIRST, S> { contacts, sums })
 }
@@ -82,7 +82,7 @@ fn sum_up<const P: usize, const FIRST: usize, S: Sums>(contacts: Contacts, sums:
     [S::join(&first), second.iter().sum()]
 }
 
-/// Terms of two sums, block by block. The second sum is the mean standard deviation, where ties are to be broken.
+/// Terms of two sums, block by block. The second sum is the mean standard deviation if ties are to be broken.
 pub(super) trait Sums {
     fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, shrink: &Block);
 
@@ -95,7 +95,7 @@ pub(super) trait Sums {
 pub(super) struct Mean;
 /// The largest variance.
 pub(super) struct Worst;
-/// The share of contacts whose variance is above this one.
+/// The share of contacts with a variance above this one.
 pub(super) struct Without(pub f64);
 /// The mean of −½·ln of the factors by which det C shrinks.
 pub(super) struct Shrinking;

@@ -30,7 +30,7 @@ fn estimators_that_are_not_done_in_time_are_stopped_and_left_out() {
     let limit = TimeLimit { clock: &clock, seconds: 1.0 };
     let task = FitTask::new(&bench.setup, &recording).watch(Watch::new(&observe));
     let choice = choose(task, all_candidates(task), Some(limit)).unwrap();
-    // Fits that are done before they are watched at all need no stopping.
+    // Fits that finish before the first check of the watch are not stopped.
     assert!(choice.tried.iter().any(|tried| tried.name == "influence"), "{:?}", choice.tried);
     assert_eq!(choice.tried.len() + choice.left_out.len(), Estimator::contenders(&bench.setup).len());
     for kind in ["network", "network-lm", "gaussian-process"] {
@@ -42,7 +42,7 @@ fn estimators_that_are_not_done_in_time_are_stopped_and_left_out() {
 fn the_first_estimator_is_stopped_too_and_nothing_is_chosen() {
     let bench = paper(5e-6, 2);
     let recording = bench.simulate(0);
-    // Each look at the clock is a second.
+    // Each call of the clock is a second.
     let looks = AtomicUsize::new(0);
     let clock = || looks.fetch_add(1, Ordering::Relaxed) as f64;
     let limit = TimeLimit { clock: &clock, seconds: 2.0 };
@@ -54,7 +54,7 @@ fn the_first_estimator_is_stopped_too_and_nothing_is_chosen() {
         told.starts_with("no estimator was done within the 2 s") && told.contains("`influence` was stopped"),
         "{told}"
     );
-    // Whoever watches stops it for reasons of their own.
+    // The caller's watch stops it for other reasons.
     let stop = |_| false;
     let task = FitTask::new(&bench.setup, &recording).watch(Watch::new(&stop));
     let limit = TimeLimit { clock: &|| 0.0, seconds: 2.0 };

@@ -114,7 +114,7 @@ impl<E: Explain> Inversion<E> {
         Some(posterior)
     }
 
-    /// The posterior summed up around every minimum; `None` where it is no number.
+    /// The posterior summed up around every minimum; `None` where it is not a number.
     fn sum(&mut self) -> Option<Posterior> {
         let Self { reading, looks, minima } = self;
         let axes = reading.axes();

@@ -1,5 +1,5 @@
-//! Networks by Levenberg–Marquardt with Bayesian regularisation: the evidence sets the weight decay, and an ensemble with the curvature
-//! around each member says how sure the answer is.
+//! Networks by Levenberg–Marquardt with Bayesian regularisation: the evidence sets the weight decay. An ensemble, with the curvature
+//! around each member, gives the uncertainty of an estimate.
 
 mod training;
 
@@ -23,7 +23,7 @@ use training::{Training, jacobians};
 
 /// An ensemble of networks with tanh hidden layers and linear outputs, trained by Levenberg–Marquardt with Bayesian regularisation.
 ///
-/// Outputs are the position and, where the bench does not know the force but every row of the recording does, the force.
+/// Outputs are the position and, where the bench's force is unknown but every row of the recording has one, the force.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, network::LevenbergMarquardt};
@@ -40,7 +40,7 @@ use training::{Training, jacobians};
 pub struct LevenbergMarquardt {
     /// Nodes of each hidden layer, input side first; at least 1 each.
     pub hidden: Vec<usize>,
-    /// Networks in the ensemble, at least 1: those with the greatest evidence of twice as many that are trained.
+    /// Networks in the ensemble, at least 1. Twice as many are trained, and those with the greatest evidence are kept.
     pub ensemble: usize,
     /// Each training is capped after this many iterations.
     pub max_iterations: u32,
@@ -53,31 +53,31 @@ impl Default for LevenbergMarquardt {
 }
 
 /// A network learns from at most this many presses, drawn at random, each of an ensemble from others (Bühlmann and Yu,
-/// *Analyzing bagging*, Annals of Statistics 30, 2002): a step costs presses × weights², and what more presses tell goes into the
+/// *Analyzing bagging*, Annals of Statistics 30, 2002). A step costs presses × weights², so that the information of more presses goes into the
 /// ensemble.
 pub(crate) const MOST_PRESSES: usize = 1000;
 
 /// A recording that the networks cannot be fitted to.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LevenbergMarquardtFitError {
-    /// One position has nothing to teach.
+    /// Too few positions to learn from.
     #[error(transparent)]
     Positions(#[from] TooFewPositions),
-    /// A layer or an ensemble of nothing.
+    /// A layer or an ensemble of size 0.
     #[error("a network with {what} 0 cannot be trained; it must be at least 1")]
     Zero {
         /// Name of the number that is 0.
         what: &'static str,
     },
-    /// Readings that never change.
+    /// Constant readings.
     #[error(transparent)]
     Features(#[from] NoFeatures),
     /// Readings that differ by no more than noise.
     #[error(
-        "the recording's readings do not differ by more than noise; a network has nothing to tell positions by"
+        "the recording's readings do not differ by more than noise; a network cannot distinguish positions by them"
     )]
     Alike,
-    /// No training kept to the numbers.
+    /// Every training diverged to numbers that are not finite.
     #[error("none of {trainings} trainings gave a network with finite weights")]
     Diverged {
         /// Number of trainings that were tried.
@@ -138,7 +138,7 @@ impl Fit for LevenbergMarquardt {
 }
 
 impl LevenbergMarquardt {
-    /// Trains twice the ensemble and keeps the half with the greatest evidence: a poor local minimum has little.
+    /// Trains twice the ensemble and keeps the half with the greatest evidence: a poor local minimum has little evidence.
     fn ensemble(
         &self,
         training: &Training,
@@ -160,13 +160,13 @@ impl LevenbergMarquardt {
     }
 }
 
-/// Inputs and outputs of the networks for a recording; `None` where it has nothing to tell positions by.
+/// Inputs and outputs of the networks for a recording; `None` for one without inputs for positions.
 pub(crate) fn network_size(setup: &Setup, recording: &Recording) -> Option<[usize; 2]> {
     let inputs = NetworkInputs::fit(setup, recording).ok()?;
     Some([inputs.axes.len(), outputs(setup, recording).len()])
 }
 
-/// The outputs of all rows: x, y where the surface has one, and the force where it is not known and the presses have several.
+/// The outputs of all rows: x, y where the surface has one, and the force where it is unknown and the presses have several forces.
 fn outputs(setup: &Setup, recording: &Recording) -> Vec<Vec<f64>> {
     let column = |of: fn(&Row) -> f64| recording.rows.iter().map(of).collect();
     let mut outputs = vec![column(|row| row.position.x_m)];
@@ -183,11 +183,11 @@ fn outputs(setup: &Setup, recording: &Recording) -> Vec<Vec<f64>> {
 /// Whitened inputs: the reading's load-invariant [`Features`] along their principal axes, each with mean 0 and variance 1 over the
 /// training recording.
 ///
-/// They are load-invariant even where the force is known: near a support the readings themselves shrink to nothing, while their
-/// direction still tells one end from the other.
+/// They are load-invariant even where the force is known: near a support the readings themselves shrink to 0, while their
+/// direction still distinguishes one end from the other.
 ///
-/// Axes along which the recording has no more than noise are left out: where the layout says how noisy its channels are,
-/// those with a variance below four times that of the noise; else those below 10⁻⁸ of the largest.
+/// Axes along which the recording has no more than noise are left out. Where the layout gives the noise of its channels, these are
+/// the axes with a variance below four times that of the noise; else those below 10⁻⁸ of the largest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NetworkInputs {
@@ -198,12 +198,12 @@ pub struct NetworkInputs {
 }
 
 impl NetworkInputs {
-    /// The inputs for a recording; none where its readings differ by no more than noise.
+    /// The inputs for a recording; an error where its readings differ by no more than noise.
     fn fit(setup: &Setup, recording: &Recording) -> Result<Self, NoFeatures> {
         let features = Features::fit(FeatureKind::load_invariant(setup, recording), recording)?;
         let mut inputs = Self { features, axes: Vec::new() };
         let noise = inputs.feature_noise(setup.layout(), recording);
-        // In units of the noise, where that is known, all that is not signal has variance 1 along every axis.
+        // In units of the noise, where that is known, the noise has variance 1 along every axis.
         let unit = noise.clone().unwrap_or_else(|| Array1::ones(inputs.features.len()));
         let mut covariance = Array2::zeros((unit.len(), unit.len()));
         for row in &recording.rows {
@@ -219,7 +219,7 @@ impl NetworkInputs {
         Ok(inputs)
     }
 
-    /// Standard deviation of every feature's noise, where the layout says how noisy its channels are; to first order at
+    /// Standard deviation of every feature's noise, where the layout gives the noise of its channels; to first order at
     /// the mean norm: that of r/|r| is σ/|r|, that of ln |r| at most as large.
     fn feature_noise(&self, layout: &Layout, recording: &Recording) -> Option<Array1<f64>> {
         let Features { channels, features, .. } = &self.features;
@@ -255,15 +255,15 @@ impl NetworkInputs {
 
 /// Networks that locate; see [`LevenbergMarquardt`].
 ///
-/// The estimate is the mean of the members. Its covariance is that of the mixture: the spread of the members, and the mean over
-/// them of g·A⁻¹·gᵀ, by which the weights are unsure (g an output's derivatives by the weights, A the curvature), and of
+/// The estimate is the mean of the members. Its covariance is that of the mixture: the covariance between members; the mean over
+/// them of g·A⁻¹·gᵀ, the uncertainty of the weights (g an output's derivatives by the weights, A the curvature); and
 /// the noise 1/β that training left. The 95 % interval is the mean ± 1.96 standard deviations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LevenbergMarquardtLocator {
     /// The surface.
     pub extent: Extent,
-    /// The contact's force in newtons, where the bench knows it.
+    /// The contact's force in newtons, where it is known.
     pub force_n: Option<f64>,
     /// From a reading to inputs.
     pub inputs: NetworkInputs,
@@ -292,7 +292,7 @@ impl OutputScale {
     }
 }
 
-/// One network, with the curvature and noise that its uncertainty is made of.
+/// One network, with the curvature and noise for its uncertainty.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Member {
@@ -363,7 +363,7 @@ impl LevenbergMarquardtLocator {
         (self.scales.len() > self.extent.dimensions()).then(|| self.scales.len() - 1)
     }
 
-    /// True where its estimates have a force: one that is known, or an output.
+    /// True where its estimates have a force: a known one, or an output.
     pub fn tells_force(&self) -> bool {
         self.force_n.is_some() || self.force_output().is_some()
     }

@@ -1,6 +1,6 @@
-//! Levenberg–Marquardt: Gauss–Newton steps, damped as far as they must be (Levenberg 1944; Marquardt 1963; Hagan and Menhaj 1994), with
-//! weight decay and noise by the evidence framework (D. J. C. MacKay, Neural Computation 4 (1992), 448; with the Gauss–Newton curvature
-//! of F. D. Foresee and M. T. Hagan, ICNN 1997).
+//! Levenberg–Marquardt: Gauss–Newton steps with as much damping as they need (Levenberg 1944; Marquardt 1963; Hagan and Menhaj 1994), with weight
+//! decay and noise by the evidence framework (D. J. C. MacKay, Neural Computation 4 (1992), 448; with the Gauss–Newton curvature of F. D. Foresee and
+//! M. T. Hagan, ICNN 1997).
 //!
 //! Symbols: w the P weights, e_k the errors of output k over N rows and J_k their Jacobian; α weight decay, β_k one over
 //! the variance of output k's noise; A = Σ β_k·J_kᵀJ_k + α·1 the curvature; γ_k effective parameters.
@@ -41,7 +41,7 @@ struct Linearisation {
     products: Vec<Array2<f64>>,
 }
 
-/// Damping beyond which no step goes down any more.
+/// Damping beyond which no step lowers the objective any more.
 const MOST_DAMPING: f64 = 1e12;
 
 /// Steps between two updates of the hyperparameters, which cost more than a step.
@@ -51,7 +51,7 @@ const STEPS_A_UPDATE: u32 = 3;
 const SETTLED: f64 = 0.01;
 
 impl Training<'_> {
-    /// The same of at most `most` presses, drawn at random.
+    /// The training of at most `most` presses, drawn at random.
     pub(super) fn subsampled(&self, most: usize, seed: u64) -> Self {
         let mut rows = random_order(self.inputs.nrows(), seed);
         rows.truncate(most);
@@ -63,10 +63,10 @@ impl Training<'_> {
         }
     }
 
-    /// Trains from the weights of a seed; `None` when the weights leave the numbers.
+    /// Trains from the weights of a seed; `None` when a weight is not finite any more.
     pub(super) fn run(&self, seed: u64, watch: Watch) -> Result<Option<Member>, Cancelled> {
         let mut weights = self.initial_weights(seed);
-        // Starting from little noise: where rows are few, "all is noise" is a maximum of the evidence too.
+        // Starting from little noise: with few rows, noise alone is another maximum of the evidence.
         let mut hyper = Hyperparameters { alpha: 0.01, betas: vec![1e4; self.topology.outputs()] };
         let (mut mu, mut iterations, mut calm) = (1.0, 0, 0);
         let mut here = self.linearise(&weights);
@@ -115,7 +115,7 @@ impl Training<'_> {
         Linearisation { errors: &self.targets - &outputs, jacobians, products }
     }
 
-    /// w ← w + (A + μ·1)⁻¹·(Σ β_k·J_kᵀe_k − α·w), with μ grown until the objective falls; whether it could be.
+    /// w ← w + (A + μ·1)⁻¹·(Σ β_k·J_kᵀe_k − α·w), with μ raised until the objective falls; false where it cannot fall.
     fn step(
         &self,
         weights: &mut Array1<f64>,
@@ -179,7 +179,7 @@ pub(super) struct Hyperparameters {
     pub(super) betas: Vec<f64>,
 }
 
-/// Targets have variance 1; noise below this standard deviation is none.
+/// Targets have variance 1; noise below this standard deviation counts as 0.
 const LEAST_NOISE: f64 = 1e-7;
 
 impl Hyperparameters {
@@ -217,7 +217,7 @@ impl Hyperparameters {
         let rows = rows as f64;
         self.alpha = (gammas.iter().sum::<f64>() / squared_weights).clamp(1e-8, 1e8);
         for ((beta, gamma), error) in self.betas.iter_mut().zip(gammas).zip(squared_errors) {
-            // A network that could take every row by heart leaves no rows to see noise in: it is granted one in a hundred.
+            // A network that can fit every row exactly leaves no degrees of freedom for the noise; it keeps at least 1 % of the rows.
             let free = (rows - gamma).max(0.01 * rows);
             *beta = (free / error).min(LEAST_NOISE.powi(-2));
         }

@@ -1,16 +1,16 @@
 //! A fresh presentation order for every lane and epoch, without branches.
 //!
-//! A uniform permutation of n patterns is had by sorting n random keys. The keys carry their pattern's number in their
-//! low bits, and a sorting network sorts all lanes at once: minimum and maximum are single instructions, where
-//! Fisher and Yates' exchanges would need a scattered store a lane and presentation. With n = 30 the 27 random bits of
-//! two keys coincide once in 300,000 epochs; then the lower number goes first, a bias far below what matters.
+//! A uniform permutation of n patterns results from sorting n random keys. The keys have their pattern's number in their low bits, and a sorting
+//! network sorts all lanes at once: minimum and maximum are single instructions, where Fisher and Yates' exchanges would need a scattered store a
+//! lane and presentation. With n = 30 the 27 random bits of two keys coincide once in 300,000 epochs; then the lower number goes first, a negligible
+//! bias.
 //!
-//! Beyond [`MOST_SORTED`] patterns the keys have too few random bits left, and the network's exchanges fill more memory than the patterns:
-//! there Fisher and Yates' exchanges (Knuth, TAOCP vol. 2, 3.4.2, algorithm P) draw the order.
+//! Beyond [`MOST_SORTED`] patterns the keys have too few random bits, and the network's exchanges need more memory than the patterns. There Fisher
+//! and Yates' exchanges (Knuth, TAOCP vol. 2, 3.4.2, algorithm P) draw the order.
 
 use palpate_numerics::simd::LOOK_UP;
 
-/// Patterns up to which random keys are sorted: as many bits of a key are random as number its pattern.
+/// Patterns up to which random keys are sorted: up to here a key has at least as many random bits as bits for the pattern's number.
 const MOST_SORTED: usize = 1 << 16;
 
 /// The generator xoshiro128++ 1.0 (Blackman and Vigna, ACM TOMS 47, 2021), N streams side by side.
@@ -27,7 +27,7 @@ impl<const N: usize> Streams<N> {
         streams
     }
 
-    /// Puts a stream of its own into one lane.
+    /// Puts a stream into one lane.
     pub(super) fn set(&mut self, lane: usize, stream: &Streams<1>) {
         for (words, word) in self.0.iter_mut().zip(&stream.0) {
             words[lane] = word[0];
@@ -98,7 +98,7 @@ fn exchanges(n: usize) -> Vec<(u32, u32)> {
     list
 }
 
-/// The length of a column that holds a number of each pattern: a power of two, and no less than vectors look up.
+/// The length of a column with a number for each pattern: a power of two, and at least the length that vectors look up.
 pub(super) fn column_len(patterns: usize) -> usize {
     patterns.next_power_of_two().max(LOOK_UP)
 }
@@ -111,7 +111,7 @@ pub(super) struct OrderDrawer {
     method: Method,
 }
 
-/// Way to a random permutation.
+/// Method of drawing a random permutation.
 enum Method {
     /// By sorting random keys with a network of these exchanges.
     Sort(Vec<(u32, u32)>),
@@ -125,8 +125,8 @@ impl OrderDrawer {
         Self { patterns, mask: column_len(patterns) as u32 - 1, method }
     }
 
-    /// Fills `order` (one row a presentation, one column a lane) with a fresh permutation a lane. The pattern's number
-    /// is a pick's low bits, which is what the patterns are looked up by; the bits above it are left as they were drawn.
+    /// Fills `order` (one row a presentation, one column a lane) with a fresh permutation a lane. The low bits of a pick are the pattern's number, by
+    /// which patterns are looked up; the bits above it stay as they were drawn.
     #[inline(always)]
     pub(super) fn draw<const N: usize>(&self, streams: &mut Streams<N>, order: &mut [[u32; N]]) {
         let Method::Sort(exchanges) = &self.method else { return shuffle(streams, order) };
@@ -149,7 +149,7 @@ impl OrderDrawer {
         }
     }
 
-    /// The same for one stream, its keys sorted by an ordinary sort.
+    /// [`OrderDrawer::draw`] for one stream, with its keys sorted by an ordinary sort.
     pub(super) fn draw_one(&self, stream: &mut Streams<1>, order: &mut [u32]) {
         if matches!(self.method, Method::Shuffle) {
             return shuffle(stream, order.as_chunks_mut().0);
@@ -168,7 +168,7 @@ impl OrderDrawer {
     }
 }
 
-/// Fisher and Yates' shuffle of every lane. A partner is the high word of a product, which prefers none by more than one part in 2³²/n.
+/// Fisher and Yates' shuffle of every lane. A partner is the high word of a product, with a bias of at most one part in 2³²/n.
 fn shuffle<const N: usize>(streams: &mut Streams<N>, order: &mut [[u32; N]]) {
     for (pattern, row) in order.iter_mut().enumerate() {
         *row = [pattern as u32; N];

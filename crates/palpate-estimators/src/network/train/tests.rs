@@ -25,7 +25,7 @@ impl Kernel for Twin<'_> {
     }
 }
 
-/// y = sin x on a few points: enough to train on, and no symmetry to hide a mix-up of inputs.
+/// y = sin x on a few points: enough to train on, and without a symmetry that would hide exchanged inputs.
 fn patterns(count: usize, inputs: usize, outputs: usize) -> TrainingSet {
     let value = |k: usize| 0.5 + 0.4 * (1.0 + k as f64 * 0.7).sin();
     TrainingSet {

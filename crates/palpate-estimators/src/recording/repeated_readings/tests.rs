@@ -23,7 +23,7 @@ struct Logger {
 const FINE: Logger = Logger { step: 1e-3, noise: 0.5, runs: [[1, 1]; 4], contacts: 16, rows_per_contact: 12 };
 
 impl Logger {
-    /// Contacts 5 mm apart, untouched at every fourth; channels that differ in sensitivity.
+    /// Contacts 5 mm apart, every fourth one untouched; channels that differ in sensitivity.
     fn record(&self, seed: u64) -> Recording {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let shift: f64 = rng.random();

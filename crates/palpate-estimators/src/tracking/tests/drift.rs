@@ -1,4 +1,4 @@
-//! A finger of steel under strain gauges whose offsets drift: a random walk on a ramp.
+//! A finger of steel under strain gauges with drifting offsets: a random walk on a ramp.
 
 use super::*;
 use palpate_mechanics::sensing::SensorKind::Strain;
@@ -16,7 +16,7 @@ const PRESSED_N: f64 = 5.0;
 const NOISE: f64 = 1e-6;
 const EVERY_S: f64 = 0.02;
 
-/// Cantilever with five gauges from 10 mm on, of which the clamp's side of the first sees no contact.
+/// Cantilever with five gauges from 10 mm on; a contact between the clamp and the first gauge strains none of them.
 fn finger() -> Setup {
     let spec = SupportedBeamSpec {
         length_m: LENGTH_M,
@@ -39,7 +39,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Offsets that walk by so many standard deviations of the noise in a second, and ramp by up to a tenth of that.
+    /// Offsets with a walk of so many standard deviations of the noise in a second, and a ramp of up to a tenth of that.
     fn new(walk: f64, seed: u64) -> Self {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let ramps = (0..5).map(|_| 0.1 * walk * NOISE * rng.random_range(-1.0..1.0)).collect();
@@ -76,7 +76,7 @@ impl Bench {
                 let before = self.offsets.clone();
                 let mut reading = self.reading(contact, 5.0);
                 if contact.is_some() {
-                    // Pressed at once after the untouched row, by which it is tared.
+                    // Pressed immediately after the untouched row that tares it.
                     reading.iter_mut().zip(&self.offsets).zip(before).for_each(|((value, now), before)| {
                         *value -= now - before;
                     });
@@ -145,7 +145,7 @@ fn a_drifting_finger_is_touched_only_when_something_touches() {
         }
         let errors = TrackErrors::new(&smoothed, &truths, Extent::line(LENGTH_M).unwrap()).unwrap();
         assert!(errors.tracked * 100 >= errors.readings * 99, "walk {walk}: {errors:?}");
-        // A drift in the course of a touch passes for a motion, and no smoother takes it off.
+        // A drift during a touch looks like a motion, and a smoother cannot subtract it.
         let least_ratio = if walk < 0.5 { 2.0 } else { 1.2 };
         eprintln!("walk {walk}: {errors:?}");
         assert!(errors.ratio() > least_ratio, "walk {walk}: {errors:?}");

@@ -50,7 +50,7 @@ fn a_contact_on_a_plane_that_lets_go_is_lost_and_found_again() {
     let motion = over_the_plate().with_speed(1.0).unwrap().with_passes(2).unwrap();
     let motion = motion.with_lifts(0.2, 0.02).unwrap();
     let wrong = wrongly_touching(likelihood(&rig, None), &readings(&rig, motion, 3));
-    // Only while the force is too small to be told from noise.
+    // Only while the force is too small to be distinguished from noise.
     assert!(wrong <= 15, "{wrong}");
 }
 
@@ -73,7 +73,7 @@ fn what_calibration_leaves_falls_with_its_repeats() {
     let left_m2 = |repeats: usize| {
         let mut rig = rig.clone();
         rig.training.repeats = repeats;
-        // Mechanics that is right leaves nothing uncertain; a recording alone does.
+        // Exact mechanics leaves no uncertainty; a recording alone does.
         let likelihood = likelihood_from(InfluenceSource::Recording, &rig, Some(5.0));
         let [first, second] = likelihood.calibration_variance(&[contact]);
         let [xx, xy, yy] = first.position_m2;

@@ -1,4 +1,4 @@
-//! The link of a simulated board: where its frames go, and where lines that move its finger come from.
+//! The link of a simulated board: takes its frames, and brings lines that move its finger.
 
 #[cfg(unix)]
 mod pty;
@@ -10,30 +10,30 @@ use std::net::{TcpListener, TcpStream, ToSocketAddrs, UdpSocket};
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Most bytes that wait for a slow reader: those of frames beyond are lost, as they are in a board's buffer.
+/// Most bytes that wait for a slow reader. Further frames are lost, as in the buffer of a board.
 const MOST_WAITING: usize = 1 << 16;
 /// Longest line that moves the finger.
 const LONGEST: usize = 1 << 10;
 
-/// Plug of a simulated board.
+/// URL of the link of a simulated board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LinkUrl {
     /// `-`: the standard output.
     Stdout,
-    /// `pty`, or `pty:PATH` with a symbolic link there that leads to it: a pseudo-terminal, as a serial port.
+    /// `pty`, or `pty:PATH` with a symbolic link to it at this path: a pseudo-terminal, which acts as a serial port.
     Pty(Option<PathBuf>),
     /// `tcp://:port`: one client at a time.
     Tcp(String),
-    /// `udp://host:port`: a datagram a frame.
+    /// `udp://host:port`: one datagram per frame.
     Udp(String),
-    /// `mqtt://host/topic`: a message a frame.
+    /// `mqtt://host/topic`: one message per frame.
     Mqtt(crate::sink::MqttUrl),
 }
 
-/// Text that is no link.
+/// Text that is not a link.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{text}` is no place for a board; places are `pty`, `pty:PATH`, `tcp://:7000`, `udp://host:7000`, `mqtt://host/topic` and `-`"
+    "`{text}` is not a place for a board; places are `pty`, `pty:PATH`, `tcp://:7000`, `udp://host:7000`, `mqtt://host/topic` and `-`"
 )]
 pub struct LinkUrlError {
     /// The text.
@@ -46,7 +46,7 @@ pub struct LinkUrlError {
 pub struct LinkError {
     /// The link.
     pub url: LinkUrl,
-    /// Why.
+    /// Cause.
     pub error: std::io::Error,
 }
 
@@ -56,7 +56,7 @@ pub struct Link {
     name: String,
     waiting: Vec<u8>,
     received: Vec<u8>,
-    /// Frames for which nobody was there, or that nobody read.
+    /// Frames that were lost because the link had no reader, or the reader was too slow.
     pub unread: u64,
 }
 
@@ -118,18 +118,18 @@ impl Link {
     /// Opens a link.
     ///
     /// # Errors
-    /// [`LinkError`] where the system does not give it.
+    /// [`LinkError`] if the system refuses the link.
     pub fn open(url: &LinkUrl) -> Result<Self, LinkError> {
         let (way, name) = open(url).map_err(|error| LinkError { url: url.clone(), error })?;
         Ok(Self { way, name, waiting: Vec::new(), received: Vec::new(), unread: 0 })
     }
 
-    /// Name to whoever connects: the path of a pseudo-terminal, the address of a socket.
+    /// Name for clients: the path of a pseudo-terminal, the address of a socket.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The next message, in words, that a broker was lost or is there again; none of any other end.
+    /// The next message that a broker was lost or is there again; `None` for other links.
     pub fn news(&self) -> Option<String> {
         match &self.way {
             Way::Mqtt(publisher) => publisher.news(),
@@ -137,10 +137,10 @@ impl Link {
         }
     }
 
-    /// Sends a frame, without waiting for anybody.
+    /// Sends a frame without waiting for the reader.
     ///
     /// # Errors
-    /// The link is of no use any more, as stdout whose reader has gone.
+    /// The link has failed, as stdout does once its reader has gone.
     pub fn send(&mut self, frame: &[u8]) -> std::io::Result<()> {
         match &mut self.way {
             Way::Stdout(out) => {
@@ -174,7 +174,7 @@ impl Link {
         Ok(())
     }
 
-    /// Hands on what waits, as far as it is taken now.
+    /// Writes as many of the waiting bytes as the other end takes now.
     fn push(&mut self) {
         while !self.waiting.is_empty() {
             let written = match &mut self.way {
@@ -200,10 +200,11 @@ impl Link {
         }
     }
 
-    /// Goes away, as a board whose cable is pulled: a client is hung up, a pseudo-terminal closed and another opened. Datagrams and messages know no connection.
+    /// Disconnects, as if the cable of the board were pulled: hangs up a TCP client, or closes a pseudo-terminal and opens another. Other links have no
+    /// connection.
     ///
     /// # Errors
-    /// No other pseudo-terminal.
+    /// The system gives no other pseudo-terminal.
     pub fn disconnect(&mut self) -> std::io::Result<()> {
         self.drop_client();
         #[cfg(unix)]
@@ -214,10 +215,10 @@ impl Link {
         Ok(())
     }
 
-    /// The bytes that came from the other end; `None` where nobody is there.
+    /// The bytes from the other end; `None` without a client.
     ///
     /// # Errors
-    /// A client that cannot be taken.
+    /// A client that cannot be accepted.
     pub fn bytes(&mut self) -> std::io::Result<Option<Vec<u8>>> {
         if let Way::Tcp { listener, client } = &mut self.way {
             accept(listener, client)?;
@@ -227,7 +228,7 @@ impl Link {
         Ok(is_there.then(|| std::mem::take(&mut self.received)))
     }
 
-    /// The whole lines that came from the other end.
+    /// The whole lines from the other end.
     pub fn lines(&mut self) -> Vec<String> {
         self.receive();
         let Some(end) = self.received.iter().rposition(|byte| *byte == b'\n') else { return Vec::new() };
@@ -261,7 +262,7 @@ impl Link {
     }
 }
 
-/// Takes the next client, where there is none.
+/// Accepts the next client, unless one is connected.
 fn accept(listener: &TcpListener, client: &mut Option<TcpStream>) -> std::io::Result<()> {
     if client.is_none()
         && let Ok((stream, _)) = listener.accept()
@@ -283,7 +284,7 @@ fn open(url: &LinkUrl) -> std::io::Result<(Way, String)> {
             Ok((Way::Pty(pty), name))
         }
         #[cfg(not(unix))]
-        LinkUrl::Pty(_) => Err(std::io::Error::other("there are no pseudo-terminals here; use tcp")),
+        LinkUrl::Pty(_) => Err(std::io::Error::other("pseudo-terminals are not available here; use tcp")),
         LinkUrl::Tcp(address) => {
             let listener = TcpListener::bind(address)?;
             listener.set_nonblocking(true)?;

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 pub struct Pty {
     /// The board's end, which does not block.
     pub master: File,
-    /// The other end, held so that the pair outlives those who open it.
+    /// The other end, kept open so that the pair outlives its readers.
     slave: OwnedFd,
     link: Option<PathBuf>,
 }
@@ -25,14 +25,14 @@ impl Pty {
         Ok(own)
     }
 
-    /// Hangs up whoever has it open, and goes on with another.
+    /// Replaces the pair, which hangs up the readers of the old one.
     pub fn reopen(&mut self) -> std::io::Result<()> {
         let (master, slave) = pair()?;
         (self.master, self.slave) = (master, slave);
         self.lead_here()
     }
 
-    /// The path by which the other end is opened.
+    /// Path of the other end.
     pub fn name(&self) -> String {
         match &self.link {
             Some(link) => link.display().to_string(),
@@ -40,7 +40,7 @@ impl Pty {
         }
     }
 
-    /// Makes the link lead to it; nothing but a link is replaced.
+    /// Makes the symbolic link lead to the other end. Replaces an existing link, but no other file.
     fn lead_here(&self) -> std::io::Result<()> {
         let Some(link) = &self.link else { return Ok(()) };
         if is_link(link) {

@@ -1,4 +1,4 @@
-//! Foxglove's WebSocket: readings, estimates and events as in a recording, and the contact on its surface for the 3D panel.
+//! WebSocket server for Foxglove: readings, estimates and events as in a recording, and the contact on its surface for the 3D panel.
 
 mod scene;
 
@@ -24,11 +24,11 @@ use std::sync::Arc;
 /// Topic of the contact on its surface.
 pub const CONTACT: &str = "/contact";
 
-/// A server to which Foxglove's app connects. It only sends: nothing that a client does reaches the session.
+/// A server for Foxglove's app. It only sends: clients cannot affect the session.
 pub struct FoxgloveServer {
     context: Arc<Context>,
     address: SocketAddr,
-    /// `None` once it is being stopped.
+    /// `None` once the server is being stopped.
     handle: Option<WebSocketServerHandle>,
 }
 
@@ -38,21 +38,21 @@ pub struct FoxgloveServer {
 pub struct FoxgloveServerError {
     /// The address.
     pub address: SocketAddr,
-    /// Why.
+    /// Cause.
     error: FoxgloveError,
 }
 
 impl FoxgloveServer {
-    /// A server at an address; port 0 takes one that is free. Its topics are there once a session has a sink of it.
+    /// Starts a server at an address; port 0 selects a free port. The topics exist once a session has a sink of this server.
     ///
     /// # Errors
-    /// [`FoxgloveServerError`] where the address is taken, or is not one of this machine.
+    /// [`FoxgloveServerError`] for an address that is in use, or is not one of this machine.
     ///
     /// # Panics
-    /// In an asynchronous context: it has a runtime of its own.
+    /// In an asynchronous context, because the server has its own runtime.
     pub fn start(address: SocketAddr) -> Result<Self, FoxgloveServerError> {
         let context = Context::new();
-        // As URLs write it: an address of IPv6 has brackets.
+        // In URLs an IPv6 address is in brackets.
         let host = match address {
             SocketAddr::V4(address) => address.ip().to_string(),
             SocketAddr::V6(address) => format!("[{}]", address.ip()),
@@ -63,7 +63,7 @@ impl FoxgloveServer {
         Ok(Self { context, address, handle: Some(handle) })
     }
 
-    /// The address that it listens at.
+    /// The address at which the server listens.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
@@ -71,7 +71,7 @@ impl FoxgloveServer {
     /// A sink of samples of these channels. A client that reads too slowly loses the oldest of 1,024 messages.
     ///
     /// # Errors
-    /// None that is known: the library wants an encoding of every topic, and each has one.
+    /// A topic that the library refuses because it has no encoding. Every topic has one, so no error is expected.
     pub fn sink(&self, channels: &[Channel], extent: Extent) -> std::io::Result<FoxgloveSink> {
         let json = |topic, name: &str, schema: Vec<u8>| {
             ChannelBuilder::new(topic)
@@ -96,7 +96,7 @@ impl FoxgloveServer {
 impl Drop for FoxgloveServer {
     fn drop(&mut self) {
         let Some(handle) = self.handle.take() else { return };
-        // In a thread of its own, as waiting is refused in an asynchronous context, which may be where this is dropped.
+        // The wait is in a separate thread, because it is refused in an asynchronous context, and the server may be dropped in one.
         let wait = move || handle.stop().wait_blocking();
         if let Ok(thread) = std::thread::Builder::new().name("foxglove-end".to_owned()).spawn(wait) {
             let _ = thread.join();
@@ -104,7 +104,7 @@ impl Drop for FoxgloveServer {
     }
 }
 
-/// Schema of readings that names every channel, so that the app offers each for a plot.
+/// Schema of readings with the names of all channels, so the app offers each of them for a plot.
 fn reading_schema(channels: &[Channel]) -> Vec<u8> {
     let values: Map<String, Value> =
         channels.iter().map(|channel| (channel.name.clone(), json!({ "type": "number" }))).collect();
@@ -157,7 +157,7 @@ impl Sink for FoxgloveSink {
     }
 }
 
-/// Sends a record to those who have subscribed to its topic; where nobody has, it is not made.
+/// Sends a record to the subscribers of its topic. Without subscribers the record is not made.
 fn log<T: Serialize>(topic: &RawChannel, at_ns: u64, record: impl FnOnce() -> T) {
     if !topic.has_sinks() {
         return;

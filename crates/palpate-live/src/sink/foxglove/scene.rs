@@ -1,4 +1,4 @@
-//! The contact on its surface, as Foxglove's 3D panel draws it: in metres in the frame `surface`, x along, y across, z out of the surface.
+//! The contact on its surface for Foxglove's 3D panel: in metres in the frame `surface`, x along, y across, z out of the surface.
 
 use foxglove::messages::scene_entity_deletion::Type;
 use foxglove::messages::{
@@ -16,11 +16,11 @@ const GREY: Color = Color { r: 0.6, g: 0.6, b: 0.65, a: 0.6 };
 const LOCATED: Color = Color { r: 0.1, g: 0.65, b: 0.3, a: 1.0 };
 const DOUBTED: Color = Color { r: 0.95, g: 0.6, b: 0.1, a: 1.0 };
 
-/// What is drawn of a surface.
+/// Drawing of a surface.
 pub struct Scene {
-    /// Length, width and thickness of the slab that stands for the surface; the width of a line and all thicknesses are such that they can be seen.
+    /// Length, width and thickness of the slab that represents the surface. The width of a line and all thicknesses are chosen to be visible.
     size_m: [f64; 3],
-    /// Of the slab's lower edge: a line has its axis at 0.
+    /// y of the lower edge of the slab. The axis of a line is at 0.
     edge_y_m: f64,
 }
 
@@ -34,8 +34,8 @@ impl Scene {
         Self { size_m: [length_m, width_m, 0.01 * length_m.max(width_m)], edge_y_m }
     }
 
-    /// The surface, which whoever comes later knows so too, and the contact, an arrow whose tip is at its place: green, or amber where other places
-    /// explain the reading as well, or none does.
+    /// Update with the surface, repeated for later subscribers, and the contact as an arrow with the tip at its place. The arrow is green for a located
+    /// contact. It is amber if other places explain the reading as well, or no place explains it.
     pub fn update(&self, estimate: &Estimate, unix_ns: u64) -> SceneUpdate {
         let color = match estimate.status {
             Status::NoContact => None,
@@ -73,7 +73,7 @@ impl Scene {
 
     fn arrow(&self, Position { x_m, y_m }: Position, color: Color) -> ArrowPrimitive {
         let length_m = 0.2 * self.size_m[0].max(self.size_m[1]);
-        // An arrow points along x; a quarter turn about y points it along −z.
+        // Arrows point along x; a quarter turn about y makes this one point along −z.
         let down = Quaternion { x: 0.0, y: FRAC_1_SQRT_2, z: 0.0, w: FRAC_1_SQRT_2 };
         ArrowPrimitive {
             pose: Some(pose([x_m, y_m, length_m], down)),

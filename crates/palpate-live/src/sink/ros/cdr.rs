@@ -1,4 +1,4 @@
-//! Messages of ROS 2 as bytes: Common Data Representation (CDR, OMG DDSI-RTPS 2.5, section 10), version 1, little-endian.
+//! ROS 2 messages as bytes: Common Data Representation (CDR, OMG DDSI-RTPS 2.5, section 10), version 1, little-endian.
 
 /// Encapsulation: plain CDR, little-endian, no options.
 const HEAD: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
@@ -38,14 +38,14 @@ impl Writer {
 
     /// `std_msgs/msg/Header`: seconds as i32, nanoseconds as u32, name of the frame.
     fn header(&mut self, unix_ns: u64, frame: &str) {
-        // Time of ROS ends in January 2038.
+        // The time of ROS ends in January 2038.
         let seconds = i32::try_from(unix_ns / 1_000_000_000).unwrap_or(i32::MAX);
         self.four(seconds.to_le_bytes());
         self.four(((unix_ns % 1_000_000_000) as u32).to_le_bytes());
         self.string(frame);
     }
 
-    /// Length with the zero at the end, text, zero.
+    /// Length including the final zero, text, zero.
     fn string(&mut self, text: &str) {
         self.four((text.len() as u32 + 1).to_le_bytes());
         self.bytes.extend(text.as_bytes());
@@ -62,7 +62,7 @@ impl Writer {
         self.bytes.extend(bytes);
     }
 
-    /// Zeros up to a multiple of `size` behind the encapsulation.
+    /// Appends zeros up to a multiple of `size` after the encapsulation.
     fn align(&mut self, size: usize) {
         let end = HEAD.len() + (self.bytes.len() - HEAD.len()).next_multiple_of(size);
         self.bytes.resize(end, 0);

@@ -1,4 +1,4 @@
-//! Keys, tokens and attachments by which nodes of `rmw_zenoh_cpp` find messages and take them (its docs/design.md).
+//! Keys, tokens and attachments by which nodes of `rmw_zenoh_cpp` find and receive messages (its docs/design.md).
 
 use super::url::RosUrl;
 
@@ -18,11 +18,11 @@ pub enum Topic {
 /// All topics, in the order of [`Topic`].
 pub const TOPICS: [Topic; 4] = [Topic::Contact, Topic::Wrench, Topic::Estimate, Topic::Event];
 
-/// Quality of service as a token tells it: that of ROS 2 where nothing is said (reliable, volatile, keep last), of depth 10.
+/// Quality of service in a token: the default of ROS 2 (reliable, volatile, keep last), with depth 10.
 const QUALITY: &str = "::,10:,:,:,,";
 
 impl Topic {
-    /// Name behind that of the session.
+    /// Name after that of the session.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Contact => "contact",
@@ -32,7 +32,7 @@ impl Topic {
         }
     }
 
-    /// Type of its messages, as ROS 2 names it.
+    /// ROS 2 type of the messages.
     pub const fn message_type(self) -> &'static str {
         match self {
             Self::Contact => "geometry_msgs/msg/PointStamped",
@@ -41,7 +41,7 @@ impl Topic {
         }
     }
 
-    /// Hash of the type's definition (REP 2016), which is part of the key: a node that knows the type by another definition gets nothing.
+    /// Hash of the definition of the type (REP 2016), which is part of the key: a node with another definition of the type receives no messages.
     pub const fn type_hash(self) -> &'static str {
         match self {
             Self::Contact => "RIHS01_4c0296af86e01e562e9e0405d138a01537247580076c58ea38d7923ac1045897",
@@ -52,7 +52,7 @@ impl Topic {
         }
     }
 
-    /// Type and hash as keys have them: `geometry_msgs::msg::dds_::PointStamped_/RIHS01_…`.
+    /// Type and hash in the form for keys: `geometry_msgs::msg::dds_::PointStamped_/RIHS01_…`.
     fn type_in_key(self) -> String {
         let (package, name) = self.message_type().rsplit_once('/').unwrap_or_default();
         format!("{}::dds_::{name}_/{}", package.replace('/', "::"), self.type_hash())
@@ -64,33 +64,33 @@ impl Topic {
 pub struct Keys<'a> {
     /// Domain, names and frame.
     pub url: &'a RosUrl,
-    /// Identity of the Zenoh session: in words, little-endian.
+    /// Identity of the Zenoh session: as text, and as little-endian bytes.
     pub session: (String, [u8; 16]),
 }
 
 impl Keys<'_> {
-    /// Key that a topic's messages are put at.
+    /// Key of the messages of a topic.
     pub fn data(&self, topic: Topic) -> String {
         let RosUrl { domain, name, .. } = self.url;
         format!("{domain}/{name}/{}/{}", topic.name(), topic.type_in_key())
     }
 
-    /// Token that tells the graph of ROS of the node.
+    /// Token that announces the node to the graph of ROS.
     pub fn node_token(&self) -> String {
         self.token("0/0/NN")
     }
 
-    /// Token that tells the graph of ROS of a topic's publisher.
+    /// Token that announces the publisher of a topic to the graph of ROS.
     pub fn publisher_token(&self, topic: Topic) -> String {
         let topic_name = format!("%{}%{}", self.url.name.replace('/', "%"), topic.name());
         let token = self.token(&format!("0/{}/MP", entity(topic)));
         format!("{token}/{topic_name}/{}/{QUALITY}", topic.type_in_key())
     }
 
-    /// What goes with every message: its number from 1, its time, and the identity of its publisher.
+    /// Attachment of a message: its number from 1, its time, and the identity of its publisher.
     pub fn attachment(&self, topic: Topic, number: i64, unix_ns: u64) -> [u8; 33] {
         let mut publisher = self.session.1;
-        // Identities of a session's publishers differ in the byte that is the last to be used of a shorter identity.
+        // The identities of a session's publishers differ in this byte, which a shorter identity uses last.
         publisher[15] ^= entity(topic);
         let mut bytes = [0; 33];
         bytes[..8].copy_from_slice(&number.to_le_bytes());
@@ -108,7 +108,7 @@ impl Keys<'_> {
     }
 }
 
-/// Number of a topic's publisher in its session; the node has 0.
+/// Number of the publisher of a topic in its session; the node has 0.
 const fn entity(topic: Topic) -> u8 {
     topic as u8 + 1
 }

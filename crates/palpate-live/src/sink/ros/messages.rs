@@ -1,7 +1,7 @@
-//! What a session publishes: which messages follow from a sample or an event.
+//! Messages that a session publishes for a sample or an event.
 //!
-//! Points and wrenches have no status, and whoever takes one acts on it. So they are published only of what is sure: a point and its wrench
-//! where a contact is located, a wrench of zero where nothing touches. What is ambiguous or outside the model is in `estimate` alone.
+//! Points and wrenches have no status, and their receivers act on them. They are therefore published only for reliable estimates: a point and its
+//! wrench for a located contact, a wrench of zero for an untouched surface. Ambiguous estimates, and those outside the model, are in `estimate` alone.
 
 use super::cdr;
 use super::keys::Topic;
@@ -17,7 +17,7 @@ use serde::Serialize;
 pub struct RosMessage {
     /// Topic.
     pub topic: Topic,
-    /// Nanoseconds since 1970-01-01 00:00 UTC: those of the reading, or of the event.
+    /// Time of the reading or the event, in ns since 1970-01-01 00:00 UTC.
     pub unix_ns: u64,
     /// The message in CDR, with its encapsulation.
     pub cdr: Vec<u8>,
@@ -25,8 +25,8 @@ pub struct RosMessage {
 
 /// Messages of an output, in the order of [`Topic`].
 ///
-/// The frame's origin is the left end of a line, on its axis, or the lower left corner of a plane; x goes along, y across to the left, z out of the
-/// surface. A contact that presses has a force along −z; the torque is about the origin.
+/// The origin of the frame is the left end of a line, on its axis, or the lower left corner of a plane. x points along, y across to the left, z out of
+/// the surface. The force of a pressing contact is along −z; the torque is about the origin.
 pub fn messages(output: &Output, frame: &str, channels: &[Channel], extent: Extent) -> Vec<RosMessage> {
     match output {
         Output::Sample(sample) => of_sample(sample, frame, &SampleRecord::new(sample, channels, extent)),
@@ -49,7 +49,7 @@ fn of_sample(sample: &Sample, frame: &str, record: &SampleRecord) -> Vec<RosMess
     all.into_iter().flatten().collect()
 }
 
-/// Force in N and torque about the origin in N·m of all contacts; `None` where they are not sure, or a force is not known.
+/// Force in N and torque about the origin in N·m of all contacts; `None` for a contact that is not located, or an unknown force.
 fn wrench(estimate: &Estimate) -> Option<([f64; 3], [f64; 3])> {
     match estimate.status {
         Status::NoContact => Some(([0.0; 3], [0.0; 3])),
@@ -71,7 +71,7 @@ fn wrench(estimate: &Estimate) -> Option<([f64; 3], [f64; 3])> {
 }
 
 fn text(topic: Topic, unix_ns: u64, record: &impl Serialize) -> Option<RosMessage> {
-    // Records have neither maps with keys that are no text, nor anything else that JSON refuses.
+    // Serialization cannot fail: records have no maps with keys other than text, and no other value that JSON refuses.
     let json = serde_json::to_string(record).ok()?;
     Some(RosMessage { topic, unix_ns, cdr: cdr::string(&json) })
 }

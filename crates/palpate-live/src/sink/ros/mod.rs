@@ -1,6 +1,6 @@
-//! ROS 2 through Zenoh: points, wrenches, estimates and events as messages that nodes of `rmw_zenoh_cpp` take, without an installation of ROS.
+//! ROS 2 through Zenoh: points, wrenches, estimates and events as messages for nodes of `rmw_zenoh_cpp`, without an installation of ROS.
 //!
-//! What is published, as which bytes and under which keys is plain code; only `RosSink`, of the feature `ros`, needs Zenoh.
+//! The messages, their bytes and their keys are made without Zenoh; only `RosSink`, of the feature `ros`, needs it.
 
 mod cdr;
 mod keys;

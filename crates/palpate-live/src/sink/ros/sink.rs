@@ -18,18 +18,18 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::CongestionControl;
 use zenoh::{Config, Session, Wait};
 
-/// Batches that wait for the router at most; those beyond are counted as lost.
+/// Most batches that wait for the router; further ones are counted as lost.
 const WAITING: usize = 1024;
-/// Time before it is tried again to reach a router.
+/// Time between two attempts to reach a router.
 const AGAIN_AFTER: Duration = Duration::from_millis(500);
-/// Time between two looks whether the router is there.
+/// Time between two checks that the router is available.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// Longest wait at the end for the router to hear of it.
+/// Longest wait at the end until the connection is closed.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Publishes points, wrenches, estimates and events to the nodes of ROS 2 behind a Zenoh router.
 ///
-/// While the router is away, samples and events are counted as lost; it is tried again until it is there.
+/// While the router is away, samples and events are counted as lost, and the sink tries to reach it again.
 pub struct RosSink {
     to: Option<SyncSender<Arc<Batch>>>,
     lost: Arc<AtomicU64>,
@@ -37,10 +37,10 @@ pub struct RosSink {
 }
 
 impl RosSink {
-    /// A node of ROS on a router, which need not be there yet; troubles are told to the session through `reports`.
+    /// A ROS node on a router, which may become available later. Problems are reported to the session through `reports`.
     ///
     /// # Errors
-    /// No thread for it.
+    /// The system gives no thread for the sink.
     pub fn new(
         url: &RosUrl,
         channels: &[Channel],
@@ -62,7 +62,7 @@ impl RosSink {
         Ok(Self { to: Some(to), lost, thread: Some(thread) })
     }
 
-    /// Samples and events that no router took.
+    /// Number of samples and events that were not published.
     pub fn lost(&self) -> u64 {
         self.lost.load(Ordering::Relaxed)
     }
@@ -85,7 +85,7 @@ impl Drop for RosSink {
         while !thread.is_finished() && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(5));
         }
-        // A thread that waits for a host that does not answer ends by itself, seconds later.
+        // A thread that waits for an unresponsive host ends by itself, seconds later.
         if thread.is_finished() {
             let _ = thread.join();
         }
@@ -98,7 +98,7 @@ struct Worker {
     extent: Extent,
     reports: SyncSender<Input>,
     lost: Arc<AtomicU64>,
-    /// Whether the router was there at the last look; `None` before the first.
+    /// True if the router was available at the last check; `None` before the first.
     was_there: Option<bool>,
 }
 
@@ -111,9 +111,9 @@ impl Worker {
         let url = self.url.clone();
         match Node::new(&session, &url) {
             Ok(mut node) => self.publish(batches, &session, &mut node),
-            Err(_) => self.report("refuses the topics; nothing is published"),
+            Err(_) => self.report("refuses the topics; messages are not published"),
         }
-        // Nodes of ROS hear at once that this one has gone.
+        // This informs other ROS nodes at once that this node has gone.
         let _ = session.close().wait();
     }
 
@@ -121,7 +121,7 @@ impl Worker {
     fn connect(&mut self, batches: &Receiver<Arc<Batch>>) -> Result<Session, Ended> {
         loop {
             let opened = config(&self.url.router).and_then(|config| zenoh::open(config).wait());
-            // What came meanwhile is of the past.
+            // Batches that arrived meanwhile are outdated.
             while let Ok(batch) = batches.try_recv() {
                 self.lose(&batch);
             }
@@ -170,7 +170,7 @@ impl Worker {
         self.lost.fetch_add(batch.outputs.len() as u64, Ordering::Relaxed);
     }
 
-    /// Tells where it has changed that the router is there.
+    /// Reports a change in the availability of the router.
     fn look(&mut self, is_there: bool) {
         match (self.was_there, is_there) {
             (Some(false), true) => self.report("is there again"),
@@ -186,7 +186,7 @@ impl Worker {
     }
 }
 
-/// A client of one router, which looks for no others.
+/// Configuration of a client of one router, without a search for others.
 fn config(router: &str) -> zenoh::Result<Config> {
     let mut config = Config::default();
     config.insert_json5("mode", "\"client\"")?;
@@ -196,19 +196,19 @@ fn config(router: &str) -> zenoh::Result<Config> {
     Ok(config)
 }
 
-/// True while a router is there, or another session that takes clients.
+/// True while a router is connected, or another session that accepts clients.
 fn has_router(session: &Session) -> bool {
     let info = session.info();
     info.routers_zid().wait().next().is_some() || info.peers_zid().wait().next().is_some()
 }
 
-/// A node of ROS with a publisher a topic.
+/// A ROS node with one publisher per topic.
 struct Node<'a> {
     keys: Keys<'a>,
     publishers: Vec<Publisher<'static>>,
     /// Number of the last message of each publisher.
     numbers: [i64; TOPICS.len()],
-    /// Tell the graph of ROS of node and publishers, as long as they are there.
+    /// Announce the node and the publishers to the graph of ROS as long as the tokens exist.
     _tokens: Vec<LivelinessToken>,
 }
 
@@ -220,7 +220,7 @@ impl<'a> Node<'a> {
         let mut publishers = Vec::with_capacity(TOPICS.len());
         for topic in TOPICS {
             let publisher = session.declare_publisher(keys.data(topic));
-            // A network that is too slow loses messages instead of holding up the others.
+            // On a slow network, messages are dropped instead of delaying the others.
             publishers.push(publisher.congestion_control(CongestionControl::Drop).wait()?);
             tokens.push(session.liveliness().declare_token(keys.publisher_token(topic)).wait()?);
         }

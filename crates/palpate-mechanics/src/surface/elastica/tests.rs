@@ -72,7 +72,7 @@ fn a_normal_force_turns_the_contact_by_a_right_angle_at_k_squared_and_by_two_at_
 
 #[test]
 fn moments_balance_whatever_the_load() {
-    // At the clamp the moment is force times lever, which knows nothing of curvatures.
+    // At the clamp the moment is force times lever, independent of the curvatures.
     for load in [1e-6, 0.1, 3.0, 30.0, 300.0] {
         let finger = unit(Vertical, load);
         let [x, _] = finger.point(1.0);

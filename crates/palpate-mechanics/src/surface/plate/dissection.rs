@@ -1,8 +1,8 @@
-//! The order in which the nodes of a grid are eliminated: nested dissection, after George, *Nested dissection of a regular
+//! The order of elimination of the nodes of a grid: nested dissection, after George, *Nested dissection of a regular
 //! finite element mesh* (1973).
 //!
 //! A line of nodes separates a grid into two halves that do not touch. Each half is eliminated first, by the same rule, and
-//! the line last, so that nothing couples the halves.
+//! the line last, so that the halves stay uncoupled.
 
 use std::collections::HashMap;
 
@@ -42,10 +42,10 @@ fn dissect(block: Block, order: &mut Vec<(usize, usize)>) {
     }
 }
 
-/// Number of pairs of nodes that the factor couples when the grid is eliminated in that order, a node with itself included.
+/// Number of pairs of nodes that the factor couples in that order of elimination, including each node with itself.
 ///
-/// An upper bound: a block's nodes couple with each other and with all nodes that surround it. In floating point, for it is
-/// asked of grids that are too large to be anything but refused.
+/// An upper bound: a block's nodes couple with each other and with all nodes that surround it. A float, because it is also
+/// computed for grids that are refused as too large.
 pub(super) fn coupled_pairs(columns: usize, rows: usize) -> f64 {
     Couplings::default().count(Surrounded {
         wide: columns,
@@ -57,7 +57,7 @@ pub(super) fn coupled_pairs(columns: usize, rows: usize) -> f64 {
     })
 }
 
-/// A block's size, and on which sides there are nodes beside it: 1 or 0.
+/// A block's size, and 1 for each side with neighbouring nodes, otherwise 0.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 struct Surrounded {
     wide: usize,
@@ -104,7 +104,7 @@ impl Couplings {
     }
 }
 
-/// Pairs among `nodes` that are eliminated together, and of them with `around` later ones.
+/// Pairs among `nodes` nodes that are eliminated together, and pairs between them and `around` later ones.
 fn eliminated(nodes: usize, around: usize) -> f64 {
     let (nodes, around) = (nodes as f64, around as f64);
     nodes * (nodes + 1.0) / 2.0 + nodes * around

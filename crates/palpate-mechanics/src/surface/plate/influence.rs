@@ -1,4 +1,4 @@
-//! The influence function of one sensor on a plate, and how large influences are.
+//! The influence function of one sensor on a plate, and the full scale of influences.
 
 use super::mesh::{Derivative, Mesh, NODE_DEGREES};
 use super::solved::{Functional, Solved, TOGETHER};
@@ -8,9 +8,9 @@ use crate::sensing::SensorKind;
 use crate::surface::{ContactLoad, InfluenceFunction, ReadingsByContact};
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Bicubic patches over the plate, with their own degrees of freedom.
+/// An influence function as bicubic patches over the plate, with their own degrees of freedom.
 ///
-/// By Maxwell's and Betti's reciprocity they are the deflection of the plate under what the sensor reads, taken as a load:
+/// By Maxwell's and Betti's reciprocity it is the deflection of the plate under the sensor's functional as a load:
 /// the reading of u = K⁻¹·f is s'·K⁻¹·f = (K⁻¹·s)'·f, and a downward unit force is −1 times the shape functions there.
 pub(super) struct PlateInfluence {
     mesh: Mesh,
@@ -18,8 +18,8 @@ pub(super) struct PlateInfluence {
 }
 
 impl PlateInfluence {
-    /// The influence functions of sensors of this `kind` at `sensors`; 0 everywhere for a raw channel, or a reaction where
-    /// there is no support.
+    /// The influence functions of sensors of this `kind` at `sensors`; 0 everywhere for a raw channel, or a reaction
+    /// without a support.
     ///
     /// # Errors
     /// [`Cancelled`] when the watch stopped the solutions.
@@ -46,12 +46,12 @@ impl PlateInfluence {
         Ok(degrees.map(|degrees| Self { mesh: solved.mesh, degrees }).collect())
     }
 
-    /// Bytes that this one takes.
+    /// Memory of this influence function, in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(self.degrees.as_slice())
     }
 
-    /// Bytes that one takes.
+    /// Memory of one influence function of a plate, in bytes.
     pub fn bytes_of(spec: &PlateSpec) -> f64 {
         (size_of::<f64>() * Mesh::new(spec.extent(), spec.elements).degrees()) as f64
     }
@@ -74,7 +74,7 @@ impl InfluenceFunction for PlateInfluence {
     }
 }
 
-/// Influence function of a plate whose equations have no solution: NaN everywhere.
+/// Influence function of a plate without a solution: NaN everywhere.
 pub(super) struct NotANumber;
 
 impl InfluenceFunction for NotANumber {
@@ -91,7 +91,7 @@ fn weights(mesh: &Mesh, at: Position, of: Derivative) -> Functional {
     mesh.weights(mesh.locate(at), of).to_vec()
 }
 
-/// ∂²w/∂x², which jumps from element to element: between two, the mean of both sides.
+/// ∂²w/∂x², which jumps from element to element: on a boundary, the mean of both sides.
 fn curvature(mesh: &Mesh, at: Position) -> Functional {
     let place = mesh.locate(at);
     let here = mesh.weights(place, Derivative::XX);
@@ -106,11 +106,11 @@ fn curvature(mesh: &Mesh, at: Position) -> Functional {
 
 /// Dependence of a sensor's reading on a load.
 enum Reads {
-    /// A functional of the plate's shape under the load, upward as the shape functions are, times a factor.
+    /// A functional of the plate's shape under the load, positive upward as the shape functions are, times a factor.
     Shape(Functional, f64),
-    /// A function of where the force acts, as degrees of freedom; no matter how the plate bends.
+    /// A function of the force's position, as degrees of freedom; independent of the bending.
     Contact(Vec<f64>),
-    /// 0, whatever the load.
+    /// 0 for every load.
     Nothing,
 }
 
@@ -135,15 +135,15 @@ impl Reads {
     }
 }
 
-/// Readings of many sensors under loads at contacts: by Maxwell's and Betti's reciprocity s'·K⁻¹·f is as well what the sensors s make
-/// of the shape K⁻¹·f.
+/// Readings of many sensors under loads at contacts: by Maxwell's and Betti's reciprocity s'·K⁻¹·f also results from applying the
+/// functionals s of the sensors to the shape K⁻¹·f.
 pub(super) struct PlateReadings<'a> {
     solved: &'a Solved,
     sensors: Vec<Reads>,
 }
 
 impl<'a> PlateReadings<'a> {
-    /// Bytes that a sensor takes: a functional of the four nodes around it.
+    /// Memory of one sensor, in bytes: a functional of the four nodes around it.
     pub const BYTES_EACH: f64 = (size_of::<Reads>() + 4 * NODE_DEGREES * size_of::<(usize, f64)>()) as f64;
 
     pub fn new(spec: &PlateSpec, solved: &'a Solved, sensors: &[(SensorKind, Position)]) -> Self {
@@ -174,7 +174,7 @@ impl ReadingsByContact for PlateReadings<'_> {
             self.sensors.iter().map(reading).collect()
         };
         let each = loads.chunks(TOGETHER).flat_map(|loads| {
-            // Nobody watches so few solutions.
+            // Few solutions need no watch.
             let solutions = self.solved.solutions(loads, Watch::NONE).unwrap_or_default();
             solutions.into_iter().zip(loads).map(readings).collect::<Vec<_>>()
         });
@@ -190,10 +190,10 @@ impl ReadingsByContact for PlateReadings<'_> {
     }
 }
 
-/// Elements along the longer side of the mesh on which scales are taken, at most.
+/// Largest number of elements along the longer side of the mesh for full scales.
 const ELEMENTS: usize = 24;
 
-/// Sensors along each side of the grid over which the largest is sought, the edges included.
+/// Sensors along each side of the grid for full scales, the edges included.
 const SENSORS: usize = 9;
 
 /// Largest magnitude of the influence of each kind of sensor, in the order of [`SensorKind::ALL`]; NaN when the plate's equations
@@ -201,7 +201,7 @@ const SENSORS: usize = 9;
 pub(super) fn full_scales(spec: &PlateSpec) -> [f64; SensorKind::ALL.len()] {
     let mut coarse = PlateSpec { elements: spec.elements.min(ELEMENTS), ..spec.clone() };
     if spec::check(&coarse).is_err() {
-        // Supports that only the finer mesh can distinguish.
+        // Only the finer mesh can distinguish the supports.
         coarse.elements = spec.elements;
     }
     match Solved::new(&coarse, Watch::NONE) {

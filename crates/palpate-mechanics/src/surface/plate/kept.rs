@@ -1,4 +1,4 @@
-//! The influence functions that a plate was last asked for: fits of one setup, fold after fold and seed after seed, ask for the same.
+//! Cache of a plate's latest influence functions: the folds and seeds of a fit all request the same ones.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,7 +7,7 @@ use super::influence::PlateInfluence;
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 
-/// Most memory that they take: those of a fit on the default mesh are 100 MB.
+/// Largest memory of the cache, in bytes: the functions of a fit on the default mesh take 100 MB.
 const MOST_BYTES: usize = 128_000_000;
 
 /// Kind and position of a sensor, by their bits.
@@ -20,10 +20,10 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    /// The influence functions of some sensors; `solve` is asked once for all that are not kept.
+    /// The influence functions of some sensors. `solve` is called once for all that are not cached.
     ///
     /// # Errors
-    /// That of `solve`; then nothing new is kept.
+    /// The error of `solve`; the cache is then unchanged.
     pub fn of_all<E>(
         &self,
         kind: SensorKind,
@@ -46,7 +46,7 @@ impl Kept {
         Ok(sensors.iter().filter_map(|at| found.get(&key(at)).cloned()).collect())
     }
 
-    /// Keeps functions, and where these are then too many, none from before.
+    /// Caches functions; when there are then too many, drops all earlier ones.
     fn keep(&self, solved: &[(Key, Arc<PlateInfluence>)]) {
         let bytes = |functions: &mut dyn Iterator<Item = &Arc<PlateInfluence>>| -> usize {
             functions.map(|function| function.bytes()).sum()

@@ -1,4 +1,4 @@
-//! The grid of elements on a plate: where a position is in it, its shape functions, and the stiffness of one element.
+//! The grid of elements on a plate: the element of a position, the shape functions, and the stiffness of one element.
 //!
 //! Every node has four degrees of freedom, in this order: w, h_x·∂w/∂x, h_y·∂w/∂y, h_x·h_y·∂²w/∂x∂y, with the
 //! deflection w and the sides h_x, h_y of an element. All are lengths, so they are of one size.
@@ -48,11 +48,11 @@ pub(super) struct MeshPoint {
     eta: f64,
 }
 
-/// The fewest elements along a side: with one alone, a plate clamped all round could not bend.
+/// Smallest number of elements along a side: with a single element, a plate clamped all round could not bend.
 const FEWEST: usize = 4;
 
 impl Mesh {
-    /// `elements` along the longer side of `extent`, and along the shorter one as many as keep them from being longer
+    /// A mesh with `elements` along the longer side of `extent`. The shorter side gets as many as keep the elements from being longer
     /// than wide, but at least four.
     pub fn new(extent: Extent, elements: usize) -> Self {
         let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(extent.length_m()));
@@ -77,14 +77,14 @@ impl Mesh {
         NODE_DEGREES * (row * (self.across + 1) + column)
     }
 
-    /// The point of the mesh at `position`; off the plate, that in the nearest element that its polynomial continues to.
+    /// The point of the mesh at `position`. Off the plate, the polynomial of the nearest element is continued.
     pub fn locate(&self, position: Position) -> MeshPoint {
         let (column, xi) = element_at(position.x_m / self.side_x_m, self.across);
         let (row, eta) = element_at(position.y_m / self.side_y_m, self.up);
         MeshPoint { column, row, xi, eta }
     }
 
-    /// The same point seen from the element before it along x, when it lies on the boundary between two.
+    /// The point as part of the previous element along x, when it lies on the boundary between two elements.
     pub fn seen_from_before(&self, point: MeshPoint) -> Option<MeshPoint> {
         let on_boundary = point.xi.abs() < 1e-9 && point.column > 0;
         on_boundary.then(|| MeshPoint { column: point.column - 1, xi: 1.0 + point.xi, ..point })
@@ -106,7 +106,7 @@ impl Mesh {
         sum
     }
 
-    /// By how much each degree of freedom is multiplied in that value: pairs of degree and factor.
+    /// Factor of each degree of freedom in the derivative `of` at `point`: pairs of degree and factor.
     pub fn weights(&self, point: MeshPoint, of: Derivative) -> [(usize, f64); 16] {
         let (along_x, along_y) = self.factors(point, of);
         std::array::from_fn(|i| {
@@ -130,15 +130,15 @@ impl Mesh {
     }
 }
 
-/// The element of a place that is `steps` elements along, among `count`, and where in it.
+/// The element at a distance of `steps` elements, among `count`, and the place within it.
 #[inline]
 fn element_at(steps: f64, count: usize) -> (usize, f64) {
-    // A float becomes the nearest whole number that fits, so that no position is out of bounds.
+    // Conversion from a float saturates, so that no position is out of bounds.
     let element = (steps as usize).min(count - 1);
     (element, steps - element as f64)
 }
 
-/// The four functions, or a derivative of them, at one ξ.
+/// The four shape functions, or a derivative of them, at one ξ.
 type Four = [f64; 4];
 
 /// Integrals over the element of products of two functions or of their derivatives.
@@ -150,13 +150,13 @@ fn values(xi: f64) -> Four {
     [1.0 - 3.0 * square + 2.0 * cube, xi - 2.0 * square + cube, 3.0 * square - 2.0 * cube, cube - square]
 }
 
-/// Their first derivatives with respect to ξ.
+/// First derivatives of N₀ … N₃ with respect to ξ.
 fn slopes(xi: f64) -> Four {
     let square = xi * xi;
     [6.0 * square - 6.0 * xi, 1.0 - 4.0 * xi + 3.0 * square, 6.0 * xi - 6.0 * square, 3.0 * square - 2.0 * xi]
 }
 
-/// Their second derivatives with respect to ξ.
+/// Second derivatives of N₀ … N₃ with respect to ξ.
 fn curvatures(xi: f64) -> Four {
     [12.0 * xi - 6.0, 6.0 * xi - 4.0, 6.0 - 12.0 * xi, 6.0 * xi - 2.0]
 }

@@ -1,6 +1,6 @@
 //! Rectangular plates after Kirchhoff, solved by the elements of Bogner, Fox and Schmit.
 //!
-//! One factor a plate, one solution a sensor: by reciprocity that is its influence over the whole plate.
+//! A plate needs one factor, and each sensor one solution: by reciprocity this solution is the influence function over the whole plate.
 
 mod dissection;
 mod influence;
@@ -29,11 +29,11 @@ use kept::Kept;
 use palpate_numerics::watch::{Cancelled, Watch};
 use solved::Solved;
 
-/// A plate that was checked, whose equations are factored when they are first asked for, once for all its clones.
+/// A checked plate. The equations are factored at the first request, once for all clones.
 ///
-/// Computed values are no part of the plate: they are neither compared nor written to files. They stay in memory as long as a
-/// clone lives: some 85 MB for a square plate of the default mesh, 230 MB for 200 × 200 elements, and up to 128 MB of influence functions that
-/// were asked for.
+/// Computed values are not part of the plate: they are neither compared nor written to files. They stay in memory as long as a
+/// clone lives: some 85 MB for a square plate of the default mesh, 230 MB for 200 × 200 elements, and up to 128 MB of the influence
+/// functions that were requested.
 ///
 /// ```
 /// use palpate_mechanics::contact::Position;
@@ -67,17 +67,17 @@ pub struct Plate {
 #[derive(Default)]
 struct Computed {
     solved: OnceLock<Result<Solved, Unsolvable>>,
-    /// Held while one thread solves, for which the others wait.
+    /// Locked while one thread solves and the others wait.
     solving: Mutex<()>,
     influences: Kept,
     full_scales: OnceLock<[f64; SensorKind::ALL.len()]>,
 }
 
 impl Plate {
-    /// Checks that the plate can be computed.
+    /// A plate from its description, which is checked.
     ///
     /// # Errors
-    /// [`PlateError`] when it cannot: a number out of its bounds, a rigid motion that nothing holds, a mesh too large.
+    /// [`PlateError`] when the plate cannot be computed: a value out of range, an unconstrained rigid motion, a mesh too large.
     pub fn new(spec: PlateSpec) -> Result<Self, PlateError> {
         spec::check(&spec)?;
         Ok(Self { spec, computed: Arc::default() })
@@ -106,7 +106,7 @@ impl Plate {
         })
     }
 
-    /// The same on a mesh of so many elements along the longer side.
+    /// This plate with a mesh of `elements` elements along the longer side.
     ///
     /// # Errors
     /// [`PlateError`] as for [`Plate::new`].
@@ -119,20 +119,20 @@ impl Plate {
         &self.spec
     }
 
-    /// Bytes that solving it needs at most, by an estimate.
+    /// Upper bound of the memory for solving the plate, in bytes, by an estimate.
     pub fn estimated_bytes(&self) -> f64 {
         spec::estimated_bytes(&self.spec)
     }
 
-    /// Factors its equations, unless that is done.
+    /// Factors the plate's equations, unless this was done before.
     ///
     /// # Errors
-    /// [`PlateError::Unsolvable`] when they are singular to working precision, or there is not the memory.
+    /// [`PlateError::Unsolvable`] when they are singular to working precision, or memory is insufficient.
     pub fn solve(&self) -> Result<(), PlateError> {
         self.solved(Watch::NONE).map(|_| ()).map_err(|reason| PlateError::Unsolvable { reason })
     }
 
-    /// Stored numbers of the factor of its equations.
+    /// Number of stored entries of the factor.
     ///
     /// # Errors
     /// As [`Plate::solve`].
@@ -141,7 +141,7 @@ impl Plate {
         solved.map(Solved::stored_numbers).map_err(|reason| PlateError::Unsolvable { reason })
     }
 
-    /// The factored equations, or why there are none. Work that was stopped leaves nothing behind: the next one who asks begins anew.
+    /// The factored equations, or the reason of the failure. Cancelled work leaves no result: the next call starts anew.
     fn solved(&self, watch: Watch) -> Result<&Solved, Unsolvable> {
         let Computed { solved, solving, .. } = &*self.computed;
         if solved.get().is_none() {
@@ -167,7 +167,7 @@ impl Surface for Plate {
         self.influence_functions(kind, &[sensor]).pop().unwrap_or_else(|| Arc::new(NotANumber))
     }
 
-    /// In few sweeps through the factor, unless they were asked for before.
+    /// Solves for all sensors in few sweeps through the factor; reuses the functions of earlier calls.
     fn influence_functions(
         &self,
         kind: SensorKind,
@@ -220,12 +220,12 @@ impl Surface for Plate {
     }
 
     fn solution_cost(&self, sensors: usize, solving: Solving) -> Option<SolutionCost> {
-        /// Multiply-adds in a second, of two dozen solutions in one sweep.
+        /// Multiply-adds per second, for two dozen solutions in one sweep.
         const PRODUCTS: f64 = 7e9;
-        /// Bytes of the equations that are set up and factored in a second.
+        /// Bytes of the equations that are set up and factored per second.
         const FACTORED: f64 = 3e8;
         let sensors = sensors as f64;
-        // Two sweeps through the factor; by contact, readings and derivatives at 16 degrees of freedom a sensor.
+        // Two sweeps through the factor; by contact, readings and derivatives at 16 degrees of freedom for each sensor.
         let sweeps = 2.0 * spec::estimated_factor_size(&self.spec);
         let (kept, multiply_adds) = match solving {
             Solving::BySensor => (PlateInfluence::bytes_of(&self.spec), sweeps),
@@ -255,8 +255,8 @@ impl Surface for Plate {
         spec::insensitive_sensor(&self.spec, kind, sensor)
     }
 
-    /// The largest influence found over a coarse grid of sensors on a coarse mesh. In this theory the strain under a force
-    /// grows without bound as the contact nears the sensor: its scale is that of a force spread over such a mesh's element.
+    /// The largest influence over a coarse grid of sensors on a coarse mesh. In this theory the strain under a force
+    /// grows without bound as the contact nears the sensor. The scale is that of a force spread over an element of such a mesh.
     fn full_scale(&self, kind: SensorKind) -> f64 {
         self.computed.full_scales.get_or_init(|| full_scales(&self.spec))[kind as usize]
     }

@@ -1,22 +1,22 @@
-//! Motions of a plate without bending: up and down, and tilting about its two sides.
+//! Rigid motions of a plate: up and down, and tilting about its two sides.
 
 use super::mesh::{Mesh, NODE_DEGREES};
 use super::spec::{Edge, Edges};
 use palpate_numerics::small::add_multiple;
 
-/// Values of 1, x/ℓ and y/ℓ, with the longer side ℓ, or what they are multiplied by.
+/// Values of 1, x/ℓ and y/ℓ, with the longer side ℓ, or their coefficients.
 pub(super) type Motions = [f64; 3];
 
-/// The rigid motions that the edges leave to a plate: all three, tilting about the one edge that is simply supported, or none.
+/// The rigid motions that the edges allow: all three, tilting about the one simply supported edge, or none.
 pub(super) struct RigidMotions {
     /// All degrees of freedom in each.
     motions: Vec<Vec<f64>>,
-    /// Nodes, column and row, of which each has to be held too lest the plate move so.
+    /// Nodes, by column and row, that must all be constrained to prevent these motions.
     nodes: Vec<(usize, usize)>,
 }
 
 impl RigidMotions {
-    /// Those that `edges` leave.
+    /// The motions that `edges` allow.
     pub fn new(mesh: &Mesh, edges: Edges) -> Self {
         let [_, far_x, far_y] = motions_at(mesh, mesh.first_degree(mesh.across, mesh.up));
         let (middle_x, middle_y) = (mesh.across / 2, mesh.up / 2);
@@ -44,17 +44,16 @@ impl RigidMotions {
         Self { motions: factors.iter().map(motion).collect(), nodes }
     }
 
-    /// Number of motions.
     pub fn count(&self) -> usize {
         self.motions.len()
     }
 
-    /// Nodes, column and row, that keep the plate from every one of them when they do not move.
+    /// Nodes, by column and row, that prevent all the motions when they are constrained.
     pub fn nodes(&self) -> &[(usize, usize)] {
         &self.nodes
     }
 
-    /// R'·f: value of a load for each motion, degree by degree; 0 where its terms cancel to rounding.
+    /// R'·f: product of a load with each motion; 0 where its terms cancel to rounding.
     pub fn resultants(&self, load: &(impl Iterator<Item = (usize, f64)> + Clone)) -> Vec<f64> {
         const ROUNDING: f64 = 1e-14;
         let value = |motion: &Vec<f64>| {
@@ -66,7 +65,7 @@ impl RigidMotions {
         self.motions.iter().map(value).collect()
     }
 
-    /// Adds to `degrees` the motions, each as often as `shares` says, times `factor`.
+    /// Adds the motions to `degrees`, each times its share and `factor`.
     pub fn add(&self, degrees: &mut [f64], factor: f64, shares: &[f64]) {
         for (motion, share) in self.motions.iter().zip(shares) {
             add_multiple(degrees, factor * share, motion);

@@ -1,4 +1,4 @@
-//! A plate's equations, factored: a solution then costs two sweeps through the factor.
+//! The factored equations of a plate: each solution costs two sweeps through the factor.
 //!
 //! Symbols as in `supports.rs`: K₀ stiffness matrix without point supports, b the deflection of one as a functional, r the forces of the
 //! point supports on the plate, R rigid motions, f a load.
@@ -17,8 +17,8 @@ use palpate_numerics::{SparseCholesky, SparseSymmetric};
 
 /// The factored equations of a plate.
 ///
-/// A support need not be at a node. What is factored is K₀ held at its edges and, where these let it move without bending, at as
-/// many nodes as keep it from that; what it does at its point supports follows by the force method.
+/// A support need not be at a node. The factor is that of K₀ with the edges constrained and, where these allow rigid motions, with as
+/// many nodes constrained as prevent them. The forces of the point supports follow by the force method.
 pub(super) struct Solved {
     pub mesh: Mesh,
     unknowns: Unknowns,
@@ -28,31 +28,31 @@ pub(super) struct Solved {
     balance: Balance,
 }
 
-/// Loads that are solved for in one sweep through the factor: more would cost memory and save little.
+/// Largest number of loads in one sweep through the factor: more would cost memory and save little.
 pub(super) const TOGETHER: usize = 24;
 
-/// Point supports, and what they do to the plate.
+/// Point supports and their effect on the plate.
 struct Supports {
-    /// The column of B of each.
+    /// The columns of B, one for each support.
     deflections: Vec<Functional>,
-    /// K₀ₕ⁻¹·B, a column each.
+    /// K₀ₕ⁻¹·B, one column for each support.
     solutions: Vec<Vec<f64>>,
     forces: SupportForces,
     motions: RigidMotions,
 }
 
-/// Equilibrium of a solution: force and moments of the load, the point supports and the edges that are held.
+/// Equilibrium of a solution: force and moments of the load, the point supports and the supported edges.
 struct Balance {
-    /// Force and both moments of an edge on the plate, per unit of each unknown that has a part in them.
+    /// Force and both moments of an edge on the plate, per unit of each unknown that contributes to them.
     by_edges: Vec<(usize, Motions)>,
 }
 
 impl Solved {
-    /// Sets up and factors the equations of a plate that was checked, and solves them for forces all over it.
+    /// Sets up and factors the equations of a checked plate, and solves them for forces all over it as a check.
     ///
     /// # Errors
-    /// [`Unsolvable`] when they are singular to working precision, too large for the memory that there is, a solution is not in balance, or the
-    /// watch stopped it.
+    /// [`Unsolvable`] when the equations are singular to working precision or too large for the memory, when a solution is not in balance,
+    /// or when the watch stopped the work.
     pub fn new(spec: &PlateSpec, watch: Watch) -> Result<Self, Unsolvable> {
         let mesh = Mesh::new(spec.extent(), spec.elements);
         let motions = RigidMotions::new(&mesh, spec.edges);
@@ -72,7 +72,7 @@ impl Solved {
         self.factor.stored_numbers()
     }
 
-    /// All degrees of freedom under each of `loads`, a functional and what the solution is multiplied by; NaN where a solution is not in
+    /// All degrees of freedom under each of `loads`: pairs of a functional and a factor for the solution. NaN where a solution is not in
     /// balance.
     ///
     /// # Errors
@@ -94,8 +94,8 @@ impl Solved {
         Ok(all)
     }
 
-    /// The force of a point support on the plate, positive upward, under a downward unit force, as degrees of freedom of a
-    /// function of where that force acts: r = P·y + Q·R'·f. `None` where there is no such support.
+    /// The force of a point support on the plate, positive upward, under a downward unit force: r = P·y + Q·R'·f, as degrees of freedom of a
+    /// function of the force's position. `None` for a missing support.
     pub fn reaction(&self, support: usize) -> Option<Vec<f64>> {
         let Supports { solutions, forces, motions, .. } = &self.supports;
         (support < solutions.len()).then(|| {
@@ -109,7 +109,7 @@ impl Solved {
         })
     }
 
-    /// Shapes under loads, few enough for one sweep; those out of balance are refined, by what their residuals do to the plate
+    /// Shapes under loads, few enough for one sweep. Shapes out of balance are refined with their residuals as loads
     /// (Golub and Van Loan, *Matrix Computations*, 3.5.3).
     fn solve(&self, loads: &[&Functional], watch: Watch) -> Result<Vec<Shape>, Cancelled> {
         let each = |load: &&Functional| self.unknowns.gathered(load.iter().copied());
@@ -143,16 +143,17 @@ impl Solved {
         Ok(shapes)
     }
 
-    /// K₀ₕ⁻¹·f for each of some loads.
+    /// K₀ₕ⁻¹·f for each of `loads`.
     fn swept(&self, loads: &[Vec<f64>], watch: Watch) -> Result<Vec<Vec<f64>>, Cancelled> {
         let mut together = loads.concat();
         self.factor.solve_in_place_watched(&mut together, watch)?;
         Ok(together.chunks_exact(self.unknowns.count().max(1)).map(<[f64]>::to_vec).collect())
     }
 
-    /// The residual of a load: f + B·r − K₀·u, by degree of freedom; 0 where an edge holds it.
+    /// The residual of a load: f + B·r − K₀·u, by degree of freedom; 0 where an edge constrains it.
     ///
-    /// In each element K₀ is applied to the departure from the rigid motion of its first node, lest rounding of a large motion bend it.
+    /// In each element K₀ multiplies the difference from the rigid motion of the element's first node. Otherwise the rounding of a large
+    /// motion would bend the element.
     fn residual(&self, shape: &Shape, load: &Functional) -> Vec<f64> {
         let (mesh, u) = (&self.mesh, self.unknowns.expand(&shape.bent, 1.0));
         let mut residual = vec![0.0; mesh.degrees()];
@@ -188,7 +189,7 @@ impl Solved {
         residual
     }
 
-    /// Adds what the point supports do to a shape that nothing but `acting` bent, and tells how far that is from balancing `load`.
+    /// Adds the effect of the point supports to a shape that only `acting` bent, and computes its imbalance under `load`.
     fn hold(
         &self,
         shape: &mut Shape,
@@ -203,7 +204,7 @@ impl Solved {
         self.balance.off(&self.mesh, &self.unknowns, &self.supports, load, shape)
     }
 
-    /// Solves for forces on a grid, the edges included.
+    /// Solves for forces on a grid that includes the edges.
     fn check(&self, spec: &PlateSpec, watch: Watch) -> Result<(), Unsolvable> {
         const ALONG: usize = 3;
         let at = |i: usize, size_m: f64| i as f64 / ALONG as f64 * size_m;
@@ -219,29 +220,29 @@ impl Solved {
     }
 }
 
-/// Shapes are refined when they are out of balance by more than this, and at most so often.
+/// Imbalance above which a shape is refined, and the largest number of refinements.
 const REFINED_IMBALANCE: f64 = 0.3 * MOST_IMBALANCE;
 const MOST_REFINEMENTS: usize = 3;
 
 /// The shape of the plate under a load.
 struct Shape {
-    /// The unknowns, the plate held.
+    /// The unknowns of the constrained plate.
     bent: Vec<f64>,
-    /// Forces of the point supports on it.
+    /// Forces of the point supports on the plate.
     forces: Vec<f64>,
-    /// The rigid motions that are added to that.
+    /// The rigid motions that are added to the unknowns.
     moved: Vec<f64>,
-    /// Share of the load by which force or moment is out of balance.
+    /// Imbalance of force or moment, as a share of the load.
     imbalance: f64,
 }
 
 impl Shape {
-    /// Held where it just cannot move, without point supports.
+    /// The shape with the rigid motions constrained, without point supports.
     fn held(bent: Vec<f64>) -> Self {
         Self { bent, forces: Vec::new(), moved: Vec::new(), imbalance: f64::NAN }
     }
 
-    /// True in balance; not where a number is none.
+    /// True in balance; false for an imbalance of NaN.
     fn is_balanced(&self) -> bool {
         self.imbalance <= MOST_IMBALANCE
     }
@@ -288,7 +289,7 @@ impl Supports {
         Ok(Self { deflections, solutions, forces, motions })
     }
 
-    /// Adds to a shape under `load` without point supports what their forces do: these, and the rigid motion.
+    /// Adds to a shape under `load` without point supports the effect of their forces: the forces, the bending and the rigid motion.
     fn hold(
         &self,
         unknowns: &Unknowns,
@@ -328,7 +329,7 @@ impl Balance {
         Self { by_edges: by_edges.collect() }
     }
 
-    /// Largest share of the load by which force or a moment is out of balance; NaN where a number is none.
+    /// Largest imbalance of force or a moment, as a share of the load; NaN where a value is NaN.
     fn off(
         &self,
         mesh: &Mesh,
@@ -339,7 +340,7 @@ impl Balance {
     ) -> f64 {
         let mut sums = [0.0; 3];
         let mut add = |functional: &Functional, times: f64| {
-            // What acts on a degree of freedom that an edge holds goes into that edge.
+            // A load on a degree of freedom that an edge constrains goes into that edge.
             for (degree, weight) in functional.iter().filter(|(degree, _)| !unknowns.is_on_held_edge(*degree))
             {
                 let arms = rigid::motions_at(mesh, *degree);
@@ -368,18 +369,18 @@ fn reading(unknowns: &Unknowns, functional: &Functional, u: &[f64]) -> f64 {
     terms.sum()
 }
 
-/// The numbers of the degrees of freedom that neither an edge nor a node holds at zero, in the order of elimination.
+/// The unknowns: degrees of freedom that neither an edge nor a node constrains to zero, in the order of elimination.
 struct Unknowns {
-    /// Of each degree of freedom, where it stands in the equations.
+    /// The equation of each degree of freedom.
     places: Vec<Option<u32>>,
     /// Degree of freedom of each unknown.
     degrees: Vec<u32>,
-    /// The first degrees of freedom, the deflections, of the nodes that are held.
+    /// The first degrees of freedom, the deflections, of the constrained nodes.
     nodes: Vec<usize>,
 }
 
 impl Unknowns {
-    /// The unknowns of a mesh whose edges are held so, and the deflection of `nodes`.
+    /// The unknowns of a mesh with these conditions along its edges, and with the deflection of `nodes` constrained.
     pub fn new(mesh: &Mesh, edges: Edges, nodes: &[(usize, usize)]) -> Self {
         let (columns, rows) = mesh.nodes();
         let nodes: Vec<usize> = nodes.iter().map(|(column, row)| mesh.first_degree(*column, *row)).collect();
@@ -399,7 +400,7 @@ impl Unknowns {
         Self { places, degrees, nodes }
     }
 
-    /// The values at the unknowns of what is given by degree of freedom.
+    /// The values at the unknowns, from values by degree of freedom.
     pub fn gathered(&self, values: impl Iterator<Item = (usize, f64)>) -> Vec<f64> {
         let mut gathered = vec![0.0; self.count()];
         for (degree, value) in values {
@@ -410,36 +411,34 @@ impl Unknowns {
         gathered
     }
 
-    /// Number of unknowns.
     pub fn count(&self) -> usize {
         self.degrees.len()
     }
 
-    /// Number of the equation of a degree of freedom; `None` when it is held at zero.
+    /// Number of the equation of a degree of freedom; `None` when it is constrained to zero.
     pub fn place(&self, degree: usize) -> Option<usize> {
         self.places[degree].map(|place| place as usize)
     }
 
-    /// True for a degree of freedom that an edge holds at zero.
+    /// True for a degree of freedom that an edge constrains to zero.
     pub fn is_on_held_edge(&self, degree: usize) -> bool {
         self.places[degree].is_none() && !self.nodes.contains(&degree)
     }
 
-    /// The degree of freedom of an unknown.
     pub fn degree(&self, unknown: usize) -> usize {
         self.degrees[unknown] as usize
     }
 
-    /// All degrees of freedom, the held ones 0, when the unknowns are `unknowns`, times `factor`.
+    /// All degrees of freedom, from the unknowns times `factor`; 0 for a constrained one.
     pub fn expand(&self, unknowns: &[f64], factor: f64) -> Vec<f64> {
         self.places.iter().map(|place| place.map_or(0.0, |place| factor * unknowns[place as usize])).collect()
     }
 }
 
-/// Which degrees of freedom of a node its edges hold at zero.
+/// Degrees of freedom of a node that its edges constrain to zero.
 ///
-/// Along an edge that is held w = 0, so its derivative along the edge is zero too; on a clamped one the slope across it is
-/// zero as well, and so is that slope's derivative along it.
+/// Along a supported edge w = 0, so the derivative of w along the edge is zero too. On a clamped edge the slope across it is
+/// zero as well, and so is the derivative of that slope along the edge.
 fn held_degrees(mesh: &Mesh, edges: Edges, column: usize, row: usize) -> [bool; NODE_DEGREES] {
     let on = [
         (column == 0, edges.left, [true, false, true, false]),
@@ -461,17 +460,17 @@ fn held_degrees(mesh: &Mesh, edges: Edges, column: usize, row: usize) -> [bool; 
     held
 }
 
-/// The sum over some degrees of freedom, each multiplied by its factor: what a point of the plate does, or a sensor reads.
+/// A weighted sum of degrees of freedom, as pairs of index and weight: the deflection of a point, or the reading of a sensor.
 pub(super) type Functional = Vec<(usize, f64)>;
 
-/// The stiffness matrix of equal elements, of the unknowns only.
+/// The stiffness matrix of equal elements, for the unknowns only.
 fn stiffness_matrix(
     mesh: &Mesh,
     unknowns: &Unknowns,
     element: &ElementStiffness,
     watch: Watch,
 ) -> Result<SparseSymmetric, Cancelled> {
-    /// Columns between two looks whether to go on.
+    /// Columns between two checks of the watch.
     const EACH: usize = 1 << 12;
     let mut matrix = SparseSymmetric::with_capacity(unknowns.count() * NEIGHBOURS * NODE_DEGREES / 2);
     for unknown in 0..unknowns.count() {
@@ -488,11 +487,11 @@ fn stiffness_matrix(
 /// A node couples with itself and the eight around it.
 const NEIGHBOURS: usize = 9;
 
-/// One column of the matrix: the couplings of a node's degree of freedom with those of its neighbours.
+/// One column of the stiffness matrix: the couplings of a node's degree of freedom with the degrees of freedom of its neighbours.
 struct Column {
-    /// The node, its column and row in the grid.
+    /// The node: column and row in the grid.
     node: (usize, usize),
-    /// Neighbours row by row from the one below to the left.
+    /// Neighbours row by row, from the lower left one.
     couplings: [[f64; NODE_DEGREES]; NEIGHBOURS],
 }
 
@@ -501,7 +500,7 @@ impl Column {
     fn entries(&self, mesh: &Mesh) -> impl Iterator<Item = (usize, f64)> {
         let (columns, rows) = mesh.nodes();
         self.couplings.iter().enumerate().flat_map(move |(i, couplings)| {
-            // One more than the neighbour's own, which may be left of or below the grid.
+            // One more than the neighbour's own column and row, which may be left of or below the grid.
             let (column, row) = (self.node.0 + i % 3, self.node.1 + i / 3);
             let exists = (1..=columns).contains(&column) && (1..=rows).contains(&row);
             let first = if exists { mesh.first_degree(column - 1, row - 1) } else { 0 };
@@ -517,7 +516,7 @@ fn element_column(mesh: &Mesh, element: &ElementStiffness, degree: usize) -> Col
     let node = (node % (mesh.across + 1), node / (mesh.across + 1));
     let mut column = Column { node, couplings: [[0.0; NODE_DEGREES]; NEIGHBOURS] };
     for (end_y, end_x) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-        // The element of which this node is the end: its first node is (node.0 − end_x, node.1 − end_y).
+        // The element with this node as its end: its first node is (node.0 − end_x, node.1 − end_y).
         let fits = |at: usize, end: usize, count: usize| at >= end && at - end < count;
         if !(fits(node.0, end_x, mesh.across) && fits(node.1, end_y, mesh.up)) {
             continue;

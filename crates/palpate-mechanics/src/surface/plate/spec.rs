@@ -1,4 +1,4 @@
-//! A plate as data, and what is checked of it before anything is computed.
+//! The description of a plate, and the checks before any computation.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +19,7 @@ pub struct PlateSpec {
     pub length_m: f64,
     /// Width along y, in metres.
     pub width_m: f64,
-    /// Thickness t, in metres; small beside the sides (below a tenth or so), or shear matters, which is left out.
+    /// Thickness t, in metres; below about a tenth of the sides, because shear is neglected.
     pub thickness_m: f64,
     /// Young's modulus E, in pascals.
     pub youngs_modulus_pa: f64,
@@ -51,9 +51,9 @@ pub struct Edges {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Edge {
-    /// Its deflection is zero, and it can turn.
+    /// The deflection is zero, and the edge can turn.
     Simple,
-    /// Its deflection and its slope are zero.
+    /// The deflection and the slope are zero.
     Clamped,
     /// No support.
     #[default]
@@ -74,9 +74,9 @@ pub struct PointSupport {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PointSupportKind {
-    /// It does not move, and the plate can turn on it.
+    /// The point does not move, and the plate can turn on it.
     Simple,
-    /// It gives in proportion to the force.
+    /// The deflection is proportional to the force.
     Elastic {
         /// Stiffness k, in newtons per metre; greater than 0.
         stiffness_n_per_m: f64,
@@ -84,7 +84,7 @@ pub enum PointSupportKind {
 }
 
 impl PlateSpec {
-    /// Elements along the longer side where nothing else is said: the error of deflections is then about 10⁻⁴ of the
+    /// Default number of elements along the longer side: the error of deflections is then about 10⁻⁴ of the
     /// largest deflection (docs/plates.md).
     pub const DEFAULT_ELEMENTS: usize = 128;
 
@@ -93,21 +93,21 @@ impl PlateSpec {
         self.youngs_modulus_pa * self.thickness_m.powi(3) / (12.0 * (1.0 - self.poissons_ratio.powi(2)))
     }
 
-    /// The area that can be touched, once its sides are checked.
+    /// The area of the plate, for checked sides.
     pub(super) fn extent(&self) -> Extent {
         Extent::checked_plane(self.length_m, self.width_m)
     }
 }
 
 impl Edges {
-    /// The same on all sides.
+    /// Edges with one condition on all four sides.
     pub const fn all(edge: Edge) -> Self {
         Self { left: edge, right: edge, bottom: edge, top: edge }
     }
 }
 
 impl PointSupport {
-    /// Whether it does not give.
+    /// True for a support that does not move.
     pub(super) fn is_rigid(&self) -> bool {
         matches!(self.kind, PointSupportKind::Simple)
     }
@@ -119,7 +119,7 @@ pub enum PlateError {
     /// A dimension is not a positive, finite number.
     #[error(transparent)]
     NotPositive(#[from] OutOfRange),
-    /// No material has this Poisson's ratio.
+    /// A Poisson's ratio that is out of range.
     #[error("a plate's poissons_ratio is {value}; it must be greater than -1 and at most 0.5")]
     PoissonsRatio {
         /// The ratio.
@@ -134,14 +134,14 @@ pub enum PlateError {
     /// Too few or too many elements.
     #[error("a plate has {elements} elements along its longer side; it must have {fewest} to {most}")]
     Elements {
-        /// Number that is wanted.
+        /// Requested number.
         elements: usize,
-        /// The fewest it can have.
+        /// Smallest allowed number.
         fewest: usize,
-        /// The most it can have.
+        /// Largest allowed number.
         most: usize,
     },
-    /// The factor of the stiffness matrix would not fit.
+    /// The factor of the stiffness matrix would not fit into memory.
     #[error(
         "a plate of {elements} elements along its longer side needs {} of memory; at most {} can be used: take fewer elements",
         gibibytes(*bytes), gibibytes(*most)
@@ -151,44 +151,44 @@ pub enum PlateError {
         elements: usize,
         /// Estimated bytes.
         bytes: f64,
-        /// The most that can be used.
+        /// The most bytes that can be used.
         most: f64,
     },
-    /// A support beside the plate.
+    /// A support outside the plate.
     #[error(
         "support {number} is at {}, off the plate; it must be within (0, 0) and {}",
         Point(*at), Point(*corner)
     )]
     SupportOffPlate {
-        /// Which support, from 1.
+        /// Number of the support, from 1.
         number: usize,
         /// Position.
         at: Position,
-        /// The corner across from (0, 0).
+        /// The corner opposite (0, 0).
         corner: Position,
     },
-    /// An elastic support without stiffness.
+    /// An elastic support with an invalid stiffness.
     #[error("support {number} has a stiffness of {value} N/m; it must be greater than 0 and finite")]
     Stiffness {
-        /// Which support, from 1.
+        /// Number of the support, from 1.
         number: usize,
         /// Stiffness, in N/m.
         value: f64,
     },
-    /// A support where the edge is held already.
-    #[error("support {number} is on the {edge} edge, which is held already; leave it out")]
+    /// A support on an edge that is already supported.
+    #[error("support {number} is on the {edge} edge, which is supported already; leave it out")]
     SupportOnHeldEdge {
-        /// Which support, from 1.
+        /// Number of the support, from 1.
         number: usize,
-        /// Which edge.
+        /// Name of the edge.
         edge: &'static str,
     },
-    /// Two supports at one place.
+    /// Two supports at one position.
     #[error("supports {first} and {second} are both at {}; leave one out", Point(*at))]
     SupportsAtOnePlace {
-        /// The first one's number, from 1.
+        /// Number of the first support, from 1.
         first: usize,
-        /// The second one's number, from 1.
+        /// Number of the second support, from 1.
         second: usize,
         /// Their position.
         at: Position,
@@ -199,9 +199,9 @@ pub enum PlateError {
         format_length_mm(*distance_m), format_length_mm(*side_x_m), format_length_mm(*side_y_m)
     )]
     SupportsTooClose {
-        /// The first one's number, from 1.
+        /// Number of the first support, from 1.
         first: usize,
-        /// The second one's number, from 1.
+        /// Number of the second support, from 1.
         second: usize,
         /// Their distance, in metres.
         distance_m: f64,
@@ -210,20 +210,20 @@ pub enum PlateError {
         /// An element's side along y, in metres.
         side_y_m: f64,
     },
-    /// Nothing holds the plate.
+    /// A plate without supports.
     #[error(
-        "nothing holds the plate: it can move up and down and tilt every way; hold an edge, or three points"
+        "the plate has no support: it can move up and down and tilt every way; support an edge, or three points"
     )]
     NotHeld,
-    /// One point holds it.
-    #[error("the plate is held at {} only: it can tilt about it every way; hold it at three points at least", Point(*at))]
+    /// A plate with a single point support.
+    #[error("the plate is supported at {} only: it can tilt about it every way; support it at three points at least", Point(*at))]
     HeldAtOnePoint {
         /// The point.
         at: Position,
     },
-    /// All that holds it is on one line.
+    /// A plate with all its supports on one line.
     #[error(
-        "the plate can turn about the line through {} and {}, on which all its supports are; hold it beside that line",
+        "the plate can turn about the line through {} and {}, on which all its supports are; support it beside that line",
         Point(*from), Point(*to)
     )]
     HeldOnALine {
@@ -235,22 +235,22 @@ pub enum PlateError {
     /// The equations could not be solved.
     #[error("the equations of the plate could not be solved: {reason}")]
     Unsolvable {
-        /// Reason for which they could not.
+        /// Reason of the failure.
         reason: Unsolvable,
     },
 }
 
-/// Most of the load by which force and moments, over the longer side, may be out of balance.
+/// Largest imbalance of force, or of a moment over the longer side, as a share of the load.
 pub(super) const MOST_IMBALANCE: f64 = 1e-9;
 
-/// Error of a plate whose equations could not be solved.
+/// Error of a plate without a solution.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unsolvable {
     /// The stiffness matrix has no factor.
     #[error(transparent)]
     Stiffness(#[from] palpate_numerics::SparseCholeskyError),
     /// The compliances of the simple supports have no factor.
-    #[error("what the supports at points do is not told: {0}")]
+    #[error("the forces of the supports at points are not determined: {0}")]
     Supports(#[from] palpate_numerics::NotPositiveDefinite),
     /// Supports and edges do not balance a force.
     #[error(
@@ -258,12 +258,12 @@ pub enum Unsolvable {
         Point(*at), MOST_IMBALANCE
     )]
     OutOfBalance {
-        /// Force, or moment over the longer side, that is not balanced, as a share of the force.
+        /// Unbalanced force, or unbalanced moment over the longer side, as a share of the force.
         share: f64,
         /// Position of the force.
         at: Position,
     },
-    /// Whoever watched the work stopped it.
+    /// The watch stopped the work.
     #[error("{0}")]
     Cancelled(#[from] palpate_numerics::watch::Cancelled),
 }
@@ -275,7 +275,7 @@ impl Unsolvable {
     }
 }
 
-/// A position for people.
+/// A position as text for messages.
 struct Point(Position);
 
 impl std::fmt::Display for Point {
@@ -288,20 +288,20 @@ fn gibibytes(bytes: f64) -> String {
     format!("{:.1} GiB", bytes / 2f64.powi(30))
 }
 
-/// The fewest and the most elements along the longer side.
+/// Smallest and largest number of elements along the longer side.
 const FEWEST_ELEMENTS: usize = 4;
 const MOST_ELEMENTS: usize = 10_000;
 
-/// The most bytes that a plate's equations may need: 4 GiB.
+/// Largest memory for a plate's equations, in bytes: 4 GiB.
 const MOST_BYTES: f64 = 4.0 * (1u64 << 30) as f64;
 
-/// Positions this near, as a share of the longer side, are the same.
+/// Positions closer than this, as a share of the longer side, are the same.
 const SAME_PLACE: f64 = 1e-9;
 
-/// Points this near to a line, as a share of the longer side, do not keep the plate from turning about it.
+/// Points closer to a line than this, as a share of the longer side, do not prevent rotation about it.
 const ON_A_LINE: f64 = 1e-6;
 
-/// Checks all that can be wrong with a plate, the cheap things first.
+/// Checks all values of a plate, the cheap checks first.
 ///
 /// # Errors
 /// [`PlateError`], with the value and its bound.
@@ -355,7 +355,7 @@ fn check_support(spec: &PlateSpec, number: usize, support: &PointSupport) -> Res
     }
 }
 
-/// No two supports may be at one place, nor two simple ones in one element: the mesh would have no freedom left there.
+/// Refuses two supports at one position, and two simple supports in one element: the mesh would have no freedom left there.
 fn check_distances(spec: &PlateSpec) -> Result<(), PlateError> {
     let Mesh { side_x_m, side_y_m, .. } = Mesh::new(spec.extent(), spec.elements);
     for (i, one) in spec.supports.iter().enumerate() {
@@ -376,8 +376,8 @@ fn check_distances(spec: &PlateSpec) -> Result<(), PlateError> {
     Ok(())
 }
 
-/// A plate that can move without bending has no equilibrium. Its rigid motions w = a + b·x + c·y must all be held: by a
-/// clamped edge, or by points that are not on one line, an edge that is held being its two ends.
+/// Refuses a plate that can move without bending, because it has no equilibrium. The rigid motions w = a + b·x + c·y must all be prevented:
+/// by a clamped edge, or by points that are not on one line. A supported edge counts as its two ends.
 fn check_held(spec: &PlateSpec) -> Result<(), PlateError> {
     let edges = edges(spec);
     if edges.iter().any(|(.., edge)| *edge == Edge::Clamped) {
@@ -413,22 +413,22 @@ fn check_memory(spec: &PlateSpec) -> Result<(), PlateError> {
     }
 }
 
-/// Matrix elements by which two nodes couple.
+/// Matrix elements that couple two nodes.
 const PAIR: f64 = (NODE_DEGREES * NODE_DEGREES) as f64;
 
-/// Numbers of the factor of the equations, without those that are stored though they are zeros.
+/// Estimated number of entries of the factor, without stored zeros.
 pub(super) fn estimated_factor_size(spec: &PlateSpec) -> f64 {
     let (columns, rows) = Mesh::new(spec.extent(), spec.elements).nodes();
     PAIR * coupled_pairs(columns, rows)
 }
 
-/// Bytes that the equations of the plate need at most: the factor, which couples pairs of nodes; the stiffness matrix, where
+/// Upper bound of the memory of the plate's equations, in bytes: the factor, which couples pairs of nodes; the stiffness matrix, where
 /// a node couples with itself and its eight neighbours; and the solutions of the point supports.
 pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
     const NUMBER_BYTES: f64 = 8.0;
-    /// Columns of nearly the same pattern are stored as one block, with zeros: the most numbers for one that couples.
+    /// Largest ratio of stored entries to nonzero ones: columns of nearly the same pattern are stored as one block, with zeros.
     const PADDING: f64 = 1.25;
-    /// A matrix element is a value and a row, and the library that factors it makes a copy.
+    /// A matrix element is a value and a row, and the library that factors the matrix copies it.
     const ELEMENT_BYTES: f64 = 2.0 * (8.0 + 8.0);
     let mesh = Mesh::new(spec.extent(), spec.elements);
     let (columns, rows) = mesh.nodes();
@@ -439,10 +439,10 @@ pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
     factor + matrix + solutions
 }
 
-/// Reason for which a sensor of this `kind` at `position` reads nothing, wherever the plate is touched; `None` when it reads something.
+/// Reason for which a sensor of this `kind` at `position` reads 0 for every contact; `None` for a sensitive sensor.
 ///
-/// On an edge that is held w = 0, so its derivatives along the edge are zero too; on a clamped one the slope across it is
-/// zero, and on a simple one the bending moment across it, and with it the curvature.
+/// On a supported edge w = 0, so the derivatives of w along the edge are zero too. On a clamped edge the slope across it is
+/// zero. On a simply supported edge the bending moment across it is zero, and with it the curvature.
 pub(super) fn insensitive_sensor(
     spec: &PlateSpec,
     kind: SensorKind,
@@ -465,7 +465,7 @@ pub(super) fn insensitive_sensor(
     (kind == SensorKind::Deflection).then_some(InsensitiveSensor::AtSupport { number: support + 1 })
 }
 
-/// The support at `position`, by its index.
+/// Index of the support at `position`.
 pub(super) fn support_at(spec: &PlateSpec, position: Position) -> Option<usize> {
     let slack_m = SAME_PLACE * longer_side_m(spec);
     spec.supports.iter().position(|support| {
@@ -474,7 +474,7 @@ pub(super) fn support_at(spec: &PlateSpec, position: Position) -> Option<usize> 
     })
 }
 
-/// The edges that `position` is on, and how they are held.
+/// The edges at `position`, by name, and their conditions.
 fn edges_at(spec: &PlateSpec, position: Position) -> impl Iterator<Item = (&'static str, Edge)> {
     let near = |value: f64, bound: f64| (value - bound).abs() <= SAME_PLACE * longer_side_m(spec);
     let on = [
@@ -486,7 +486,7 @@ fn edges_at(spec: &PlateSpec, position: Position) -> impl Iterator<Item = (&'sta
     edges(spec).into_iter().zip(on).filter(|(_, on)| *on).map(|((name, _, edge), _)| (name, edge))
 }
 
-/// Each edge's name, its ends, and how it is held.
+/// Name, ends and condition of each edge.
 fn edges(spec: &PlateSpec) -> [(&'static str, [Position; 2], Edge); 4] {
     let corner = |x_m, y_m| Position { x_m, y_m };
     let (length_m, width_m) = (spec.length_m, spec.width_m);

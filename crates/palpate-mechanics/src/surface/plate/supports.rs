@@ -1,20 +1,20 @@
-//! Forces of a plate's point supports, by the force method: the plate is held where it just cannot move, and the supports' forces are
-//! what balances the load and lets the points of the supports move as their springs say.
+//! Forces of a plate's point supports, by the force method. As many degrees of freedom of the plate are constrained as prevent rigid motions.
+//! The forces of the supports then balance the load, and deflect the points of the supports according to their springs.
 //!
-//! Symbols: K₀ stiffness matrix of the plate without point supports; K₀ₕ the same held at as many further degrees of freedom as
+//! Symbols: K₀ stiffness matrix of the plate without point supports; K₀ₕ that matrix with as many further degrees of freedom constrained as
 //! there are rigid motions; R rigid motions, a column each; b the deflection of a support as a functional, B all of them as columns;
 //! c a support's compliance, 0 for a simple one, C all of them as a diagonal; r forces of the supports on the plate; f a load.
 //!
-//! The shape is u = K₀ₕ⁻¹·(f + B·r) + R·a, in balance, R'·f + G'·r = 0 with G = B'·R, where B'·u = −C·r. With S = B'·K₀ₕ⁻¹·B and
-//! y = B'·K₀ₕ⁻¹·f that is
+//! The shape is u = K₀ₕ⁻¹·(f + B·r) + R·a. It is in balance, R'·f + G'·r = 0 with G = B'·R, and at the supports B'·u = −C·r.
+//! With S = B'·K₀ₕ⁻¹·B and y = B'·K₀ₕ⁻¹·f these equations are
 //!
 //! ```text
 //! | S + C  G | |r|     | y    |
 //! | G'     0 |·|a| = − | R'·f |
 //! ```
 //!
-//! (Benzi, Golub and Liesen, *Numerical solution of saddle point problems*, 2005, section 6). However soft the springs are, nothing
-//! in it is small beside something that it is added to, where K₀ + B·C⁻¹·B' is singular to working precision.
+//! (Benzi, Golub and Liesen, *Numerical solution of saddle point problems*, 2005, section 6). Even for very soft springs no term
+//! is small beside a term that it is added to, whereas K₀ + B·C⁻¹·B' is then singular to working precision.
 
 use ndarray::{Array1, Array2};
 
@@ -31,17 +31,17 @@ pub(super) struct SupportForces {
     pub motion_by_load: Array2<f64>,
 }
 
-/// Share of the plate's own compliance that scales supports which do not give where the plate is held.
+/// Share of the plate's own compliance that is added to every scale, for rigid supports at constrained nodes.
 const LEAST_SCALE: f64 = 1e-3;
 
 impl SupportForces {
-    /// From S + C, G, and the plate's own compliance ℓ²/D.
+    /// Blocks of the inverse from S + C, G, and the plate's own compliance ℓ²/D.
     ///
-    /// Scaled so that supports are alike, M = D·(S + C)·D, and the motions orthonormal over them, D·G = Ĝ·L', the equations are those of
-    /// M + Ĝ·Ĝ', which is positive definite wherever the supports hold the plate.
+    /// The supports are scaled to equal size, M = D·(S + C)·D, and the motions are made orthonormal over them, D·G = Ĝ·L'. The equations are
+    /// then those of M + Ĝ·Ĝ', which is positive definite wherever the supports prevent rigid motions.
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`] when the supports do not hold it to working precision, or two are one.
+    /// [`NotPositiveDefinite`] when the supports do not prevent rigid motions to working precision, or two supports coincide.
     pub fn new(
         compliance: &Array2<f64>,
         motions: &Array2<f64>,
@@ -57,7 +57,7 @@ impl SupportForces {
         let flexible = inverse.dot(&orthonormal);
         let shared = Cholesky::factor(orthonormal.t().dot(&flexible))?;
         let by_load = flexible.dot(&inverse_of(&shared));
-        // Forces in balance exactly: what rounding left out is added, and taken off those that are to have no resultant.
+        // The forces balance exactly: the rounding error is added back, and removed from the forces without resultant.
         let lacking = Array2::<f64>::eye(orthonormal.ncols()) - orthonormal.t().dot(&by_load);
         let by_load = &by_load + &orthonormal.dot(&lacking);
         let balanced = |forces: Array2<f64>| &forces - &orthonormal.dot(&orthonormal.t().dot(&forces));
@@ -70,7 +70,7 @@ impl SupportForces {
     }
 }
 
-/// Columns made orthonormal by the method of Gram and Schmidt, gone through twice, and the upper triangle that gives them back.
+/// Orthonormal columns by two passes of Gram–Schmidt, and the upper triangle that restores the originals.
 fn orthonormalised(mut columns: Array2<f64>) -> (Array2<f64>, Array2<f64>) {
     let count = columns.ncols();
     let mut triangle = Array2::zeros((count, count));

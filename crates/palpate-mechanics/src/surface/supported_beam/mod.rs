@@ -1,8 +1,8 @@
 //! A straight beam on any supports, with steps of its section, after Euler and Bernoulli: exact everywhere.
 //!
-//! Between its ends, supports and section steps an unloaded beam is bent into cubics. So is an influence function: by the
-//! theorems of Betti and Maxwell, what a sensor reads of a unit force at a is the deflection at a that a disturbance at the
-//! sensor causes. For a sensor at s these are
+//! Between its ends, supports and section steps the shape of an unloaded beam is a cubic. So is an influence function: by the
+//! theorems of Betti and Maxwell, the reading of a sensor for a unit force at a is the deflection at a under a disturbance at the
+//! sensor. For a sensor at s the disturbances are
 //!
 //! | sensor | disturbance |
 //! |---|---|
@@ -11,8 +11,8 @@
 //! | strain (t/2)·y''(s) | a kink of −t/(2·E·I) |
 //! | reaction of a support at s | the ground under it rises by 1 |
 //!
-//! What the beam admits to the left and to the right of the sensor is known once for all sensors (see `structure`); fitting the
-//! two together is one system of six equations a sensor, and its answer is the whole influence function, with its gradient.
+//! The admissible states to the left and to the right of the sensor are computed once for all sensors (see `structure`). Fitting the
+//! two together requires one system of six equations for each sensor. The result is the whole influence function, with its gradient.
 
 mod spec;
 mod structure;
@@ -31,13 +31,13 @@ use crate::sensing::SensorKind;
 use spec::SAME_PLACE;
 use structure::{Disturbance, Element, Hold, Shape, Site, State, Structure};
 
-/// Influences below this share of full scale are 0 but for rounding.
+/// Influences below this share of full scale are 0 except for rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// A beam on any supports, ready to be asked for influence functions.
+/// A beam on any supports, solved and ready for influence functions.
 ///
-/// Signs are those of the simply supported [`Beam`](super::Beam). At a section step, and at a support that takes up a couple,
-/// the curvature jumps: a strain sensor there is on the right of it, at the beam's right end on the left.
+/// Signs are those of the simply supported [`Beam`](super::Beam). The curvature jumps at a section step, and at a support with a reaction
+/// couple. A strain sensor there is on the right side of the jump; at the beam's right end it is on the left side.
 ///
 /// ```
 /// use palpate_mechanics::contact::Position;
@@ -63,15 +63,15 @@ pub struct SupportedBeam {
     structure: Structure,
     /// The largest bending stiffness D, in N·m².
     stiffness_nm2: f64,
-    /// Of every kind of sensor, in the order of [`SensorKind::ALL`].
+    /// Full scale of every kind of sensor, in the order of [`SensorKind::ALL`].
     full_scales: [f64; SensorKind::ALL.len()],
 }
 
 impl SupportedBeam {
-    /// Checks the description and solves the beam as far as all sensors share.
+    /// Checks the description and computes everything that all sensors share.
     ///
     /// # Errors
-    /// [`SupportedBeamError`], for the first thing that is wrong.
+    /// [`SupportedBeamError`] for the first fault.
     pub fn new(spec: SupportedBeamSpec) -> Result<Self, SupportedBeamError> {
         spec.check()?;
         let stiffnesses = spec.sections.iter().map(|s| s.bending_stiffness(spec.youngs_modulus_pa));
@@ -96,8 +96,8 @@ impl SupportedBeam {
         &self.spec
     }
 
-    /// Disturbance at the place of a sensor of this kind whose shape is its influence function; `None` where it
-    /// reads nothing that a model explains.
+    /// Disturbance at the place of a sensor of this kind: the resulting shape is the sensor's influence function. `None` for a
+    /// raw channel and for a reaction without a support.
     fn disturbance(&self, kind: SensorKind, site: Site) -> Option<Disturbance> {
         let (l, stiffness) = (self.spec.length_m, self.stiffness_nm2);
         match kind {
@@ -131,7 +131,7 @@ impl SupportedBeam {
         let peak = |element, offset| self.shape_at(kind, Site { element, offset }).peak();
         let of_element = |(i, element): (usize, &Element)| match kind {
             SensorKind::Raw => 0.0,
-            // Reactions are felt at the nodes only.
+            // Reactions exist at the nodes only.
             SensorKind::Reaction => peak(i, 0.0).max(peak(i, element.length)),
             _ => largest_within(element.length, |offset| peak(i, offset)),
         };
@@ -164,8 +164,8 @@ impl Surface for SupportedBeam {
         held.then_some(InsensitiveSensor::Held { kind })
     }
 
-    /// Over contact positions exact, as the extremes of cubics; over sensor positions by a scan of every element and golden
-    /// section, to rounding. Found once, when the beam is made.
+    /// Exact over contact positions, as the extremes of cubics. Over sensor positions by a scan of every element and golden
+    /// section search, to rounding. Computed once, in the constructor.
     fn full_scale(&self, kind: SensorKind) -> f64 {
         self.full_scales[kind as usize]
     }
@@ -189,7 +189,7 @@ impl From<SupportedBeam> for SupportedBeamSpec {
     }
 }
 
-/// Nodes at the ends, supports and section steps, and the stretches between them.
+/// Nodes at the ends, supports and section steps, and the elements between them.
 fn structure(spec: &SupportedBeamSpec, stiffness_nm2: f64) -> Structure {
     let l = spec.length_m;
     let places = spec.sections.iter().map(|section| section.to_m);
@@ -231,15 +231,15 @@ fn hold(kind: BeamSupportKind, l: f64, stiffness_nm2: f64) -> Hold {
     }
 }
 
-/// Sensor positions looked at in an element.
+/// Sensor positions in the scan of an element.
 const PEAK_STEPS: u32 = 32;
-/// Steps of the golden section around the best of them.
+/// Steps of the golden section search around the best position.
 const HALVINGS: u32 = 60;
 
-/// The largest value of `at` from 0 to `length`: of evenly spaced places the best, and the best around it by golden section.
+/// The largest value of `at` from 0 to `length`: the best of evenly spaced places, refined by golden section search.
 ///
-/// Exact to rounding where `at` has one maximum between neighbouring places, as the smooth functions of the sensor's position
-/// on one element have, which bend at most a few times on it.
+/// Exact to rounding where `at` has one maximum between neighbouring places. This is true for the smooth functions of the sensor's
+/// position on one element, which bend at most a few times there.
 fn largest_within(length: f64, at: impl Fn(f64) -> f64) -> f64 {
     let place = |step: u32| length * f64::from(step) / f64::from(PEAK_STEPS);
     let (best, value) = (0..=PEAK_STEPS)
@@ -250,7 +250,7 @@ fn largest_within(length: f64, at: impl Fn(f64) -> f64) -> f64 {
     value.max(golden_section(around, at))
 }
 
-/// The largest value that golden section meets (Kiefer, Proc. Am. Math. Soc. 4, 1953).
+/// The largest value in a golden section search (Kiefer, Proc. Am. Math. Soc. 4, 1953).
 fn golden_section((mut low, mut high): (f64, f64), at: impl Fn(f64) -> f64) -> f64 {
     let ratio = 0.5 * (5f64.sqrt() - 1.0);
     let (mut left, mut right) = (high - ratio * (high - low), low + ratio * (high - low));

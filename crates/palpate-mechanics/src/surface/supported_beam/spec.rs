@@ -1,11 +1,11 @@
-//! A beam on any supports as data: its description, what it must say, and the words for it.
+//! The description of a beam on any supports, its checks, and its texts.
 
 use serde::{Deserialize, Serialize};
 
 use crate::units::{Dimension, Quantity, format_length_mm};
 use palpate_numerics::OutOfRange;
 
-/// A straight beam of rectangular sections and what holds it, as plain data, which [`SupportedBeam::new`](super::SupportedBeam::new) checks.
+/// A straight beam of rectangular sections with its supports, as plain data, which [`SupportedBeam::new`](super::SupportedBeam::new) checks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SupportedBeamSpec {
@@ -13,13 +13,13 @@ pub struct SupportedBeamSpec {
     pub length_m: f64,
     /// Young's modulus E, in pascals.
     pub youngs_modulus_pa: f64,
-    /// Stretches of one section each, from left to right, which together are the beam.
+    /// Parts of constant section, from left to right, which together cover the beam.
     pub sections: Vec<BeamSection>,
     /// Supports, in any order.
     pub supports: Vec<BeamSupport>,
 }
 
-/// A stretch of the beam that has one width and thickness. It begins where the one before it ends, the first at 0.
+/// A part of the beam with one width and thickness. It begins at the end of the previous one, the first at 0.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamSection {
@@ -41,7 +41,7 @@ pub struct BeamSupport {
     pub kind: BeamSupportKind,
 }
 
-/// Kind of a support: how it holds the beam.
+/// Kind of a support: the motions that it prevents.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum BeamSupportKind {
@@ -51,13 +51,13 @@ pub enum BeamSupportKind {
     Clamped,
     /// No slope, free to deflect.
     Guided,
-    /// Not at all: an end of the beam without a support, said so.
+    /// An end of the beam without a support, listed explicitly.
     Free,
     /// A spring under the beam.
     Elastic {
         /// Upward force per metre of downward deflection, in N/m.
         stiffness_n_per_m: f64,
-        /// Couple against the slope, in N·m/rad; `None` where it is free to turn.
+        /// Couple against the slope, in N·m/rad; `None` for a support that is free to turn.
         rotational_stiffness_nm_per_rad: Option<f64>,
     },
 }
@@ -81,12 +81,12 @@ impl BeamSupportKind {
         }
     }
 
-    /// Whether it takes up force across the beam.
+    /// True for a support with a transverse reaction force.
     pub const fn takes_force(self) -> bool {
         matches!(self, Self::Simple | Self::Clamped | Self::Elastic { .. })
     }
 
-    /// Whether it takes up a couple.
+    /// True for a support with a reaction couple.
     pub const fn takes_couple(self) -> bool {
         matches!(
             self,
@@ -95,17 +95,17 @@ impl BeamSupportKind {
     }
 }
 
-/// More sections, and more supports, than a bench has.
+/// Largest number of sections, and of supports: more than a bench has.
 const MOST: usize = 100;
-/// Places nearer than this share of the length are one.
+/// Positions closer than this share of the length are the same.
 pub(super) const SAME_PLACE: f64 = 1e-9;
 
 impl SupportedBeamSpec {
-    /// Checks that the beam can be computed: numbers in their bounds, sections that cover it, supports on it and apart, and
-    /// enough of them.
+    /// Checks that the beam can be computed: values in range, sections that cover it, and enough supports on it at different
+    /// positions.
     ///
     /// # Errors
-    /// [`SupportedBeamError`], for the first thing that is wrong.
+    /// [`SupportedBeamError`] for the first fault.
     pub fn check(&self) -> Result<(), SupportedBeamError> {
         OutOfRange::check_positive([
             ("a beam's length", self.length_m),
@@ -170,7 +170,7 @@ impl SupportedBeamSpec {
         Ok(())
     }
 
-    /// Moving up and down and turning must both be held.
+    /// Checks that the supports prevent both translation and rotation.
     fn check_held(&self) -> Result<(), SupportedBeamError> {
         let mut forces = self.supports.iter().filter(|support| support.kind.takes_force());
         let couples = self.supports.iter().any(|support| support.kind.takes_couple());
@@ -185,7 +185,7 @@ impl SupportedBeamSpec {
 }
 
 impl SupportedBeamSpec {
-    /// "clamped at 0 mm, elastic (2 N/mm) at 300 mm", from left to right.
+    /// Text of the supports from left to right: "clamped at 0 mm, elastic (2 N/mm) at 300 mm".
     pub fn supports_in_words(&self) -> String {
         let mut supports = self.supports.clone();
         supports.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
@@ -195,7 +195,7 @@ impl SupportedBeamSpec {
         supports.iter().map(words).collect::<Vec<_>>().join(", ")
     }
 
-    /// "40 mm × 1.2 mm", or "40 mm × 2 mm up to 100 mm, 40 mm × 1.2 mm up to 300 mm": width × thickness.
+    /// Text of the sections as width × thickness: "40 mm × 1.2 mm", or "40 mm × 2 mm up to 100 mm, 40 mm × 1.2 mm up to 300 mm".
     pub fn sections_in_words(&self) -> String {
         let size = |section: &BeamSection| {
             format!("{} × {}", format_length_mm(section.width_m), format_length_mm(section.thickness_m))
@@ -226,7 +226,7 @@ fn kind_in_words(kind: BeamSupportKind) -> String {
     }
 }
 
-/// Error of a beam on supports that cannot be computed, with the part that is at fault. Sections and supports are numbered from 1, in the
+/// Error of a beam on supports that cannot be computed, with the part at fault. Sections and supports are numbered from 1, in the
 /// order of the description.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SupportedBeamError {
@@ -236,36 +236,36 @@ pub enum SupportedBeamError {
     /// A dimension of a section is not a positive, finite number.
     #[error("section {number}: {fault}")]
     Section {
-        /// Which section.
+        /// Number of the section.
         number: usize,
-        /// Which dimension, in SI units.
+        /// The dimension, in SI units.
         fault: OutOfRange,
     },
     /// A spring's stiffness is not a positive, finite number.
     #[error("support {number}: {fault}")]
     Stiffness {
-        /// Which support.
+        /// Number of the support.
         number: usize,
-        /// Which stiffness, in SI units.
+        /// The stiffness, in SI units.
         fault: OutOfRange,
     },
-    /// More sections than are computed.
+    /// More sections than the largest number.
     #[error("the beam has {found} sections; it can have at most {most}")]
     TooManySections {
-        /// Number of them.
+        /// Number of sections.
         found: usize,
-        /// The most that there can be.
+        /// Largest number.
         most: usize,
     },
-    /// More supports than are computed.
+    /// More supports than the largest number.
     #[error("the beam has {found} supports; it can have at most {most}")]
     TooManySupports {
-        /// Number of them.
+        /// Number of supports.
         found: usize,
-        /// The most that there can be.
+        /// Largest number.
         most: usize,
     },
-    /// Sections overlap, or one is out of order.
+    /// Sections overlap, or are out of order.
     #[error(
         "section {number} ends at {}, but the one before it reaches to {}: sections follow each other from left to right and do \
          not overlap",
@@ -273,21 +273,21 @@ pub enum SupportedBeamError {
         format_length_mm(*from_m)
     )]
     SectionsOverlap {
-        /// Which section.
+        /// Number of the section.
         number: usize,
         /// End of the section before it, or 0, in metres.
         from_m: f64,
         /// End, in metres.
         to_m: f64,
     },
-    /// A section reaches beyond the beam.
+    /// A section extends beyond the beam.
     #[error(
         "section {number} ends at {}, beyond the beam's end at {}",
         format_length_mm(*to_m),
         format_length_mm(*length_m)
     )]
     SectionBeyond {
-        /// Which section.
+        /// Number of the section.
         number: usize,
         /// End, in metres.
         to_m: f64,
@@ -306,38 +306,38 @@ pub enum SupportedBeamError {
         /// The beam's length, in metres.
         length_m: f64,
     },
-    /// A support beside the beam.
+    /// A support off the beam.
     #[error(
         "support {number} is at {}, off the beam; it must be within 0 and {}",
         format_length_mm(*at_m),
         format_length_mm(*length_m)
     )]
     SupportOffBeam {
-        /// Which support.
+        /// Number of the support.
         number: usize,
         /// Position, in metres.
         at_m: f64,
         /// The beam's length, in metres.
         length_m: f64,
     },
-    /// Two supports at one place.
+    /// Two supports at one position.
     #[error("supports {first} and {second} are both at {}", format_length_mm(*at_m))]
     SupportsTogether {
-        /// The one.
+        /// Number of the first support.
         first: usize,
-        /// The other, which comes later.
+        /// Number of the second support.
         second: usize,
         /// Their position, in metres.
         at_m: f64,
     },
-    /// A place within the beam that is said to be a free end.
+    /// A free end within the beam.
     #[error(
         "support {number} is `free` at {}, within the beam; free is an end, at 0 or {}",
         format_length_mm(*at_m),
         format_length_mm(*length_m)
     )]
     FreeWithin {
-        /// Which support.
+        /// Number of the support.
         number: usize,
         /// Position, in metres.
         at_m: f64,
@@ -347,10 +347,10 @@ pub enum SupportedBeamError {
     /// The supports let the beam move as a whole.
     #[error("the beam is a mechanism: {motion}")]
     Mechanism {
-        /// Motion that nothing prevents.
+        /// Motion that the supports allow.
         motion: RigidMotion,
     },
-    /// The deflections are not numbers that can be computed with.
+    /// The largest deflection is not positive and finite, or is lost in rounding.
     #[error(
         "a beam's largest deflection is {compliance_m_per_n} m/N; it must be greater than 0 and finite, and not be lost beside \
          the largest stiffness"
@@ -361,16 +361,16 @@ pub enum SupportedBeamError {
     },
 }
 
-/// A motion of the whole beam that bends nothing and that no support takes up.
+/// A motion of the whole beam that causes no bending and no reaction of a support.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RigidMotion {
-    /// All of them.
+    /// Translation and rotation.
     #[error("no support takes up force or couple, so it can move up and down and turn freely")]
     Any,
-    /// Up and down.
-    #[error("its supports hold the slope only, so it can move up and down freely")]
+    /// Translation up and down.
+    #[error("its supports fix the slope only, so it can move up and down freely")]
     UpAndDown,
-    /// About the only support.
+    /// Rotation about the only support.
     #[error("only the support at {} takes up force, so it can turn about that freely", format_length_mm(*about_m))]
     Turning {
         /// Position of that support, in metres.
@@ -378,10 +378,10 @@ pub enum RigidMotion {
     },
 }
 
-/// Part of a beam's description that is at fault.
+/// Part of a beam's description at fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BeamPart {
-    /// All of it.
+    /// The whole description.
     Whole,
     /// The supports together.
     Supports,
@@ -394,7 +394,7 @@ pub enum BeamPart {
 }
 
 impl SupportedBeamError {
-    /// The part that is at fault.
+    /// The part at fault.
     pub const fn part(&self) -> BeamPart {
         match *self {
             Self::NotPositive(_) | Self::Compliance { .. } => BeamPart::Whole,
@@ -410,7 +410,7 @@ impl SupportedBeamError {
         }
     }
 
-    /// Advice on what would help.
+    /// Advice on a remedy.
     pub const fn help(&self) -> Option<&'static str> {
         match self {
             Self::SectionsEnd { .. } => {

@@ -1,13 +1,13 @@
-//! The beam between its nodes: which states it admits, and how it bends after a disturbance at one place.
+//! The beam between its nodes: its admissible states, and its shape after a disturbance at one place.
 //!
-//! Lengths here are shares of the beam's length l and stiffnesses shares of its largest bending stiffness D, so that all
+//! Lengths here are shares of the beam's length l, and stiffnesses are shares of the beam's largest bending stiffness D. So all
 //! four numbers of a state have one magnitude and one unit, that of the deflection.
 //!
-//! Whatever acts further along, the stretches passed so far leave two freedoms: the states of a section are the
-//! combinations of two. A sweep carries such a pair from the free air before the beam through its supports and stretches,
-//! and makes it orthonormal after every support, so that nothing is lost on the way (Godunov's orthogonal sweep, Uspekhi
-//! Mat. Nauk 16(3), 1961). Stiffness matrices are not formed: theirs have entries of 12·E·I/h³, of which a short element
-//! takes (l/h)³ digits away, and a rigid support is not a stiff spring's limit in them.
+//! For any load further along, the elements passed so far leave two degrees of freedom: the states of a section are the
+//! combinations of two. A sweep carries such a pair from the free space before the beam through its supports and elements.
+//! It makes the pair orthonormal after every support, to avoid loss of precision (Godunov's orthogonal sweep, Uspekhi
+//! Mat. Nauk 16(3), 1961). Stiffness matrices are not formed: their entries 12·E·I/h³ cost (l/h)³ digits for a short
+//! element, and they cannot represent a rigid support as the limit of a stiff spring.
 
 use std::ops::{Add, Mul};
 
@@ -16,11 +16,11 @@ use crate::contact::Position;
 use crate::surface::InfluenceFunction;
 use palpate_numerics::small::solve_general;
 
-/// The beam between its nodes, with the states that it admits from both ends.
+/// The beam between its nodes, with its admissible states from both ends.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Structure {
     length_m: f64,
-    /// Places of the nodes, as shares of the length: ends, supports and section steps.
+    /// Positions of the nodes, as shares of the length: ends, supports and section steps.
     pub nodes: Vec<f64>,
     pub holds: Vec<Hold>,
     /// One fewer than nodes.
@@ -29,11 +29,11 @@ pub(super) struct Structure {
     back: Sweep,
 }
 
-/// A place in an element. At the element's ends it is on this element's side of their supports and steps.
+/// A place in an element. At the ends of the element it is on the element's side of the supports and steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Site {
     pub element: usize,
-    /// From the element's beginning, as a share of the beam's length; from 0 to the element's length.
+    /// Distance from the element's beginning, as a share of the beam's length; from 0 to the element's length.
     pub offset: f64,
 }
 
@@ -46,16 +46,16 @@ pub(super) enum Disturbance {
     Settlement,
 }
 
-/// States that the beam admits on both sides of a site.
+/// Admissible states of the beam on both sides of a site.
 struct Surroundings {
-    /// Admitted by the beam to its left, in the factors of this element, if any.
+    /// Admissible states of the beam to the left, in the factors of `left_element`, if any.
     left: Pair,
     left_element: Option<usize>,
-    /// Admitted by the beam to its right, in the factors of this element of the sweep back, if any.
+    /// Admissible states of the beam to the right, in the factors of `right_element` of the backward sweep, if any.
     right: Pair,
     right_element: Option<usize>,
     hold: Hold,
-    /// Whether the hold is to the left of what happens.
+    /// True when the support is to the left of the disturbance.
     held_left: bool,
 }
 
@@ -67,7 +67,7 @@ impl Structure {
         Self { length_m, nodes, holds, elements, forth, back }
     }
 
-    /// The site of a sensor: in the element to the right of a node, but for the last one.
+    /// The site of a sensor: in the element to the right of a node, except for the last node.
     pub fn site(&self, place: f64) -> Site {
         let last = self.elements.len() - 1;
         let element =
@@ -99,7 +99,7 @@ impl Structure {
         Shape { length_m: self.length_m, pieces: vec![piece] }
     }
 
-    /// The beam's shape after a disturbance: all it admits to the left and to the right of the site, fitted together.
+    /// The beam's shape after a disturbance: the admissible states to the left and to the right of the site, fitted together.
     pub fn shape(&self, site: Site, disturbance: Disturbance) -> Shape {
         let around = self.surroundings(site);
         let (left, right) = around.fitted(disturbance);
@@ -111,7 +111,7 @@ impl Structure {
     fn surroundings(&self, Site { element, offset }: Site) -> Surroundings {
         let last = self.elements.len() - 1;
         let Element { length, stiffness, .. } = self.elements[element];
-        // Elements to the right of this one; the sweep back passes them before it.
+        // Elements to the right of this one, which the backward sweep passes first.
         let beyond = last - element;
         let forward = |offset: f64| self.forth.start(element).map(|state| state.advanced(offset, stiffness));
         let backward = |offset: f64| self.back.start(beyond).map(|state| state.advanced(offset, stiffness));
@@ -142,7 +142,7 @@ impl Structure {
         pieces
     }
 
-    /// Whole elements with the states at their left and right ends.
+    /// Whole elements, with the states at their left and right ends.
     fn pieces(
         &self,
         elements: impl Iterator<Item = usize>,
@@ -170,8 +170,8 @@ impl Structure {
 }
 
 impl Surroundings {
-    /// The factors of both sides: from left to right the state jumps by the disturbance, by the support's force and by its
-    /// couple; the support gives way to the one and turns under the other. Six equations.
+    /// The factors of both sides, from six equations. From left to right the state jumps by the disturbance, by the support's force and by its
+    /// couple. The support's deflection is proportional to the force, and its rotation to the couple.
     fn fitted(&self, disturbance: Disturbance) -> (Factors, Factors) {
         let (jump, settlement) = match disturbance {
             Disturbance::Jump(jump) => (jump, 0.0),
@@ -209,17 +209,17 @@ impl Surroundings {
     }
 }
 
-/// Influence function of a sensor, as the shape that a disturbance at the sensor bends the beam into (Betti and Maxwell;
+/// Influence function of a sensor: the shape of the beam under a disturbance at the sensor (Betti and Maxwell;
 /// Müller-Breslau, *Die neueren Methoden der Festigkeitslehre*, 1886).
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Shape {
-    /// In metres.
+    /// Length of the beam, in metres.
     pub length_m: f64,
-    /// From one end of the beam to the other.
+    /// Cubics from one end of the beam to the other.
     pub pieces: Vec<Piece>,
 }
 
-/// One cubic, known by its states at both ends. Places are shares of the beam's length.
+/// One cubic, given by its states at both ends. Places are shares of the beam's length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Piece {
     pub from: f64,
@@ -230,7 +230,7 @@ pub(super) struct Piece {
 }
 
 impl Piece {
-    /// The state at a place, from the nearer end: beside a support the deflection is then as small as it should be.
+    /// The state at a place, computed from the nearer end: the deflection then vanishes correctly next to a support.
     fn state_at(&self, place: f64) -> State {
         let (behind, ahead) = (place - self.from, self.to - place);
         if behind <= ahead {
@@ -274,18 +274,18 @@ impl InfluenceFunction for Shape {
     }
 }
 
-/// The real roots of a·t² + b·t + c; NaN for those that are not there.
+/// The real roots of a·t² + b·t + c; NaN for a missing one.
 fn roots(a: f64, b: f64, c: f64) -> [f64; 2] {
     let root = (b * b - 4.0 * a * c).sqrt();
     let q = -0.5 * (b + if b < 0.0 { -root } else { root });
     [q / a, c / q]
 }
 
-/// Two states whose combinations are all that can be; the factors of a combination.
+/// Two states that span all admissible ones; the factors of a combination.
 type Pair = [State; 2];
 type Factors = [f64; 2];
 
-/// Compliances of a node's support: how far it gives way to a unit force and turns under a unit couple, in the states' unit. 0 is
+/// Compliances of a node's support: deflection per unit force and rotation per unit couple, in the states' unit. 0 is
 /// rigid, `None` free.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Hold {
@@ -293,38 +293,38 @@ pub(super) struct Hold {
     pub turning: Option<f64>,
 }
 
-/// A stretch between neighbouring nodes.
+/// The part of the beam between neighbouring nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Element {
-    /// As a share of the beam's length.
+    /// Length as a share of the beam's length.
     pub length: f64,
-    /// As a share of the beam's largest bending stiffness.
+    /// Bending stiffness as a share of the beam's largest.
     pub stiffness: f64,
     pub thickness_m: f64,
 }
 
-/// The admitted states of every element, in the direction of the sweep.
+/// The admissible states of every element, in the direction of the sweep.
 #[derive(Clone, Debug, PartialEq)]
 struct Sweep {
     passages: Vec<Passage>,
 }
 
-/// One element's.
+/// The admissible states of one element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Passage {
-    /// Just behind the support at its beginning.
+    /// Pair just behind the support at the element's beginning.
     start: Pair,
-    /// Just before the support at its end, with the same factors.
+    /// Pair just before the support at the element's end, with the same factors.
     end: Pair,
-    /// From this element's factors to those of the one before.
+    /// Matrix from this element's factors to those of the element before.
     before: [Factors; 2],
 }
 
-/// States of a section before the beam, which nothing holds.
+/// States of an unsupported section before the beam.
 const FREE: Pair = [State::DEFLECTION, State::SLOPE];
 
 impl Sweep {
-    /// Through `elements`, each with the hold of the node at its beginning.
+    /// Sweeps through `elements`, each with the support of the node at its beginning.
     pub fn new(elements: impl Iterator<Item = (Hold, Element)>) -> Self {
         let mut passages = Vec::new();
         let mut pair = FREE;
@@ -342,14 +342,14 @@ impl Sweep {
         self.passages[element].start
     }
 
-    /// The pair just before the support at the end of the elements passed so far, counted from 0; that of the free air
-    /// where none was.
+    /// The pair just before the support at the end of the first `passed` elements; the pair of the free space
+    /// for none.
     pub fn end(&self, passed: usize) -> Pair {
         passed.checked_sub(1).map_or(FREE, |last| self.passages[last].end)
     }
 
-    /// The states at the beginning and the end of `element` and of all before it, nearest first, when the combination in
-    /// `element` has these factors.
+    /// The states at the beginning and the end of `element` and of all elements before it, nearest first, for the combination with these
+    /// factors in `element`.
     pub fn back_from(&self, element: usize, factors: Factors) -> impl Iterator<Item = (State, State)> + '_ {
         self.passages[..=element].iter().rev().scan(factors, |factors, passage| {
             let states = (combined(passage.start, *factors), combined(passage.end, *factors));
@@ -364,7 +364,7 @@ fn combined([first, second]: Pair, [a, b]: Factors) -> State {
     first * a + second * b
 }
 
-/// A pair, and the matrix from its factors to those of the pair that it comes from, by columns.
+/// A pair, and the matrix from its factors to those of the original pair, by columns.
 type Mixture = (Pair, [Factors; 2]);
 
 const UNMIXED: [Factors; 2] = [[1.0, 0.0], [0.0, 1.0]];
@@ -373,8 +373,8 @@ fn mixed([first, second]: [Factors; 2], [a, b]: Factors) -> Factors {
     [first[0] * a + second[0] * b, first[1] * a + second[1] * b]
 }
 
-/// Behind a support that gives way by c to a unit force: of the combinations, one has no deflection and passes as it is;
-/// the other one meets a force of −w/c, here times c so that a rigid support is nothing special.
+/// The pair behind a support with the compliance c. One combination has no deflection and passes unchanged.
+/// The other one gets a force of −w/c; it is multiplied by c, so that a rigid support needs no special case.
 fn yielded(mixture: Mixture, yielding: Option<f64>) -> Mixture {
     let Some(c) = yielding else { return mixture };
     let ((still, still_mix), (moving, moving_mix)) = parted(mixture, |state| state.deflection);
@@ -382,7 +382,7 @@ fn yielded(mixture: Mixture, yielding: Option<f64>) -> Mixture {
     ([State { deflection: 0.0, ..still }, met], [still_mix, moving_mix.map(|factor| factor * c)])
 }
 
-/// Behind a support that turns by c under a unit couple, likewise.
+/// The pair behind a support with the rotational compliance c, likewise.
 fn turned(mixture: Mixture, turning: Option<f64>) -> Mixture {
     let Some(c) = turning else { return mixture };
     let ((still, still_mix), (moving, moving_mix)) = parted(mixture, |state| state.slope);
@@ -390,7 +390,7 @@ fn turned(mixture: Mixture, turning: Option<f64>) -> Mixture {
     ([State { slope: 0.0, ..still }, met], [still_mix, moving_mix.map(|factor| factor * c)])
 }
 
-/// The combination of which `part` is 0, and the one at right angles to it.
+/// The combination with `part` equal to 0, and the one at right angles to it.
 fn parted((pair, mix): Mixture, part: fn(State) -> f64) -> ((State, Factors), (State, Factors)) {
     let [a, b] = pair.map(part);
     let size = a.hypot(b);
@@ -399,7 +399,7 @@ fn parted((pair, mix): Mixture, part: fn(State) -> f64) -> ((State, Factors), (S
     (combination([-b, a]), combination([a, b]))
 }
 
-/// Gram and Schmidt's, done twice, which is enough (Kahan, in Parlett, *The Symmetric Eigenvalue Problem*, 6.9).
+/// Gram–Schmidt, done twice, which is enough (Kahan, in Parlett, *The Symmetric Eigenvalue Problem*, 6.9).
 fn orthonormal(mixture: Mixture) -> Mixture {
     let (mut pair, mut mix) = mixture;
     scale(&mut pair, &mut mix, 0);
@@ -422,13 +422,13 @@ fn scale(pair: &mut Pair, mix: &mut [Factors; 2], which: usize) {
 }
 
 /// The state of one section: deflection w, slope θ = dw/dξ, moment M = r·d²w/dξ² and its derivative V = dM/dξ, with
-/// ξ = x/l and r the stretch's stiffness over D. All but w are continuous wherever nothing acts, and so is w.
+/// ξ = x/l and r the element's stiffness over D. All four are continuous where no disturbance acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct State {
     pub deflection: f64,
     pub slope: f64,
     pub moment: f64,
-    /// Upward loads make it jump up: D·ΔV = q·l³ for a force q in newtons.
+    /// Jumps up at upward loads: D·ΔV = q·l³ for a force q in newtons.
     pub shear: f64,
 }
 
@@ -438,7 +438,7 @@ impl State {
     pub const MOMENT: Self = Self { deflection: 0.0, slope: 0.0, moment: 1.0, shear: 0.0 };
     pub const SHEAR: Self = Self { deflection: 0.0, slope: 0.0, moment: 0.0, shear: 1.0 };
 
-    /// The state `by` further along a stretch of this stiffness that carries no load: w is a cubic.
+    /// The state `by` further along an unloaded element of this stiffness: w is a cubic.
     pub fn advanced(self, by: f64, stiffness: f64) -> Self {
         let Self { deflection, slope, moment, shear } = self;
         Self {
@@ -449,7 +449,7 @@ impl State {
         }
     }
 
-    /// The same state, seen by someone who walks the beam from its other end.
+    /// The state in the opposite direction of x.
     pub fn mirrored(self) -> Self {
         Self { slope: -self.slope, shear: -self.shear, ..self }
     }

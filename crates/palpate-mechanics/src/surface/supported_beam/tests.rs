@@ -11,7 +11,7 @@ mod refusals;
 
 static PAPER: LazyLock<Beam> = LazyLock::new(|| Beam::new(0.4, 0.04, 0.0012, 200e9).unwrap());
 
-/// A spring.
+/// An elastic support.
 fn spring(stiffness_n_per_m: f64, rotational_stiffness_nm_per_rad: Option<f64>) -> BeamSupportKind {
     BeamSupportKind::Elastic { stiffness_n_per_m, rotational_stiffness_nm_per_rad }
 }
@@ -48,7 +48,7 @@ fn largest_difference(a: &dyn Surface, b: &dyn Surface, supports_m: &[f64]) -> f
                 let [here, there] = [0, 1].map(|i| functions[i].at(contact));
                 largest = largest.max((here - there).abs() / a.full_scale(kind));
                 let [here, there] = [0, 1].map(|i| functions[i].gradient(contact)[0]);
-                // A kink over the sensor may be answered from either side.
+                // At a kink over the sensor the value of either side is valid.
                 if (contact.x_m - sensor_m).abs() > 1e-6 * l {
                     largest = largest.max((here - there).abs() * l / (12.0 * a.full_scale(kind)));
                 }

@@ -1,4 +1,4 @@
-//! Verdicts on outcomes that are made up, so that every claim is seen to hold and to fail.
+//! Claims on artificial outcomes, which confirm every claim or reject it.
 
 use super::*;
 use crate::{ArmOutcome, PreparedStudy, Study, TrainedSeed};
@@ -7,7 +7,7 @@ use palpate_numerics::watch::Watch;
 /// Results of a made-up arm: the error of every estimate in % of the length, and the epochs.
 type MadeUp = fn(&str, u32) -> (f64, u32);
 
-/// The paper's arms with three seeds each, whose locators are off by `made_up`.
+/// The paper's arms with three seeds each and the errors `made_up`.
 fn judged(made_up: MadeUp) -> Vec<Claim> {
     let text = crate::paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 1");
     let prepared = PreparedStudy::new(Study::from_toml(&text).unwrap(), Watch::NONE).unwrap();

@@ -161,7 +161,7 @@ fn drift_is_found_where_there_is_any() {
     }
 }
 
-/// Mean error in millimetres, and share of the 95 % intervals that hold the contact, of strips of so many presses that drift: of locators
+/// Mean error in millimetres, and share of the 95 % intervals that cover the contact, of strips of so many presses that drift: of locators
 /// from all presses, and from half as many in their place.
 fn condensed_under_drift(presses: usize, course: Course, places: usize) -> [[f64; 2]; 2] {
     let count = benches(1);

@@ -1,4 +1,4 @@
-//! Back-propagation with momentum, one network, as the textbook has it: the reference that the SIMD lanes are held to.
+//! Back-propagation with momentum, one network, as in textbooks: the reference for the SIMD lanes.
 //!
 //! Rumelhart, Hinton and Williams, Nature 323 (1986), with one update a pattern. Symbols: w weights, Δw the last step,
 //! x inputs of a layer, z weighted sums, a outputs, t targets, δ = −∂E/∂z for E = ½ Σ (t − a)², η learning rate,
@@ -10,7 +10,7 @@
 //! Δw = η δ x + α Δw_last
 //! ```
 //!
-//! `V` is one lane of the arithmetic that the SIMD lanes have, so that both round alike.
+//! `V` is one lane of the SIMD lanes' arithmetic, so that both round alike.
 
 use crate::network::logistic::{activate, derivative};
 use crate::network::train::Layer;
@@ -55,7 +55,7 @@ fn value<V: Vector<1>>(x: f64) -> V {
     V::splat(V::Real::from_f64(x))
 }
 
-/// Every pattern's inputs, each row followed by the 1 that the biases weigh.
+/// Every pattern's inputs, each row followed by the 1 for the biases.
 fn inputs_with_bias<V: Vector<1>>(task: &TrainingTask) -> Vec<V> {
     let bias = task.topology.biases.then_some(1.0);
     let rows = task.patterns.input_values.chunks_exact(task.patterns.inputs);

@@ -1,4 +1,4 @@
-//! Equilibrium of plates, however soft or stiff what holds them is.
+//! Equilibrium of plates on supports of any stiffness.
 
 use super::*;
 
@@ -17,7 +17,7 @@ fn imbalance(plate: &Plate, contact: Position) -> f64 {
         .fold(0.0, |a, b| if b <= a { a } else { b })
 }
 
-/// A plate on nothing but springs: four corners, the middle of an edge and a point off the nodes.
+/// A plate on springs only: at four corners, the middle of an edge and a point off the nodes.
 fn on_springs(stiffness_n_per_m: f64, elements: usize) -> Plate {
     let mut spec = steel(0.3, 0.2, Edges::default(), elements);
     let places = [(0.0, 0.0), (0.3, 0.0), (0.0, 0.2), (0.3, 0.2), (0.15, 0.0), (0.1234, 0.117)];
@@ -43,7 +43,7 @@ fn springs_of_every_stiffness_balance_force_and_moments() {
 
 #[test]
 fn a_plate_on_soft_springs_moves_as_a_rigid_one_and_bends_as_if_the_springs_were_forces() {
-    // Closed form of a rigid plate on springs k at its four corners: a force at (x, y) is shared as products of linear functions, and
+    // Closed form of a rigid plate on springs k at its four corners: the springs share a force at (x, y) as products of linear functions, which
     // lowers the plate by (1 + (2x/l − 1)·(2x'/l − 1) + (2y/b − 1)·(2y'/b − 1))/(4k) at (x', y').
     let corners = [(0.0, 0.0), (0.3, 0.0), (0.0, 0.2), (0.3, 0.2)];
     for stiffness_n_per_m in [1e-3, 0.2] {
@@ -55,7 +55,7 @@ fn a_plate_on_soft_springs_moves_as_a_rigid_one_and_bends_as_if_the_springs_were
             let ([a, b], [c, d]) = (share(sensor), share(contact));
             let rigid = -(1.0 + a * c + b * d) / (4.0 * stiffness_n_per_m);
             let found = deflection(&plate, sensor, contact);
-            // What the plate bends is of the order of l²/D = 0.01 m/N, the spring's give 1/k.
+            // The plate's bending is of the order of l²/D = 0.01 m/N, the deflection of a spring is 1/k.
             assert!((found - rigid).abs() < 0.01, "{found} {rigid}");
             for (x, y) in corners {
                 let [e, f] = share(at(x, y));
@@ -64,7 +64,7 @@ fn a_plate_on_soft_springs_moves_as_a_rigid_one_and_bends_as_if_the_springs_were
                 assert!((reaction - shared).abs() < 0.02 * stiffness_n_per_m, "{reaction} {shared}");
             }
         }
-        // A strain gauge sees no rigid motion: the softer the springs, the more exactly the forces of a rigid plate bend it.
+        // A strain gauge is insensitive to rigid motions: for softer springs its reading is closer to that under the forces of a rigid plate.
         let strain = |plate: &Plate| plate.influence(SensorKind::Strain, at(0.16, 0.11), at(0.12, 0.09));
         let stiffer = on_corners(1.0);
         assert!(off(strain(&plate), strain(&stiffer)) < 0.05, "{} {}", strain(&plate), strain(&stiffer));
@@ -134,7 +134,7 @@ fn held_edges_balance_on_every_mesh() {
             Edges { left: Edge::Clamped, bottom: Edge::Simple, ..Edges::default() },
             Edges { left: Edge::Simple, right: Edge::Simple, ..Edges::default() },
         ] {
-            // Solving checks a grid of forces against what edges and supports carry.
+            // The solution checks a grid of forces against the reactions of edges and supports.
             let mut spec = steel(0.3, 0.2, edges, elements);
             let on_edge = Plate::new(spec.clone()).unwrap().solve();
             spec.supports = vec![simple_at(0.1234, 0.0876), elastic_at(0.21, 0.123, 1e-3)];

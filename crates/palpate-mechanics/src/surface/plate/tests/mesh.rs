@@ -1,4 +1,4 @@
-//! The elements, their order of elimination, and what they need.
+//! The elements, their order of elimination, and their memory.
 
 use proptest::prelude::*;
 
@@ -81,8 +81,8 @@ fn a_mesh_has_no_element_longer_than_wide_unless_four_are_too_many() {
     assert_eq!(mesh(0.4, 0.01, 40), (40, 4));
 }
 
-/// The largest difference of deflections between two meshes of one plate, as a share of full scale, the sensors' own places
-/// among those of the contact.
+/// The largest difference of deflections between two meshes of one plate, as a share of full scale. The contact positions include
+/// the positions of the sensors.
 fn difference(one: &Plate, other: &Plate) -> f64 {
     let place = |x: f64, y: f64| at(one.spec().length_m * x, one.spec().width_m * y);
     let sensors = [(0.25, 0.25), (0.5, 0.5), (0.611, 0.3), (0.9, 0.07), (0.99, 0.4)];
@@ -99,8 +99,8 @@ fn difference(one: &Plate, other: &Plate) -> f64 {
     worst / one.full_scale(SensorKind::Deflection)
 }
 
-/// By the second order of a force's singularity the finer of two meshes, with half the side, has a third of their difference
-/// as its error.
+/// The convergence at a force's singularity is of second order. So the error of the finer of two meshes, with half the side, is a third of
+/// their difference.
 #[test]
 fn the_default_mesh_holds_deflections_to_a_ten_thousandth_of_full_scale() {
     let mut on_points = steel(0.3, 0.2, Edges::all(Edge::Free), 64);

@@ -1,4 +1,4 @@
-//! Plates held against series, beams, and the properties that every plate has.
+//! Plates compared with series and beams, and properties of every plate.
 
 mod balance;
 mod beams;
@@ -10,7 +10,7 @@ mod stopped;
 
 use super::*;
 
-/// A steel plate, 0.8 mm thick, with nothing at points.
+/// A steel plate, 0.8 mm thick, without point supports.
 fn steel(length_m: f64, width_m: f64, edges: Edges, elements: usize) -> PlateSpec {
     PlateSpec {
         length_m,
@@ -46,7 +46,7 @@ fn deflection(plate: &Plate, sensor: Position, contact: Position) -> f64 {
     plate.influence(SensorKind::Deflection, sensor, contact)
 }
 
-/// The integral of an influence function over the plate: the reading under a uniform load of one pascal. By Simpson's rule
+/// The integral of an influence function over the plate: the reading under a uniform load of one pascal. Computed by Simpson's rule
 /// on the elements, which is exact for cubic functions.
 fn under_uniform_load(plate: &Plate, kind: SensorKind, sensor: Position) -> f64 {
     let influence = plate.influence_function(kind, sensor);
@@ -74,12 +74,12 @@ fn mesh_of(plate: &Plate) -> super::mesh::Mesh {
     super::mesh::Mesh::new(plate.extent(), plate.spec().elements)
 }
 
-/// log₂ of how much smaller each error is than the one before.
+/// log₂ of the ratio of each error to the next.
 fn orders(errors: &[f64]) -> Vec<f64> {
     errors.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect()
 }
 
-/// The share by which `found` is off.
+/// Relative error of `found`.
 fn off(found: f64, expected: f64) -> f64 {
     (found / expected - 1.0).abs()
 }

@@ -18,7 +18,7 @@ static MIXED: LazyLock<Plate> = LazyLock::new(|| {
     plate(spec)
 });
 
-/// Four points, one of which gives.
+/// Four point supports, one of them elastic.
 static ON_POINTS: LazyLock<Plate> = LazyLock::new(|| {
     let mut spec = steel(LENGTH_M, WIDTH_M, Edges::all(Edge::Free), 20);
     spec.supports = vec![
@@ -36,7 +36,7 @@ prop_compose! {
     fn anywhere()(x in 0.0..=LENGTH_M, y in 0.0..=WIDTH_M) -> Position { at(x, y) }
 }
 
-/// Far enough from the edges for differences on either side.
+/// A position far enough from the edges for differences on either side.
 fn inside(x: f64, y: f64) -> Position {
     at(0.01 + 0.28 * x, 0.01 + 0.18 * y)
 }

@@ -1,4 +1,4 @@
-//! Plates and sensors that make no sense.
+//! Invalid plates and sensors.
 
 use super::*;
 
@@ -67,7 +67,7 @@ fn a_sensor_that_would_read_nothing_is_told_so() {
             let answer =
                 plate.insensitive_sensor(kind, place).map_or("reads".to_owned(), |why| why.to_string());
             table += &format!("{kind}, {name}: {answer}\n");
-            // What is refused reads nothing, and what is not refused reads something.
+            // A refused sensor reads 0, and an accepted one does not.
             let largest = [at(0.11, 0.07), at(0.22, 0.13), at(0.28, 0.18)]
                 .map(|contact| plate.influence(kind, place, contact).abs())
                 .into_iter()

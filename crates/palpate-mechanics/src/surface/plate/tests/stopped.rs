@@ -1,4 +1,4 @@
-//! Work that is stopped leaves nothing behind.
+//! Stopped work leaves no result.
 
 use palpate_testing::stopping::stopped_at_every_look;
 

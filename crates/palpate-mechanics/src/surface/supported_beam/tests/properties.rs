@@ -15,7 +15,7 @@ fn any_kind() -> impl Strategy<Value = BeamSupportKind> {
     ]
 }
 
-/// Beams of one to four sections on one to five supports that hold them, with places in whole shares of the length.
+/// Beams of one to four sections on one to five sufficient supports, with places at whole shares of the length.
 fn any_beam() -> impl Strategy<Value = SupportedBeam> {
     let sections = proptest::collection::btree_map(1..97u32, (0.5..2.0f64, 0.5..2.0f64), 0..4);
     let supports = proptest::collection::btree_map(0..=97u32, any_kind(), 1..6);
@@ -42,12 +42,12 @@ fn any_beam() -> impl Strategy<Value = SupportedBeam> {
     beam.prop_filter_map("a mechanism", Result::ok)
 }
 
-/// Whether a node is near, where curvatures and slopes of strains jump.
+/// True near a node, where curvatures and slopes of strains jump.
 fn near_a_node(beam: &SupportedBeam, share: f64) -> bool {
     beam.structure.nodes.iter().any(|node| (node - share).abs() < 1e-3)
 }
 
-/// Upward forces and couples of the supports on the beam, with their places, for a unit force downward at `contact_m`:
+/// Upward forces and couples of the supports on the beam, with their places, for a unit force downward at `contact_m`,
 /// from the jumps of the bent beam.
 fn jumps(beam: &SupportedBeam, contact_m: f64) -> Vec<(f64, f64, f64)> {
     let l = beam.spec.length_m;
@@ -132,7 +132,7 @@ proptest! {
         }
     }
 
-    /// However many nodes there are, and however near to each other, the beam is the same.
+    /// Additional nodes at any distance do not change the beam.
     #[test]
     fn sections_that_are_equal_change_nothing(
         supports in proptest::collection::btree_map(0..=40u32, any_kind(), 1..5),

@@ -1,4 +1,4 @@
-//! Beams that cannot be, and sensors that read nothing.
+//! Invalid beams, and insensitive sensors.
 
 use super::*;
 
