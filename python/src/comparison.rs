@@ -144,7 +144,9 @@ pub fn compare<'py>(
             (trials?, "simulation".to_owned(), how)
         }
         (None, None) => {
-            return Err(refused("a recording to compare on is missing: give one, or `training` to simulate it"));
+            return Err(refused(
+                "a recording to compare on is missing: give one, or `training` to simulate it",
+            ));
         }
     };
     let rows = trials.first().map_or(0, |trial| trial.training.rows.len());

@@ -45,7 +45,9 @@ pub fn limit<'py>(
     };
     let extent = setup.surface().extent();
     let at = match (at, every) {
-        (Some(_), Some(_)) => return Err(refused("`at` and `every` both give positions; leave one of them out")),
+        (Some(_), Some(_)) => {
+            return Err(refused("`at` and `every` both give positions; leave one of them out"));
+        }
         (Some(at), None) => {
             let at = positions(&at)?;
             OffSurface::check("position", &at, extent).map_err(refused)?;

@@ -35,7 +35,9 @@ pub fn refuse_untold_forces(rules: &Rules, path: &Path, locator: &Locator) -> Re
 /// Refuses rules that publish without a broker.
 pub fn refuse_publishing(publishing: &Rules, path: &Path, help: &str) -> Result<(), Failure> {
     let Some(rule) = publishing.as_slice().first() else { return Ok(()) };
-    let complaint =
-        Complaint::about(path, format!("rule `{}` publishes a message, and the broker is missing", rule.name));
+    let complaint = Complaint::about(
+        path,
+        format!("rule `{}` publishes a message, and the broker is missing", rule.name),
+    );
     Err(complaint.help(help).into())
 }

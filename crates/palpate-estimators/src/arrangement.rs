@@ -71,7 +71,9 @@ pub enum ArrangementError {
         middle: usize,
     },
     /// The middle portion is empty or reaches a support.
-    #[error("the middle portion goes from {start} to {end} of the length; they must satisfy 0 < start < end < 1")]
+    #[error(
+        "the middle portion goes from {start} to {end} of the length; they must satisfy 0 < start < end < 1"
+    )]
     Portion {
         /// Start, as a share of the length.
         start: f64,

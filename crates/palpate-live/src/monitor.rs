@@ -272,9 +272,7 @@ impl Monitor {
         }
         self.source.as_ref()?;
         if self.bytes == 0 {
-            return Some(
-                "the board is silent: check that it runs, and that the port is its own".to_owned(),
-            );
+            return Some("the board is silent: check that it runs, and that the port is its own".to_owned());
         }
         if self.detected.is_some() && self.unexplained < UNEXPLAINED {
             return None;

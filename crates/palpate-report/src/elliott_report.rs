@@ -97,7 +97,8 @@ impl ElliottReport<'_> {
         let x = Axis::linear("component").from_to(0.0, points.len() as f64 + 1.0);
         let y = Axis::log10("share of the readings’ variance, %");
         let series = vec![Series::markers("component", 0, points, Marker::Circle)];
-        let caption = html! { "Of the first calibration. Where the shares level off, components are only noise." };
+        let caption =
+            html! { "Of the first calibration. Where the shares level off, components are only noise." };
         Figure::chart(&Chart::new("What each component carries", x, y, series), caption)
     }
 

@@ -182,7 +182,9 @@ impl At<OfferKeys> {
         if channel.noise_sd == 0.0 && channel.resolution == 0.0 {
             return Err(match &self.noise {
                 None => self.place.missing("noise"),
-                Some(noise) => noise.place.refuse("greater than 0, or the information of the sensor has no limit"),
+                Some(noise) => {
+                    noise.place.refuse("greater than 0, or the information of the sensor has no limit")
+                }
             });
         }
         Ok(SensorOffer { kind, channel, cost: self.cost.map_or(1.0, |cost| cost.si), supply: Supply::Any })

@@ -16,7 +16,9 @@ pub fn findings(project: &Project) -> Vec<Finding> {
     versions.dedup();
     let unknown = versions.into_iter().filter(|version| !has_section(&text, version));
     unknown
-        .map(|version| Finding::new(CHANGELOG, 1, format!("no section `## {version}`: describe its contents")))
+        .map(|version| {
+            Finding::new(CHANGELOG, 1, format!("no section `## {version}`: describe its contents"))
+        })
         .collect()
 }
 

@@ -320,9 +320,7 @@ impl Bench<'_> {
         let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
         let plan = calibration::check_presses(rig, rows, weights, depths_m);
         if plan.is_empty() {
-            return Err(
-                Complaint::new("no place between those of the calibration is left to check").into()
-            );
+            return Err(Complaint::new("no place between those of the calibration is left to check").into());
         }
         let path = calibration::check_path(&arguments.presses);
         let depths = DepthKnowledge::for_stage(stage.as_ref());

@@ -431,7 +431,9 @@ fn told(value: Option<f64>) -> String {
 fn not_told_in_words(limits: &Limits) -> String {
     let line = |(curve, name): (&LimitCurve, &str)| {
         let words = curve.not_told_in_words()?;
-        Some(format!("\nforce {name}: not determined, and left out of the limits over the surface, {words}\n"))
+        Some(format!(
+            "\nforce {name}: not determined, and left out of the limits over the surface, {words}\n"
+        ))
     };
     [(&limits.known, "known"), (&limits.unknown, "unknown")].into_iter().filter_map(line).collect()
 }

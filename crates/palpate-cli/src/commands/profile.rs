@@ -192,10 +192,7 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
         if told.misfit < 1e6 { format!("{:.1}", told.misfit) } else { format!("{:.1e}", told.misfit) };
     output::say(format!("misfit {misfit}; noise seldom makes more than {:.1}", told.worst_misfit))?;
     let Some(centre) = &told.centre_x_mm else { return Ok(()) };
-    output::say(format!(
-        "total force         {}, for any shape of the load",
-        interval(&told.total_n, "N")
-    ))?;
+    output::say(format!("total force         {}, for any shape of the load", interval(&told.total_n, "N")))?;
     let Seen { margin_mm, low_n, high_n } = told.seen;
     output::say(format!(
         "                    {} without a load within {margin_mm:.0} mm of an edge",

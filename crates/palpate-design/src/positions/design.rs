@@ -192,7 +192,9 @@ pub enum PositionError {
         found: usize,
     },
     /// Too few places are pressed to estimate the smoothness of the influence functions.
-    #[error("the recording has {found} distinct positions; at least {needed} determine the smoothness of the surface")]
+    #[error(
+        "the recording has {found} distinct positions; at least {needed} determine the smoothness of the surface"
+    )]
     TooFewPresses {
         /// Number of distinct positions in the recording.
         found: usize,
@@ -219,9 +221,7 @@ pub enum PositionError {
     )]
     NothingTold,
     /// The presses have different forces on a surface without a model, and the offsets of the channels are unknown.
-    #[error(
-        "the forces of the presses differ, and the untouched reading of the channels is unknown"
-    )]
+    #[error("the forces of the presses differ, and the untouched reading of the channels is unknown")]
     NoOffset,
     /// The noise of a channel is unknown.
     #[error(

@@ -191,7 +191,9 @@ fn free(measured: &MeasuredLocator) -> String {
     let counts = [table.x.count, table.y.count, table.nuisance.count];
     let nodes: Vec<String> = counts.iter().filter(|count| **count > 1).map(usize::to_string).collect();
     let (nuisance, why) = match measured.role() {
-        NuisanceRole::None => ("", "no other quantity was recorded that they depend on, or the rig asks for it"),
+        NuisanceRole::None => {
+            ("", "no other quantity was recorded that they depend on, or the rig asks for it")
+        }
         NuisanceRole::Force => (
             " and force",
             "they are not a multiple of a function of the force, as far as the presses show, or the rig asks for it",

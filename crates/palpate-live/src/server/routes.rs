@@ -85,8 +85,9 @@ struct Mark {
 async fn mark(State(live): State<Arc<Live>>, JsonBody(Mark { text }): JsonBody<Mark>) -> Answer {
     let length = text.chars().count();
     if length == 0 || length > MOST_OF_A_MARK || text.chars().any(char::is_control) {
-        let error =
-            format!("a mark of {length} characters; it may have 1 to {MOST_OF_A_MARK}, without control characters");
+        let error = format!(
+            "a mark of {length} characters; it may have 1 to {MOST_OF_A_MARK}, without control characters"
+        );
         return Err(Refusal::new(StatusCode::BAD_REQUEST, error, "write less, on one line"));
     }
     done(live.command(Command::Mark(text)))

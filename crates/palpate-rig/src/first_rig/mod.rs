@@ -99,9 +99,7 @@ pub enum FirstRigError {
         line: usize,
     },
     /// The column of the hint `--untouched` does not mark rows.
-    #[error(
-        "--untouched: column `{column}` must be 1, true or yes, or 0, false, no or empty, in every row"
-    )]
+    #[error("--untouched: column `{column}` must be 1, true or yes, or 0, false, no or empty, in every row")]
     NotMarks {
         /// The heading.
         column: String,
@@ -439,8 +437,7 @@ impl FirstRig {
                 )
             }
             Left::Single => {
-                "if it is a channel, add it to them; if readings depend on it, set `nuisance`"
-                    .to_owned()
+                "if it is a channel, add it to them; if readings depend on it, set `nuisance`".to_owned()
             }
             Left::OneOfForces => {
                 format!("it may be the force, as others may: set force = {}", self.key(column))

@@ -78,9 +78,10 @@ fn router_of(text: &str) -> Result<String, &'static str> {
     let address = text.strip_prefix("tcp/").ok_or("it does not begin with tcp/")?;
     // The colons of an IPv6 address are within brackets.
     let (host, port) = match address.rsplit_once(':') {
-        Some((host, port)) if !port.ends_with(']') => {
-            (host, port.parse().ok().filter(|&port| port > 0).ok_or("its port is not a number of 1 to 65535")?)
-        }
+        Some((host, port)) if !port.ends_with(']') => (
+            host,
+            port.parse().ok().filter(|&port| port > 0).ok_or("its port is not a number of 1 to 65535")?,
+        ),
         _ => (address, PORT),
     };
     let bare = host.strip_prefix('[').and_then(|host| host.strip_suffix(']'));
