@@ -1,7 +1,7 @@
 //! Positions with the least posterior variance of influence functions learnt as Gaussian processes.
 //!
-//! The noise variance of a reading is 1, and the expected reading has a posterior variance v. A locator therefore has noise of √(1
-//! + v), and a reading contributes 1/(1 + v) of its information at the limit. The surface's size contributes the rest, so without
+//! The noise variance of a reading is 1, and the expected reading has a posterior variance v. A locator therefore has noise of
+//! √(1 + v), and a reading contributes 1/(1 + v) of its information at the limit. The surface's size contributes the rest, so without
 //! any presses the error is that of a guess. Greedy choice and exchange minimize the mean over the contacts (Krause, Singh and
 //! Guestrin, *Journal of Machine Learning Research* 9, 2008, choose sensors of fields in this way).
 
