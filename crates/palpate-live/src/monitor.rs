@@ -520,7 +520,7 @@ mod tests {
     fn says_why_there_are_no_readings() {
         let problem = |monitor: &Monitor| monitor.record(Duration::ZERO).problem.unwrap_or_default();
         assert!(problem(&of_lines(&[])).contains("sends nothing"));
-        assert!(problem(&of_lines(&["hello\n", "world\n"])).contains("no values are found"));
+        assert!(problem(&of_lines(&["hello\n", "world\n"])).contains("lines arrive without values"));
         let mut monitor = of_lines(&[]);
         monitor.receive(&arrived(1, Arrival::Bytes(vec![0xf8; 5000])));
         assert!(problem(&monitor).contains("baud"), "{}", problem(&monitor));

@@ -180,7 +180,7 @@ fn finished_studies_are_kept() {
         (&["simulate", "rig.toml", "-o", "out/networks.csv"], "networks.csv"),
         (&["profile", "load.toml", "--report", "out/report.html"], "report.html"),
     ] {
-        kept(path, arguments, &format!("out/{name}"), "it is a result of the study whose");
+        kept(path, arguments, &format!("out/{name}"), "it is a result of the study with the");
     }
     said(&run(path, &["fit", "rig.toml", "-o", "out/locator.json"]));
 
