@@ -1,4 +1,4 @@
-"""Influence functions: what sensors read per newton, learnt from presses."""
+"""Influence functions: what sensors read per newton, as presses told it."""
 
 from __future__ import annotations
 

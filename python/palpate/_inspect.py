@@ -81,7 +81,7 @@ def inspect(
         elif path.suffix.lower() in _TABLES:
             if bench is None:
                 lines = _palpate.inspect_table(str(path), path.read_bytes())
-                return Inspection([*lines, "`bench` is the bench of the recording"])
+                return Inspection([*lines, "`bench` says of which bench it is a recording"])
             setup = bench.setup if isinstance(bench, Rig) else bench
             what = setup.read_csv(path)
         else:

@@ -49,7 +49,7 @@ class LoadProfile(Result):
     total, total_sd : float
         Whole force in newtons, and its standard deviation.
     total_95 : tuple of float
-        Ends of its 95 % interval, for any shape of the load.
+        Ends of its 95 % interval, whatever the shape of the load.
     margin : float
         Distance from the edges, in metres, within which a load is not told from a harder one at the edge.
     seen_95 : tuple of float

@@ -40,7 +40,7 @@ class Section:
         return unit
 
     def _keys(self) -> dict[str, str]:
-        """The section's keys, each with its value in TOML; keys without a value are left out."""
+        """The section's keys, each with its value in TOML; those that are not said are left out."""
         keys = {} if self._kind is None else {"kind": json.dumps(self._kind)}
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
@@ -56,7 +56,7 @@ class Section:
 
 @dataclasses.dataclass(frozen=True)
 class Range(Section):
-    """A section with `start` and `end`, which are called `from` and `to` in a rig; `from` is a word of Python itself."""
+    """A section whose `start` and `end` are called `from` and `to` in a rig; `from` is a word of Python itself."""
 
     def _keys(self) -> dict[str, str]:
         renamed = {"start": "from", "end": "to"}

@@ -272,7 +272,7 @@ class StudyResults(Result):
         return frame if weights else frame.drop(columns="weights")
 
     def to_dict(self) -> dict[str, Any]:
-        """All figures, and of the founding paper's study "published" figures and "claims": the contents of ``results.json``."""
+        """All figures, and of the founding paper's study "published" figures and "claims": what ``results.json`` holds."""
         values: dict[str, Any] = json.loads(self.results_json)
         return values
 
@@ -410,7 +410,7 @@ class _Tables:
         self._lock = threading.Lock()
         if self.folder is None:
             if resume or overwrite:
-                raise PalpateError("`folder` is None; `resume` and `overwrite` apply to an earlier run in a folder")
+                raise PalpateError("`folder` is None; `resume` and `overwrite` say what becomes of an earlier run in a folder")
             return
         if resume and overwrite:
             raise PalpateError("`resume` and `overwrite` are both True; one of them may be")

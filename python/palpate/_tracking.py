@@ -191,7 +191,7 @@ class Track(Result):
         Estimate of each reading by itself.
     errors : dict or None
         Where the truth is known: "single" and "track", mean errors in metres of readings by themselves and of the track, and their "ratio";
-        "single_covered", "track_covered", shares of the 95 % intervals that cover the contact; "single_number_right", "track_number_right", shares
+        "single_covered", "track_covered", shares of the 95 % intervals that hold the contact; "single_number_right", "track_number_right", shares
         of the readings with as many contacts as touch; "readings", "tracked".
     """
 
@@ -205,7 +205,7 @@ class Track(Result):
 
     @property
     def x(self) -> Floats:
-        """Position of the contact along the surface in metres, NaN while the surface is untouched: of the shape (readings)."""
+        """Position of the contact along the surface in metres, NaN while nothing touches: of the shape (readings)."""
         return self.first.x
 
     @property
@@ -296,7 +296,7 @@ class TrackState:
 
     @property
     def x(self) -> float | None:
-        """Position of the first contact along the surface in metres; None while the surface is untouched."""
+        """Position of the first contact along the surface in metres; None while nothing touches."""
         return self.contacts[0].x if self.contacts else None
 
     @property
@@ -321,7 +321,7 @@ class TrackState:
 
     def __repr__(self) -> str:
         if not self.contacts:
-            return f"<TrackState: {self.time:.4g} s, untouched>"
+            return f"<TrackState: {self.time:.4g} s, nothing touches>"
         return f"<TrackState: {self.time:.4g} s, {' and '.join(map(_in_words, self.contacts))}>"
 
 

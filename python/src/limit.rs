@@ -45,9 +45,7 @@ pub fn limit<'py>(
     };
     let extent = setup.surface().extent();
     let at = match (at, every) {
-        (Some(_), Some(_)) => {
-            return Err(refused("`at` and `every` both give positions; leave one of them out"));
-        }
+        (Some(_), Some(_)) => return Err(refused("`at` and `every` both say where; leave one of them out")),
         (Some(at), None) => {
             let at = positions(&at)?;
             OffSurface::check("position", &at, extent).map_err(refused)?;
@@ -116,7 +114,7 @@ fn complaint(error: &LimitError) -> PyErr {
     refused(format!("{error}: {help}"))
 }
 
-/// Positions between two checks for Ctrl-C.
+/// Positions that are told between two looks for Ctrl-C.
 const TOGETHER: usize = 500;
 
 /// A question for the limit.

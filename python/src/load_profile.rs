@@ -92,7 +92,7 @@ pub fn simulate_loads<'py>(
         (None, _) => Vec::new(),
     };
     if loads.is_empty() {
-        return Err(refused("no load to simulate was given; give at least one `UniformLoad`"));
+        return Err(refused("there is no load to simulate; give at least one `UniformLoad`"));
     }
     if repeats == 0 {
         return Err(refused("`repeats` is 0; it must be at least 1"));

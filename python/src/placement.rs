@@ -64,7 +64,7 @@ pub fn place_sensors<'py>(
     }
     match (count, add) {
         (Some(_), Some(_)) => {
-            return Err(refused("`count` and `add` both give the number; leave one of them out"));
+            return Err(refused("`count` and `add` both say how many; leave one of them out"));
         }
         (Some(count), None) => design.count = count,
         (None, Some(count)) => design = design.adding(count, own.layout()).map_err(refused)?,

@@ -136,7 +136,7 @@ def test_readings_are_followed_one_by_one_as_all_at_once(beam_rig, examples, pla
     assert_same_states(swinging.track(moving, frequency="17.17 Hz", damping=0.02), states)
     for count in range(1, 100):
         lifted = tracker.follow(moving.time[-1] + 0.005 * count, np.zeros(8))
-    assert lifted.x is None and lifted.x_95 is None and lifted.touching < 0.5 and repr(lifted).endswith("untouched>")
+    assert lifted.x is None and lifted.x_95 is None and lifted.touching < 0.5 and repr(lifted).endswith("nothing touches>")
 
     two = pp.Rig((examples / "two-moving-loads.toml").read_text().replace('rate = "1 kHz"', 'rate = "50 Hz"'))
     moving, locator = pp.simulate_moving(two, seed=2), two.estimator.fit(two.simulate(seed=1))

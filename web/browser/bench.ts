@@ -1,4 +1,4 @@
-// A simulated board with a finger that a test moves, by the machine that stands beside it.
+// A simulated board whose finger a test moves, by the machine that stands beside it.
 
 import type { ChildProcess } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";

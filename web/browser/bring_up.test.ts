@@ -64,7 +64,7 @@ describe.skipIf(!hasChromium())("a board without a rig", () => {
       if (name === "phone") await page.context().close();
     }
     const page = browser.contexts()[0]!.pages()[0]!;
-    // All that the board sends is text.
+    // What the board sends is text, whatever it is.
     say(() => '<img src=x onerror="document.title=1">');
     await says(page, "bring-up-lines", /<img src=x onerror/);
     await says(page, "bring-up-problem", /no values are found/);
@@ -99,7 +99,7 @@ describe.skipIf(!hasChromium())("a board without a rig", () => {
     await page.locator("#rig-places").fill("6");
     await says(page, "rig-overwrite-words", /^Replace rig\.toml, which is there already$/);
     await page.locator("#rig-make").click();
-    // Without a confirmation, no file is replaced.
+    // Without a word nothing is replaced.
     expect(readFileSync(join(folder, "rig.toml"), "utf8")).toBe("mine");
     await page.locator("#rig-overwrite").check();
     await page.locator("#rig-make").click();

@@ -41,7 +41,7 @@ export async function open(browser: Browser, url: string, options: BrowserContex
   const faults: string[] = [];
   page.on("pageerror", (error) => faults.push(String(error.stack ?? error)));
   page.on("console", (message) => {
-    // A server that is away is an error of the network, which the page reports in words.
+    // A server that is away is an error of the network, which the page says in words.
     if (message.type() === "error" && !message.text().includes("ERR_CONNECTION")) faults.push(message.text());
   });
   page.on("request", (request) => {

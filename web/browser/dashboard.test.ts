@@ -144,7 +144,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       expect(seen.length).toBe(40);
       for (const { drawn, written, budget, sd } of seen) {
         expect(drawn).toBe(written);
-        // The dot of the budget stands at the contact; its standard deviation is in the words.
+        // The dot of the budget stands at the contact, whose standard deviation is in the words.
         expect(Math.abs(budget - Number(written))).toBeLessThan(1);
         expect(sd).toBe(true);
       }

@@ -93,7 +93,7 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await taken(first.page, 2);
     await picture(first.page, "machine-phone");
     expect(await first.page.evaluate(() => document.documentElement.scrollWidth)).toBe(390);
-    // The stop is always there.
+    // The stop is there whatever else is open.
     await first.page.keyboard.press("?");
     await first.page.keyboard.press("Escape");
     await says(first.page, "calibration-problem", /stopped by hand/);

@@ -37,7 +37,7 @@ export function remember(key: string, value: string): void {
   try {
     localStorage.setItem(`palpate-${key}`, value);
   } catch {
-    // A browser without storage asks again the next time.
+    // A browser that keeps nothing asks again the next time.
   }
 }
 

@@ -33,7 +33,7 @@ export function statusWords(estimate: EstimateRecord): { word: string; why: stri
     case "outside_model":
       return {
         word: "Outside model",
-        why: "No single contact explains the reading within the noise: a second contact, a patch, a damaged or exchanged channel, or drift. If the surface is untouched, tare.",
+        why: "No single contact explains the reading within the noise: a second contact, a patch, a damaged or exchanged channel, or drift. If nothing touches, tare.",
       };
     case "outside_surface":
       return { word: "Outside surface", why: "The position is beyond the surface's edge, which no contact can have." };
@@ -48,7 +48,7 @@ const BAD_FRAMES: Record<string, string> = {
   too_long: "longer than any frame",
   channels: "another number of values than channels",
   missing_channel: "a channel is missing",
-  not_a_number: "a value is not a number",
+  not_a_number: "a value is no number",
   encoding: "not text",
   checksum: "the checksum is wrong",
   malformed: "not a frame",

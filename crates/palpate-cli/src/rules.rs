@@ -7,7 +7,7 @@ use palpate_live::rules::Rules;
 use palpate_mechanics::surface::Extent;
 use std::path::Path;
 
-/// The rules of a file for a surface of this extent; empty without a file.
+/// The rules of a file for a surface of this extent; none without a file.
 pub fn read(path: Option<&Path>, extent: Extent) -> Result<Rules, Failure> {
     let Some(path) = path else { return Ok(Rules::default()) };
     let text = input::read_text(path)?;
@@ -17,27 +17,25 @@ pub fn read(path: Option<&Path>, extent: Extent) -> Result<Rules, Failure> {
     })?)
 }
 
-/// Refuses rules that need a force if the locator does not estimate it: they would never act.
+/// Refuses rules that ask for a force, where the locator tells none: they would never act.
 pub fn refuse_untold_forces(rules: &Rules, path: &Path, locator: &Locator) -> Result<(), Failure> {
     if locator.tells_force() {
         return Ok(());
     }
     let Some(rule) = rules.first_of_force() else { return Ok(()) };
     let problem = format!(
-        "rule `{}` asks for a `force`, and the locator, of kind `{}`, estimates none: it would never act",
+        "rule `{}` asks for a `force`, and the locator, of kind `{}`, tells none: it would never act",
         rule.name,
         locator.kind()
     );
     let complaint = Complaint::about(path, problem);
-    Err(complaint.help("leave `force` out, or fit an estimator of the force, such as `influence`").into())
+    Err(complaint.help("leave `force` out, or fit an estimator that tells it, such as `influence`").into())
 }
 
-/// Refuses rules that publish without a broker.
+/// Refuses rules that publish, where there is no broker.
 pub fn refuse_publishing(publishing: &Rules, path: &Path, help: &str) -> Result<(), Failure> {
     let Some(rule) = publishing.as_slice().first() else { return Ok(()) };
-    let complaint = Complaint::about(
-        path,
-        format!("rule `{}` publishes a message, and the broker is missing", rule.name),
-    );
+    let complaint =
+        Complaint::about(path, format!("rule `{}` publishes a message, and there is no broker", rule.name));
     Err(complaint.help(help).into())
 }

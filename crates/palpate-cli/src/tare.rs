@@ -247,12 +247,12 @@ impl<'a> Taring<'a> {
             Source::First(_) => {}
             Source::Auto { .. } | Source::Last { .. } if locator.false_alarm_rate().is_none() => {
                 let complaint = format!(
-                    "--tare {}: a locator of kind `{}` does not distinguish untouched readings from contacts",
+                    "--tare {}: a locator of kind `{}` does not tell untouched readings from contacts",
                     source.followed().unwrap_or_default(),
                     locator.kind()
                 );
                 return Err(Complaint::new(complaint)
-                    .help("--tare N averages the first N readings as untouched, --tare FILE those of a file")
+                    .help("--tare N takes the first N readings for untouched, --tare FILE those of a file")
                     .into());
             }
             Source::Auto { .. } => {}
@@ -272,7 +272,7 @@ impl<'a> Taring<'a> {
             return Err(complaint.help("mend the lines above, or take them out").into());
         }
         if self.count == 0 {
-            let complaint = Complaint::about(path, "it has no untouched reading");
+            let complaint = Complaint::about(path, "it holds no untouched reading");
             return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
         }
         self.look_again();
@@ -405,7 +405,7 @@ impl<'a> Taring<'a> {
         if self.is_beginning {
             let needed = self.source.first();
             let complaint = format!(
-                "--tare {needed}: {source} has {} readings; the first {needed} are to be the untouched ones",
+                "--tare {needed}: {source} holds {} readings; the first {needed} are to be the untouched ones",
                 self.count
             );
             return Err(Complaint::new(complaint).help("give fewer, or record longer").into());
@@ -430,7 +430,7 @@ pub fn tare_splits(
         Some(_) => {
             let complaint = "--tare takes `auto` alone here; N, a time, a FILE and `last` are for a locator: a rig is judged by folds of one recording";
             return Err(Complaint::new(complaint)
-                .help("--tare auto subtracts the drift that the presses show")
+                .help("--tare auto takes off the drift that the presses tell")
                 .into());
         }
         None if recording.rows.len() > MOST_LOOKED_AT => return Ok(()),
@@ -455,7 +455,7 @@ pub fn tare_splits(
         .map_err(|error| Failure::from_error(&error))?;
     match spans {
         Some(spans) => say_drift(setup, &spans),
-        None => remark!("palpate: the presses show no drift; readings are judged as they are"),
+        None => remark!("palpate: the presses tell no drift; readings are judged as they are"),
     }
     Ok(())
 }

@@ -89,7 +89,7 @@ impl Target {
         let place = target.place()?;
         if let Some(name) = result_beside(&place) {
             let complaint = format!(
-                "cannot write {}: it is a result of the study with the {name} beside it",
+                "cannot write {}: it is a result of the study whose {name} is beside it",
                 path.display()
             );
             return Err(Complaint::new(complaint).help("name another file").into());
@@ -113,7 +113,7 @@ impl Target {
     fn place(&self) -> Result<PathBuf, Failure> {
         let refused = |why: &str| Complaint::new(format!("cannot write {}: {why}", self.path.display()));
         if self.path == Path::new("-") {
-            let complaint = refused("stdout is for the output of the command");
+            let complaint = refused("stdout is for what the command says");
             return Err(complaint.help("name a file; one that is called so is `./-`").into());
         }
         if self.path.file_name().is_none() && !self.path.is_dir() {
@@ -136,7 +136,7 @@ impl Target {
         let folder = folder_of(&place);
         match folder.is_dir() {
             true => Ok(place),
-            false => Err(refused(&format!("there is not a folder {}", folder.display())).into()),
+            false => Err(refused(&format!("there is no folder {}", folder.display())).into()),
         }
     }
 }
@@ -169,7 +169,7 @@ fn what_it_is(there: &Metadata) -> &'static str {
 
 #[cfg(not(unix))]
 fn what_it_is(_: &Metadata) -> &'static str {
-    "it is not a regular file"
+    "it is no regular file"
 }
 
 /// A folder that takes a report, with all files that belong to it.
@@ -203,7 +203,7 @@ impl TargetFolder {
             path.ancestors().find(|above| above.exists()).filter(|above| !above.as_os_str().is_empty());
         let nearest = nearest.unwrap_or(Path::new("."));
         if !nearest.is_dir() {
-            return Err(refused(&Error::other(format!("{} is not a folder", nearest.display()))));
+            return Err(refused(&Error::other(format!("{} is no folder", nearest.display()))));
         }
         check_takes_files(nearest).map_err(|error| refused(&error))?;
         if path.is_dir() {

@@ -33,23 +33,23 @@ pub enum Arrangement {
         /// Positions across the width.
         rows: usize,
     },
-    /// The listed positions.
+    /// These positions.
     Explicit(Vec<Position>),
 }
 
 /// An arrangement that cannot be laid out.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArrangementError {
-    /// The number of positions is 0.
+    /// There are no positions.
     #[error("0 training positions; at least 1 is needed")]
     NoPositions,
-    /// The middle portion has fewer positions than its two ends.
+    /// The middle portion holds fewer than its two ends.
     #[error("{middle} training positions in the middle portion; at least 2 are needed, its ends")]
     MiddleTooSmall {
         /// Number of positions in the middle portion.
         middle: usize,
     },
-    /// There are fewer positions than the middle portion alone needs.
+    /// There are fewer positions than the middle portion alone wants.
     #[error(
         "{count} training positions, but {middle} of them in the middle portion; at least {middle} are needed"
     )]
@@ -71,9 +71,7 @@ pub enum ArrangementError {
         middle: usize,
     },
     /// The middle portion is empty or reaches a support.
-    #[error(
-        "the middle portion goes from {start} to {end} of the length; they must satisfy 0 < start < end < 1"
-    )]
+    #[error("the middle portion goes from {start} to {end} of the length; 0 < start < end < 1 must hold")]
     Portion {
         /// Start, as a share of the length.
         start: f64,
@@ -81,14 +79,14 @@ pub enum ArrangementError {
         end: f64,
     },
     /// The portion of even positions is empty or reaches beyond the surface.
-    #[error("the portion goes from {start} to {end} of the length; they must satisfy 0 ≤ start < end ≤ 1")]
+    #[error("the portion goes from {start} to {end} of the length; 0 ≤ start < end ≤ 1 must hold")]
     EvenPortion {
         /// Start, as a share of the length.
         start: f64,
         /// End, as a share of the length.
         end: f64,
     },
-    /// The number of listed positions differs from the given count.
+    /// The explicit positions are not as many as was said.
     #[error("{listed} training positions are listed, but their count is given as {count}")]
     CountDiffers {
         /// Number of positions in the list.
@@ -101,7 +99,7 @@ pub enum ArrangementError {
     OffSurface(#[from] OffSurface),
     /// A rule along a line, on a surface that has a width as well.
     #[error(
-        "{count} training positions on a line do not determine positions on a plane; a plane needs a grid"
+        "{count} training positions on a line do not say where they are on a plane; a plane needs a grid"
     )]
     LineOnPlane {
         /// Number of positions.
@@ -259,19 +257,19 @@ impl Training {
         Self::new(Arrangement::Grid { columns, rows }, columns * rows)
     }
 
-    /// Sets the number of presses at each position, at least 1.
+    /// The same, each position pressed `repeats` times; at least 1.
     #[must_use]
     pub fn repeated(self, repeats: usize) -> Self {
         Self { repeats: repeats.max(1), ..self }
     }
 
-    /// Sets the force of the presses in newtons, independently of the force of contacts in use.
+    /// The same, pressed with this force in newtons, whatever the force of contacts in use.
     #[must_use]
     pub fn with_force(self, force_n: f64) -> Self {
         Self { force_n: Some(force_n), ..self }
     }
 
-    /// Sets the standard deviation in each direction of the pressed place about the asked one, in metres.
+    /// The same, pressed by a person who misses the asked place by this standard deviation in each direction, in metres.
     #[must_use]
     pub fn with_placement(self, sd_m: f64) -> Self {
         Self { placement_sd_m: Some(sd_m), ..self }
@@ -309,8 +307,8 @@ impl EveryError {
     pub const MOST: f64 = 1e6;
 }
 
-/// Positions at which an estimator is judged, all over a surface: on a line 399, 1/400 of the length apart; on a plane about 400, in the
-/// middles of equal cells that are as square as possible. A share of the positions is thus a share of the area.
+/// Positions at which an estimator is judged, all over a surface: on a line 399, 1/400 of the length apart; on a plane about
+/// 400, in the middles of equal cells that are as square as they can be, so that a share of them is a share of the area.
 pub fn all_over(extent: Extent) -> Vec<Position> {
     let Some(width_m) = extent.width_m() else { return inner_grid(extent, ALONG_A_LINE, 1) };
     let side = |ratio: f64| (ON_A_PLANE * ratio).sqrt().round().clamp(2.0, 0.5 * ON_A_PLANE) as usize;
@@ -321,7 +319,7 @@ pub fn all_over(extent: Extent) -> Vec<Position> {
 /// row.
 ///
 /// # Errors
-/// [`EveryError`] for no position, or more than 1,000,000.
+/// [`EveryError`] where those are none or more than 1,000,000.
 pub fn every(extent: Extent, every_m: f64) -> Result<Vec<Position>, EveryError> {
     let inside = |size_m: f64| (size_m / every_m - 1e-6).floor().max(0.0);
     let (columns, rows) = (inside(extent.length_m()), extent.width_m().map_or(1.0, inside));
@@ -337,17 +335,17 @@ pub fn cells(extent: Extent, columns: usize, rows: usize) -> Vec<Position> {
     rows_of(extent, columns, rows, |i, count, size_m| (i as f64 + 0.5) * size_m / count as f64)
 }
 
-/// The middles of equal cells with every coordinate, as a share u of its side, moved to `warp`(u): x_i = length·warp((i + ½)/columns).
+/// The same middles with every coordinate, as a share u of its side, moved to `warp`(u): x_i = length·warp((i + ½)/columns).
 pub fn warped_cells(extent: Extent, columns: usize, rows: usize, warp: impl Fn(f64) -> f64) -> Vec<Position> {
     rows_of(extent, columns, rows, |i, count, size_m| size_m * warp((i as f64 + 0.5) / count as f64))
 }
 
-/// (1 − cos πu)/2, which maps even shares to Chebyshev's: dense towards both ends.
+/// (1 − cos πu)/2, which takes even shares to Chebyshev's: dense towards both ends.
 pub fn chebyshev(share: f64) -> f64 {
     0.5 * (1.0 - (std::f64::consts::PI * share).cos())
 }
 
-/// Columns and rows of the grid of `count` positions with the cells closest to squares.
+/// The grid of `count` positions whose cells are the closest to squares: columns and rows.
 pub fn squarest(extent: Extent, count: usize) -> (usize, usize) {
     let Some(width_m) = extent.width_m() else { return (count, 1) };
     let elongation = |columns: usize| {
@@ -366,8 +364,8 @@ pub fn inner_grid(extent: Extent, columns: usize, rows: usize) -> Vec<Position> 
     rows_of(extent, columns, rows, |i, count, size_m| (i + 1) as f64 / (count + 1) as f64 * size_m)
 }
 
-/// Rows of positions, one above the other. `place` gives a coordinate from its index, the number of coordinates and the size of its side. A
-/// line has one row, at 0.
+/// Rows of positions, one above the other, each coordinate by its number, how many there are, and the size of its side; a line has
+/// one row, at 0.
 fn rows_of(
     extent: Extent,
     columns: usize,

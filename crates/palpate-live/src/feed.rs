@@ -126,6 +126,6 @@ impl FeedWatch {
         if self.state == FeedState::Ended {
             return "the source ended; check what sends to it".to_owned();
         }
-        "the source is connected and silent; check that the board is on and sends to this port".to_owned()
+        "the source is open and sends nothing; check that the board is on and sends to this port".to_owned()
     }
 }

@@ -7,38 +7,38 @@ use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-/// Number of lines that are kept.
+/// Lines that are kept.
 const LINES: usize = 100;
-/// Most characters of a kept line.
+/// Most characters of a line that is kept.
 const LONGEST: usize = 160;
-/// Most bytes without a line end; more are not text, or the baud rate is wrong.
+/// Most bytes without the end of a line; more are not text, or the baud rate is wrong.
 const MOST_PARTIAL: usize = 4096;
-/// Most channels of a detected form.
+/// Most channels that are looked for.
 const MOST_CHANNELS: usize = 64;
-/// Time over which the rate is measured.
+/// Time over which the rate is taken.
 const RATE_OVER: Duration = Duration::from_secs(2);
-/// Consecutive frames that do not match the channels, before the search for channels is repeated.
+/// Frames in a row that the channels do not explain, before channels are looked for again.
 const UNEXPLAINED: u32 = 20;
 /// Bytes that are searched for binary frames.
 const BINARY_SAMPLE: usize = 2048;
-/// Binary frames with a valid checksum that determine the number of channels.
+/// Binary frames with a right checksum that decide how many channels there are.
 const BINARY_FRAMES: usize = 3;
 
-/// A received line.
+/// A line as it came.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RawLine {
     /// Seconds since 1970-01-01 00:00 UTC.
     pub time_s: f64,
-    /// Text of the line; bytes that are not text are escaped, and long lines are cut.
+    /// Its text; bytes that are not text are escaped, and long lines are cut.
     pub text: String,
-    /// True for a reading of the detected channels.
+    /// True where it is a reading of the channels that were found.
     pub reads: bool,
 }
 
 /// Values of a channel.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelValues {
-    /// Name from the board; `s1`, `s2`, … without one.
+    /// Name by which the board calls it; `s1`, `s2`, … where it has none.
     pub name: String,
     /// Newest value.
     pub now: Option<f64>,
@@ -49,21 +49,21 @@ pub struct ChannelValues {
 /// State of a monitor as a record of JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct MonitorRecord {
-    /// Name of the source, while it is available.
+    /// Name of the source, while it is there.
     pub source: Option<String>,
-    /// Cause of missing readings, in words.
+    /// Why there are no readings, in words.
     pub problem: Option<String>,
     /// Bytes so far.
     pub bytes: u64,
     /// Readings so far.
     pub readings: u64,
-    /// Readings per second.
+    /// Readings a second.
     pub rate_hz: f64,
     /// Frames that are not readings, by cause.
     pub bad_frames: BTreeMap<BadFrame, u64>,
-    /// The channels, once they were detected.
+    /// The channels, once they were found.
     pub channels: Vec<ChannelValues>,
-    /// True if the board names its values.
+    /// True where the board names its values.
     pub named: bool,
     /// The last lines, the oldest first.
     pub lines: Vec<RawLine>,
@@ -80,7 +80,7 @@ pub struct Monitor {
     detected: Option<DetectedFrames>,
     /// Names of the last line that may be a header.
     header: Option<Vec<u8>>,
-    /// Last bytes before the channels are detected.
+    /// Last bytes while no channels were found.
     sample: Vec<u8>,
     readings: u64,
     arrivals: VecDeque<(Duration, u64)>,
@@ -98,7 +98,7 @@ struct DetectedFrames {
 }
 
 impl Monitor {
-    /// Takes an arrival of the source.
+    /// Takes what the source brought.
     pub fn receive(&mut self, arrived: &Arrived) {
         let time_s = arrived.at.unix_ns as f64 * 1e-9;
         match &arrived.arrival {
@@ -209,7 +209,7 @@ impl Monitor {
         }
     }
 
-    /// Searches a line for channels.
+    /// Looks for channels in a line.
     fn find_text(&mut self, line: &[u8]) {
         let header = self.header.as_deref();
         let Some((names, named, uses_header)) = candidates(line, header).find(|(names, _, uses_header)| {
@@ -231,7 +231,7 @@ impl Monitor {
         self.unexplained = 0;
     }
 
-    /// Searches the last bytes for binary frames. Valid checksums confirm the number of channels.
+    /// Looks for binary frames in the last bytes, whose checksums tell how many channels they have.
     fn find_binary(&mut self) {
         for count in 1..=MOST_CHANNELS {
             let names = numbered(count);
@@ -247,7 +247,7 @@ impl Monitor {
         }
     }
 
-    /// Present state of the monitor.
+    /// The state now.
     pub fn record(&self, now: Duration) -> MonitorRecord {
         let recent = self.arrivals.iter().filter(|(at, _)| now.saturating_sub(*at) <= RATE_OVER);
         let (first, count) =
@@ -272,7 +272,9 @@ impl Monitor {
         }
         self.source.as_ref()?;
         if self.bytes == 0 {
-            return Some("the board is silent: check that it runs, and that the port is its own".to_owned());
+            return Some(
+                "the board sends nothing: see that it runs, and that the port is its own".to_owned(),
+            );
         }
         if self.detected.is_some() && self.unexplained < UNEXPLAINED {
             return None;
@@ -285,19 +287,19 @@ impl Monitor {
         Some(match (self.lines.is_empty(), is_text) {
             (true, _) if self.bytes < MOST_PARTIAL as u64 => format!("no line has ended yet: `{last}`"),
             (false, true) => format!(
-                "lines arrive without values; the last is `{last}`; send one line a reading, such as `12,34,56`"
+                "lines arrive, and no values are found in them; the last is `{last}`; send one line a reading, such as `12,34,56`"
             ),
             _ => format!("the bytes are not text: `{last}`; try another baud rate"),
         })
     }
 
-    /// Fault of a source without readings; `None` for any other source.
+    /// Fault of a source that brought no reading; `None` of any other.
     pub fn fault(&self) -> Option<String> {
         let reason = || self.problem().unwrap_or("the source did not open".to_owned());
         (self.readings == 0).then(|| format!("there was no reading: {}", reason()))
     }
 
-    /// Names of the detected channels, in their order; empty before the detection.
+    /// Names of the channels that were found, in their order; none before that.
     pub fn channel_names(&self) -> Vec<String> {
         self.detected
             .iter()
@@ -306,7 +308,7 @@ impl Monitor {
             .collect()
     }
 
-    /// True if the board names its values.
+    /// True where the board names its values.
     pub fn is_named(&self) -> bool {
         self.detected.as_ref().is_some_and(|detected| detected.named)
     }
@@ -328,27 +330,27 @@ fn numbered(count: usize) -> Vec<String> {
     (1..=count).map(|i| format!("s{i}")).collect()
 }
 
-/// Candidates for the channels of a line: their names, whether these are from the board, and whether they are from the header.
+/// Channels that a line may have: their names, whether the board gives them, and whether it does so in the header.
 fn candidates<'a>(
     line: &'a [u8],
     header: Option<&'a [u8]>,
 ) -> impl Iterator<Item = (Vec<String>, bool, bool)> + 'a {
     let named = names_in_line(line).map(|names| (names, true, false));
     let headed = header.and_then(names_in_header).map(|names| (names, true, true));
-    // The number of pieces between separators limits the number of values.
+    // At most as many values as there are pieces between separators.
     let pieces = line.split(|byte| b",; \t[]".contains(byte)).filter(|piece| !piece.is_empty()).count();
     let unnamed = (1..=pieces.min(MOST_CHANNELS)).rev().map(|count| (numbered(count), false, false));
     named.into_iter().chain(headed).chain(unnamed)
 }
 
-/// Names before `:` or `=` in a line, or of the numeric members of a JSON object; `None` without usable names.
+/// Names before `:` or `=` in a line, or the members of an object of JSON; none where there are none.
 fn names_in_line(line: &[u8]) -> Option<Vec<String>> {
     let text = std::str::from_utf8(line).ok()?.trim();
     let names: Vec<String> = if text.starts_with('{') {
         let object: serde_json::Map<String, serde_json::Value> = serde_json::from_str(text).ok()?;
         let mut names: Vec<String> =
             object.into_iter().filter(|(_, value)| value.is_number()).map(|(name, _)| name).collect();
-        // In the order of the line; the parsed object is in alphabetical order.
+        // As the board sends them; the object has them by the alphabet.
         names.sort_by_key(|name| text.find(&format!("\"{name}\"")));
         names
     } else {
@@ -363,7 +365,7 @@ fn names_in_line(line: &[u8]) -> Option<Vec<String>> {
     checked(names)
 }
 
-/// Names in a line of words.
+/// Names of a line of words.
 fn names_in_header(line: &[u8]) -> Option<Vec<String>> {
     let text = std::str::from_utf8(line).ok()?.trim();
     let separator = [';', '\t', ','].into_iter().find(|separator| text.contains(*separator)).unwrap_or(' ');
@@ -374,7 +376,7 @@ fn names_in_header(line: &[u8]) -> Option<Vec<String>> {
     checked(fields.into_iter().filter(|_| are_words).collect())
 }
 
-/// Names without those of time and frame number; `None` without remaining names, with more than [`MOST_CHANNELS`], or with duplicates.
+/// Names that may be those of channels: other than time and number of the frame, and none twice.
 fn checked(names: Vec<String>) -> Option<Vec<String>> {
     let names: Vec<String> = names.into_iter().filter(|name| !is_reserved(name)).collect();
     let mut sorted: Vec<String> = names.iter().map(|name| name.to_ascii_lowercase()).collect();
@@ -520,7 +522,7 @@ mod tests {
     fn says_why_there_are_no_readings() {
         let problem = |monitor: &Monitor| monitor.record(Duration::ZERO).problem.unwrap_or_default();
         assert!(problem(&of_lines(&[])).contains("sends nothing"));
-        assert!(problem(&of_lines(&["hello\n", "world\n"])).contains("lines arrive without values"));
+        assert!(problem(&of_lines(&["hello\n", "world\n"])).contains("no values are found"));
         let mut monitor = of_lines(&[]);
         monitor.receive(&arrived(1, Arrival::Bytes(vec![0xf8; 5000])));
         assert!(problem(&monitor).contains("baud"), "{}", problem(&monitor));

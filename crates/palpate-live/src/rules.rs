@@ -175,7 +175,7 @@ impl Rules {
         let file: FileIn = toml::from_str(text)
             .map_err(|error| RuleError { problem: error.message().to_owned(), span: error.span() })?;
         if file.rule.is_empty() {
-            return Err(RuleError { problem: "[[rule]] is missing".to_owned(), span: None });
+            return Err(RuleError { problem: "there is no [[rule]]".to_owned(), span: None });
         }
         if let Some(beyond) = file.rule.get(MOST) {
             return Err(error_at(beyond.span(), format!("there are more than {MOST} rules")));
@@ -335,7 +335,7 @@ fn action(
         (Some(topic), Some(message), None) => {
             let text = topic.get_ref();
             if text.is_empty() || text.len() > 1000 || text.contains(['+', '#', '\0']) {
-                let problem = "`topic` must have 1 to 1000 bytes, without + and #".to_owned();
+                let problem = "`topic` must have 1 to 1000 bytes, and none of + and #".to_owned();
                 return Err(error_at(topic.span(), problem));
             }
             Ok(Action::Publish { topic: topic.into_inner(), message: message.into_inner() })

@@ -61,7 +61,7 @@ pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
         section.text(report.counts_in_words()).figure(figure)
     }));
     sections.push(Section::new("given", "What was given").text(report.given()));
-    sections.push(Section::new("meaning", "Search and scores of layouts").text(meaning()));
+    sections.push(Section::new("meaning", "How layouts are found and judged").text(meaning()));
     Page::new(report.title, report.summary(), sections).with_source(html! { ", seed " (report.seed) }).files()
 }
 
@@ -331,7 +331,7 @@ impl<'a> SensorDesignReport<'a> {
                     ", " (stated(self.problem.force_n())) " N, force " (self.problem.force().name())
                     @let left_out = self.problem.contacts_over_supports().len();
                     @if left_out > 0 {
-                        ", of which those over supports (" (left_out) "), where no layout determines an unknown force, are left out of scores and limits"
+                        ", of which those over supports (" (left_out) "), where no layout tells a force that is not known, are left out of scores and limits"
                     }
                     @if !design.contacts.weights.is_empty() { ", some stretches touched more often than others" }
                     "."
@@ -355,10 +355,10 @@ impl<'a> SensorDesignReport<'a> {
 fn score_in_words(criterion: DesignCriterion) -> &'static str {
     match criterion {
         DesignCriterion::MeanLimit => {
-            "the mean limit in mm, each contact's combined with the size of the surface"
+            "the mean limit in mm, each contact's combined with what the surface's size tells"
         }
-        DesignCriterion::WorstLimit => "the largest limit in mm, combined with the size of the surface",
-        DesignCriterion::WithinTolerance => "the share of contacts with a limit above the tolerance, in %",
+        DesignCriterion::WorstLimit => "the largest limit in mm, combined with what the surface's size tells",
+        DesignCriterion::WithinTolerance => "the share of contacts whose limit exceeds the tolerance, in %",
         DesignCriterion::DOptimality => "the mean of ½·ln det of a contact's least covariance",
     }
 }

@@ -33,7 +33,7 @@ impl ElliottReport<'_> {
         self.findings.rows.iter().find(|row| row.chain == chain)
     }
 
-    /// The chains on components, with their number of components.
+    /// The chains on components, with how many.
     fn by_components(&self) -> impl Iterator<Item = (f64, &ChainRow)> {
         self.findings.rows.iter().filter_map(|row| match row.chain {
             Chain::Components(count) => Some((count as f64, row)),
@@ -97,8 +97,7 @@ impl ElliottReport<'_> {
         let x = Axis::linear("component").from_to(0.0, points.len() as f64 + 1.0);
         let y = Axis::log10("share of the readings’ variance, %");
         let series = vec![Series::markers("component", 0, points, Marker::Circle)];
-        let caption =
-            html! { "Of the first calibration. Where the shares level off, components are only noise." };
+        let caption = html! { "Of the first calibration. Where the shares level off, components are noise and nothing else." };
         Figure::chart(&Chart::new("What each component carries", x, y, series), caption)
     }
 
@@ -117,7 +116,7 @@ impl ElliottReport<'_> {
         Series::error_bars(label, colour, points, Marker::Circle)
     }
 
-    /// The chains that do not depend on a number of components, each as a horizontal line.
+    /// The chains that do not depend on a number of components: a line across each.
     fn across(&self, error: fn(&ChainRow) -> Option<Quantiles>) -> impl Iterator<Item = Series> {
         let chains = [
             (Chain::Readings, "network on all readings", 1),

@@ -77,7 +77,7 @@ impl<'a> ProfileReport<'a> {
             @if let Some(centre) = &profile.centre {
                 li {
                     "Total force " b { (number(profile.total_n)) " N" } ", 95 % interval " (interval_n(total_95_n)) " N"
-                    " for any shape of the load; " (interval_n(seen_95_n)) " N without a load within " (mm(margin_m))
+                    " whatever the shape of the load; " (interval_n(seen_95_n)) " N where nothing lies within " (mm(margin_m))
                     " mm of an edge."
                 }
                 li {
@@ -203,7 +203,7 @@ impl<'a> ProfileReport<'a> {
         }
         panels.push(kpa("standard deviation", cells.map(|cell| profile.density_sd(cell)).collect()));
         let caption = html! {
-            "The pressure of the reading, cell by cell"
+            "The pressure that the reading tells, cell by cell"
             @if !self.truth.is_empty() { ", the pressure that was simulated," }
             " and the standard deviation of what is told. Neighbouring cells share their uncertainty: where one is too high, the next is too \
              low, and their sum is told better than either. Dots: the sensors."
@@ -348,7 +348,7 @@ fn tenths_mm(length_m: f64) -> String {
 fn status_in_words(profile: &LoadProfile) -> Markup {
     let (misfit, worst) = (number(profile.misfit), stated(profile.worst_misfit.round()));
     match profile.status {
-        Status::NoContact => html! { "No contact: the reading is within its noise." },
+        Status::NoContact => html! { "No contact: the reading is no more than its noise." },
         Status::OutsideModel => html! {
             b { "Outside the model" } ": no load explains the reading within its noise. The least sum of squared residuals is "
             (misfit) " standard deviations squared; noise alone seldom makes more than " (worst) "."

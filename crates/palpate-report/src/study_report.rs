@@ -447,7 +447,7 @@ fn arm_columns(report: &StudyReport) -> Vec<ArmColumn> {
     }));
     columns.extend([
         spread("error over the limit's", &|arm| arm.limit.as_ref()?.error_over_limit),
-        spread("95 % intervals that cover, %", &|arm| arm.coverage_percent),
+        spread("95 % intervals that hold, %", &|arm| arm.coverage_percent),
     ]);
     columns
 }
@@ -530,8 +530,8 @@ pub(crate) fn glossary(report: &StudyReport) -> Markup {
                 }
             }
             @if report.results.arms.iter().any(|arm| arm.coverage_percent.is_some()) {
-                dt { "95 % intervals that cover" }
-                dd { "The share of estimates with the true position in their 95 % interval: 95 % for correct intervals." }
+                dt { "95 % intervals that hold" }
+                dd { "The share of estimates whose 95 % interval holds the true position: 95 % if the estimator knows how sure it can be." }
             }
             dt { "Seed" }
             dd {

@@ -153,7 +153,7 @@ impl TrackReport<'_> {
             (
                 "How far the track is off",
                 "position less the true one, mm",
-                "The track's error over time and its 95 % interval, while something touched: the interval should contain 0.",
+                "The track's error over time and its 95 % interval, while something touched: the interval should hold 0.",
             )
         };
         let chart = Chart::new(title, Axis::linear("time, s"), Axis::linear(y), series).with_height(480);

@@ -15,9 +15,9 @@ use crate::error::RigError;
 use crate::sensors::kind_on;
 use crate::values::{AtLeastZero, Count, Length, NotNegative, Number, Point, Positive, Written, check_order};
 
-/// Greatest number of candidate sites for a search in reasonable time.
+/// Greatest number of candidate sites that a search goes through in reasonable time.
 const MOST_SITES: i64 = 1_000_000;
-/// Greatest number of contact positions that a layout is judged by.
+/// Greatest number of contact positions to judge a layout by.
 const MOST_CONTACTS: f64 = 10_000.0;
 
 /// Candidates of a sensor design, and its constraints.
@@ -119,7 +119,7 @@ impl At<DesignKeys> {
     pub fn build(&self, setup: &Setup) -> Result<SensorDesign, RigError> {
         let extent = setup.surface().extent();
         let Ok(default) = SensorDesign::for_setup(setup) else {
-            let with = "a surface without a model, which cannot predict a sensor elsewhere";
+            let with = "a surface without a model, which cannot tell what a sensor elsewhere would read";
             return Err(self.place.unused(with));
         };
         let offers = match &self.kinds {
@@ -165,7 +165,7 @@ fn offers(listed: &At<Vec<At<OfferKeys>>>, setup: &Setup) -> Result<Vec<SensorOf
 }
 
 impl At<OfferKeys> {
-    /// Builds a kind with its noise and cost; faults without a key here are those of the rig's own sensors of the kind.
+    /// A kind with its noise and cost; the faults that are not named here are those of the rig's own sensors of the kind.
     fn build(&self, setup: &Setup) -> Result<SensorOffer, RigError> {
         let kind = kind_on(setup.surface(), &self.measure)?;
         let own = setup.layout().sensors().iter().find(|sensor| sensor.kind == kind);
@@ -182,9 +182,7 @@ impl At<OfferKeys> {
         if channel.noise_sd == 0.0 && channel.resolution == 0.0 {
             return Err(match &self.noise {
                 None => self.place.missing("noise"),
-                Some(noise) => {
-                    noise.place.refuse("greater than 0, or the information of the sensor has no limit")
-                }
+                Some(noise) => noise.place.refuse("greater than 0, or nothing limits what the sensor tells"),
             });
         }
         Ok(SensorOffer { kind, channel, cost: self.cost.map_or(1.0, |cost| cost.si), supply: Supply::Any })

@@ -31,7 +31,7 @@ pub enum RigProblem {
     #[error("{}", .0.message())]
     Toml(toml::de::Error),
     /// A section is missing.
-    #[error("the rig has no section {section}")]
+    #[error("there is no section {section}")]
     MissingSection {
         /// Name in brackets.
         section: &'static str,
@@ -122,7 +122,7 @@ pub enum RigProblem {
     Arrangement(ArrangementError),
     /// An insensitive sensor: its reading does not depend on the contact.
     #[error(
-        "{kind} sensor {number} is at {} and would always read 0: {reason}",
+        "{kind} sensor {number} is at {} and would read nothing: {reason}",
         extent.place_in_words(*position)
     )]
     InsensitiveSensor {

@@ -90,7 +90,7 @@ pub enum AssemblyError {
         seed: u64,
     },
     /// No shard at all.
-    #[error("the number of shards is 0: it must be at least 1")]
+    #[error("there are no shards: there must be at least 1")]
     Nothing,
 }
 

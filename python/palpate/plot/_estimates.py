@@ -17,7 +17,7 @@ from ._bench import sensors
 from ._canvas import Canvas
 from ._checks import check_surface, check_type
 
-# √χ² of two coordinates that contains 95 % of a normal distribution.
+# √χ² of two coordinates that holds 95 % of a normal distribution.
 _OF_95_OF_TWO = 2.447747
 _MARKERS = {"located": "o", "ambiguous": "D", "outside_model": "s", "outside_surface": "v"}
 

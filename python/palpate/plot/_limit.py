@@ -27,7 +27,7 @@ def limit(
     """The limit: the least standard deviation of a located contact, by its position.
 
     On a line there is a curve for a force that is known and one for a force that is estimated along; what the limit warns of is shaded. On a plane
-    there are colours; grey is where the readings do not determine the position.
+    there are colours; grey is where the readings do not tell the position.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from .._study import StudyResults
 from ._canvas import Canvas
 from ._checks import check_type
 
-# Overlapping bands can be distinguished up to this number.
+# Bands that lie over each other are told apart up to so many.
 _MOST_BANDS = 2
 
 

@@ -1,4 +1,4 @@
-// The ellipse that contains 95 % of a normal distribution in the plane.
+// The ellipse that holds 95 % of a normal distribution in the plane.
 
 /** The radius that holds 95 % of a normal distribution in the plane, in standard deviations: √(−2 ln 0.05). */
 export const RADIUS_95 = 2.4477;

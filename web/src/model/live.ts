@@ -1,4 +1,4 @@
-// The session's state on the page, from its messages.
+// What the page knows of the session, from its messages.
 
 import type { EventRecord, PastRecord, SampleRecord, StateRecord, StreamMessage } from "../protocol";
 import { Baseline } from "./baseline";

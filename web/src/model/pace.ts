@@ -1,4 +1,4 @@
-// How often a page draws, on unknown screens and processors.
+// How often a page draws, on screens and processors that it does not know.
 
 /** Milliseconds between the frames of a screen that keeps up. */
 const FRAME_MS = 1000 / 60;

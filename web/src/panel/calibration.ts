@@ -221,7 +221,7 @@ function writeStatements(state: CalibrationRecord): void {
 
 /** Why a second weight is asked for. */
 export function weightWords(force_n: number): string {
-  return `All presses have ${Number(force_n.toPrecision(3))} N, and the force in use is unknown: one weight does not show how readings grow with the force.`;
+  return `All presses have ${Number(force_n.toPrecision(3))} N, and the force in use is unknown: one weight cannot tell how readings grow with the force.`;
 }
 
 function beginWords(state: CalibrationRecord): string {

@@ -1,4 +1,4 @@
-// The log of events, its search, and the announcements of a screen reader.
+// The log of events, its search, and what is said aloud.
 
 import { element, need, setText } from "../dom";
 import type { Snapshot } from "../model/snapshot";

@@ -189,7 +189,7 @@ class Chart {
     const { min, max } = this.plot.scales.y!;
     if (factor === null || min == null || max == null) return this.setRange(null);
     const [middle, half] = [(min + max) / 2, (factor * (max - min)) / 2];
-    // A range below the resolution of doubles has no axis.
+    // A range that doubles cannot tell apart has no axis.
     if (half > 1e-12 * Math.abs(middle) && half < 1e300) this.setRange([middle - half, middle + half]);
   }
 

@@ -63,7 +63,7 @@ export class LineView {
     // The next round number below what fills the room.
     const most = (DEFLECTION * height) / (this.largest_mm * perMm);
     this.exaggeration = 1 / roundUp(1 / most);
-    // A support fixes the surface, unless it is elastic.
+    // A support holds the surface, unless it gives way.
     const held = surface.supports.filter((support) => support.kind === "simple" || support.kind === "clamped");
     const points = [...measured, ...held.map((support) => ({ x: support.at_mm, y: 0 }))]
       .sort((one, other) => one.x - other.x)

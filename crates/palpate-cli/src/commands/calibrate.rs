@@ -90,7 +90,7 @@ pub struct OperatorOptions {
 }
 
 impl OperatorOptions {
-    /// The first of these options on the command line.
+    /// The first option that is given.
     pub fn given(&self) -> Option<&'static str> {
         match self.statements() {
             Statements { placement_sd_m: Some(_), .. } => Some("--placement"),
@@ -100,7 +100,7 @@ impl OperatorOptions {
         }
     }
 
-    /// The options as statements about the calibration.
+    /// The statements of the options.
     pub fn statements(&self) -> Statements {
         Statements {
             placement_sd_m: self.placement,
@@ -110,7 +110,7 @@ impl OperatorOptions {
     }
 }
 
-/// Longest interval between two checks of keys, signals and the machine.
+/// Longest time without a look at keys, signals and the machine.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -129,7 +129,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let stated = arguments.operator.statements();
     let known = match &stage {
         None => stated.or_known(&rig, arguments.force, in_file_m, &before),
-        // The placement in the rig is for a person.
+        // The placement of the rig is that of a person.
         Some(_) => stated,
     };
     let depths_m = stage.as_ref().map_or_else(Vec::new, |stage| stage.depths_m.clone());
@@ -174,7 +174,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The stage of the rig, if a machine presses.
+/// The stage of the rig, where a machine presses.
 pub fn stage(
     path: &Path,
     rig: &Rig,
@@ -186,7 +186,7 @@ pub fn stage(
     }
     let Some(stage) = &rig.stage else {
         let complaint = Complaint::about(path, "--stage needs the rig's section [stage]");
-        return Err(complaint.help("docs/live.md describes it: origin, touch and depths at least").into());
+        return Err(complaint.help("docs/live.md says how: origin, touch and depths at least").into());
     };
     if force_n.is_some() && (stage.load_cell.is_some() || stage.depths_m.len() > 1) {
         let why = if stage.load_cell.is_some() {
@@ -201,7 +201,7 @@ pub fn stage(
     Ok(Some(stage.clone()))
 }
 
-/// Rows of the file of presses, and the placement error in it; empty for a new file.
+/// Rows that the file of presses has, and the placement that it says; none of a new file.
 fn rows_before(
     arguments: &Arguments,
     rig: &Rig,
@@ -215,7 +215,7 @@ fn rows_before(
     pressed_before(&arguments.rig, rig, path, depths)
 }
 
-/// Rows of an existing file of presses, and the placement error in it; empty without a file.
+/// Rows that a file of presses has already, and the placement that it says; none where there is no file.
 pub fn pressed_before(
     rig_path: &Path,
     rig: &Rig,
@@ -237,7 +237,7 @@ pub fn pressed_for(rig: &Path) -> String {
     format!("palpate {}, pressed for {}", env!("CARGO_PKG_VERSION"), rig.display())
 }
 
-/// A complaint about presses that cannot be stored.
+/// A complaint about presses that cannot be kept.
 pub fn about_journal(rig: &Path, error: &JournalError) -> Failure {
     let complaint = match error {
         JournalError::Nuisance { .. } | JournalError::Numbered => Complaint::about(rig, error),
@@ -246,7 +246,7 @@ pub fn about_journal(rig: &Path, error: &JournalError) -> Failure {
     complaint.help(error.help()).into()
 }
 
-/// Plans the presses that are missing from rows.
+/// Presses that are missing from rows.
 type Replan<'a> = &'a dyn Fn(&[Row]) -> Result<Vec<Press>, Complaint>;
 
 /// The bench of a calibration, and the person at its keyboard.
@@ -266,7 +266,7 @@ impl Bench<'_> {
         Ok((source, inputs))
     }
 
-    /// Jogs and touch-offs by keys; the stage gets the height of the touch. False if the operator ends the calibration.
+    /// Jogs and touch-offs by the keys; the stage gets the height that is found. False where the operator ends it.
     fn set_up(&self, stage: &mut Stage) -> Result<bool, Failure> {
         let Self { arguments, rig, clock, .. } = self;
         let (Some(url), Some(keys)) = (&arguments.stage, self.keys) else {
@@ -274,7 +274,7 @@ impl Bench<'_> {
                 Complaint::new("--jog needs the keyboard, and --from - takes the readings from it");
             return Err(complaint.help("give the readings by another source").into());
         };
-        // No press is made, and no file is written.
+        // Nothing is pressed, and no file is written.
         let journal =
             Journal::new(&rig.setup, &arguments.presses, String::new(), Vec::new(), DepthKnowledge::Unknown)
                 .map_err(|error| about_journal(&arguments.rig, &error))?;
@@ -291,7 +291,7 @@ impl Bench<'_> {
         match outcome.end {
             JogEnd::Begin => Ok(true),
             JogEnd::Quit => Ok(false),
-            JogEnd::Interrupted => Err(Failure::Interrupted("stopped before the first press".to_owned())),
+            JogEnd::Interrupted => Err(Failure::Interrupted("stopped; nothing was pressed".to_owned())),
         }
     }
 
@@ -306,7 +306,7 @@ impl Bench<'_> {
             .map_err(|error| Complaint::new(format!("--from {from}: {error}")).into())
     }
 
-    /// Requests presses at fresh places, and reports the errors of the locator there.
+    /// Asks for presses at fresh places, and says how far off the locator is there.
     fn check(
         &self,
         locator: &Locator,
@@ -320,7 +320,9 @@ impl Bench<'_> {
         let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
         let plan = calibration::check_presses(rig, rows, weights, depths_m);
         if plan.is_empty() {
-            return Err(Complaint::new("no place between those of the calibration is left to check").into());
+            return Err(
+                Complaint::new("there is no place between those of the calibration to check at").into()
+            );
         }
         let path = calibration::check_path(&arguments.presses);
         let depths = DepthKnowledge::for_stage(stage.as_ref());
@@ -338,7 +340,7 @@ impl Bench<'_> {
         operator::say_check(check.as_ref(), placement_sd_m, rig.setup.surface().extent())
     }
 
-    /// Guides through the presses of a plan; accepted presses are on disk. A press can be deleted if `replan` requests it again.
+    /// Presses of a plan, guided; those that are taken are on disk. A press can be struck out where `replan` asks for it again.
     fn press_all(
         &self,
         stage: Option<Stage>,
@@ -388,7 +390,7 @@ impl Bench<'_> {
         }
         if calibration.guide().waiting() != Waiting::Nothing {
             if let Some(machine) = machine {
-                // The finger no longer appears in the readings.
+                // No reading shows its finger any more.
                 machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error))?;
             }
             let cause = calibration.fault().unwrap_or("the source ended before all was pressed".to_owned());
@@ -404,7 +406,7 @@ impl Bench<'_> {
     }
 }
 
-/// The connected machine, if a machine presses.
+/// The machine, connected, where one presses.
 fn machine(
     arguments: &Arguments,
     stage: Option<Stage>,
@@ -416,10 +418,10 @@ fn machine(
     Ok(Some(Machine::new(thread, limit_n, clock.elapsed())))
 }
 
-/// Connects to a machine without moving it; a signal stops the machine at once.
+/// Connects to a machine, which a signal stops at once; nothing moves yet.
 fn open_stage(url: &StageUrl, stage: Stage, clock: HostClock) -> Result<StageThread, Failure> {
     let stop = Arc::default();
-    // After a stop the machine still has to be lifted.
+    // A machine that was stopped is lifted.
     progress::finish_after_signal();
     progress::set_at_signal(&stop).map_err(Complaint::new)?;
     let thread = StageThread::open(url, stage, stop, clock).map_err(|error| {
@@ -437,7 +439,7 @@ fn open_stage(url: &StageUrl, stage: Stage, clock: HostClock) -> Result<StageThr
     Ok(thread)
 }
 
-/// Homes the machine, and travels to every position at the height of travel.
+/// Homes, and travels to every position at the height of travel.
 fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage, clock: HostClock) -> Result<(), Failure> {
     let Some(url) = &arguments.stage else { return Ok(()) };
     let weights = arguments.operator.statements().weights(arguments.force);
@@ -463,7 +465,7 @@ fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage, clock: HostClock) -> 
     ))
 }
 
-/// Waits for the end of a machine's move; any typed line stops it.
+/// Waits for the end of a machine's move; anything that was typed stops it.
 fn wait_for(thread: &mut StageThread, keys: &Receiver<String>) -> Result<(), Failure> {
     let ended = |error: MachineError| machine_failure(&error, "");
     loop {
@@ -474,12 +476,12 @@ fn wait_for(thread: &mut StageThread, keys: &Receiver<String>) -> Result<(), Fai
             thread.stop();
             return Err(ended(MachineError::ByHand));
         }
-        // Without a keyboard the channel is closed, and a receive returns at once.
+        // Without a keyboard the channel is closed, and does not wait.
         std::thread::sleep(LOOK_EVERY / 10);
     }
 }
 
-/// Makes the machine do its next step; any typed line stops it.
+/// Has the machine do what is next; anything that was typed stops it.
 fn step(
     machine: &mut Machine,
     key: Option<&str>,
@@ -494,7 +496,7 @@ fn step(
     match machine.step(now, calibration)? {
         Some(MachineNote::Homing) => remark!("the machine looks for its end stops"),
         Some(MachineNote::Unseen) => remark!("left out: a press that no reading showed"),
-        Some(MachineNote::NoRest) => remark!("left out: a press with a reading that did not come to rest"),
+        Some(MachineNote::NoRest) => remark!("left out: a press whose reading did not come to rest"),
         Some(MachineNote::SetUp(note)) => remark!("{note}"),
         None => {}
     }
@@ -523,7 +525,7 @@ fn cannot_go_on(arguments: &Arguments, calibration: &Calibration, error: Calibra
     }
 }
 
-/// Typed lines.
+/// Lines that are typed.
 fn keys() -> Receiver<String> {
     let (to, keys) = channel();
     // The thread waits for the keyboard until the process ends.
@@ -537,7 +539,7 @@ fn keys() -> Receiver<String> {
     keys
 }
 
-/// Description of the keys.
+/// Words on the keys.
 fn help(can_strike: bool) -> &'static str {
     match can_strike {
         true => {
@@ -561,7 +563,7 @@ fn press_key(
     match (key.trim(), replan) {
         ("r", _) => {
             if !calibration.redo().map_err(|error| about(&error))? {
-                remark!("no press yet");
+                remark!("nothing was pressed yet");
             }
         }
         ("s", _) => calibration.skip(),
@@ -595,7 +597,7 @@ fn stopped(arguments: &Arguments, calibration: &Calibration) -> Failure {
     }
 }
 
-/// Description of the stored presses.
+/// Words on what is kept.
 fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
     let presses = calibration.journal().presses();
     if presses == 0 {
@@ -611,11 +613,11 @@ fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
     }
 }
 
-/// Fits the rig's estimator to the presses on disk, and reports its accuracy and the gain from more presses.
+/// Fits the rig's estimator to the presses on disk, and says how good it is and what more presses would gain.
 fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Recording), Failure> {
     if !arguments.presses.exists() {
         let words =
-            "the calibration ended before any press, so a fit is not possible; run it again and press";
+            "the calibration ended before any press, so there is nothing to fit; run it again and press";
         return Err(Failure::GoalMissed(words.to_owned()));
     }
     let recording = input::read_recording(&rig.setup, &arguments.presses)?;

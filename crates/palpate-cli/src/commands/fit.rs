@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) = training {
         let epochs = format_count(u64::from(epochs));
         return Err(Failure::GoalMissed(format!(
-            "training diverged after {epochs} epochs; no file was written: lower the learning rate or the momentum"
+            "training diverged after {epochs} epochs; nothing was written: lower the learning rate or the momentum"
         )));
     }
     let learnt = learnt::of_locator(&locator);

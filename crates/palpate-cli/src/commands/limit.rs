@@ -1,4 +1,4 @@
-//! `palpate limit`: the Cramér–Rao bound of a bench, position by position, and the smallest detectable force.
+//! `palpate limit`: what physics allows on a bench, position by position, and the lightest touch that is told from noise.
 
 use crate::cost::MemoryOption;
 use crate::failure::{Complaint, Failure};
@@ -56,7 +56,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The limit with a known and with an unknown force.
+/// The limit for both kinds of knowledge of the force.
 struct Limits<'a> {
     limit: &'a CramerRaoBound<'a>,
     force_n: f64,
@@ -66,7 +66,7 @@ struct Limits<'a> {
     listed: Vec<Position>,
     warnings: Vec<LimitWarning>,
     touch: &'a LightestTouch<'a>,
-    /// The smallest detectable force over the surface.
+    /// The lightest touch over the surface.
     touches: [Option<TouchSummary>; 2],
 }
 
@@ -112,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Announces the limit of many sensors, and refuses one above the memory limit.
+/// Announces the limit of many sensors, and refuses one that takes more memory than it may.
 fn check_cost(setup: &Setup, listed: usize, arguments: &Arguments) -> Result<(), Failure> {
     let Some(surface) = setup.surface().model() else { return Ok(()) };
     let cost = CramerRaoBound::cost(surface, setup.layout(), listed);
@@ -136,7 +136,7 @@ fn false_alarm_rate(bench: &RigOrLocator) -> FalseAlarmRate {
     set.unwrap_or_default()
 }
 
-/// The bench, with the noise of the command line, or with the noise that a locator has learnt.
+/// The bench, with the noise of the command line, or that which a locator has learnt.
 fn setup(bench: &RigOrLocator, arguments: &Arguments) -> Result<Setup, Failure> {
     let mut setup = match bench {
         RigOrLocator::Rig(rig) => rig.setup.clone(),
@@ -211,8 +211,8 @@ fn limits<'a>(
     })
 }
 
-/// Positions from one end to the other: for the paper's beam 1, 20, 50, 100, 200 mm and mirrored; on a plane rows of positions from
-/// one side to the other.
+/// Positions from one end to the other: for the paper's beam 1, 20, 50, 100, 200 mm and mirrored; on a plane rows of them from one
+/// side to the other.
 fn a_few(extent: Extent) -> Vec<Position> {
     const ON_A_LINE: [f64; 9] = [0.0025, 0.05, 0.125, 0.25, 0.5, 0.75, 0.875, 0.95, 0.9975];
     const ON_A_PLANE: [f64; 7] = [0.05, 0.125, 0.25, 0.5, 0.75, 0.875, 0.95];
@@ -255,7 +255,7 @@ fn write_report(
     limit_table(limits, arguments).write(out, "limit.csv")
 }
 
-/// The limit and the smallest detectable force all over the surface. A cell is empty if the readings do not determine its value.
+/// The limit and the lightest touch all over the surface. What the readings do not tell is an empty cell.
 fn limit_table(limits: &Limits, arguments: &Arguments) -> CsvTable {
     let extent = limits.known.extent;
     let comment = format!(
@@ -282,9 +282,9 @@ fn limit_table(limits: &Limits, arguments: &Arguments) -> CsvTable {
     table
 }
 
-/// JSON of the limit. A limit is null if the readings do not determine the contact.
+/// JSON of the limit. A limit that is not there, because the readings do not tell, is null.
 fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize {
-    // Limits over the surface; `mean_error_mm` is the mean error of an estimator at the limit.
+    // Limits over the surface; `mean_error_mm` is what an estimator at the limit is off on average.
     let summary = |summary: LimitSummary| {
         object! {
             "mean_mm": summary.mean_m * 1e3,
@@ -309,7 +309,7 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
             "lightest_touch_n": limits.touch.forces_at(position),
         }
     };
-    // Forces that a locator without knowledge of the force detects with this probability.
+    // Forces that a locator without knowledge of the force finds with so much probability.
     let touch = |summary: &TouchSummary| {
         object! {
             "found_percent": summary.found * 100.0,
@@ -340,7 +340,7 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
         "sensors": setup.layout().len(),
         "sensors_alive": limits.limit.alive(),
         "force_n": limits.force_n,
-        // Whether the force is known to the rig; the warnings are about this case.
+        // What the rig knows of it: what the warnings are about.
         "force": limits.force,
         "known_force": limits.known.summary().map(summary),
         "unknown_force": limits.unknown.summary().map(summary),
@@ -387,8 +387,8 @@ fn print_line(limits: &Limits, extent: Extent) -> Result<(), Failure> {
     output::say(summary_rows(limits).into_iter().fold(table, Table::row))
 }
 
-/// A table for each knowledge of the force, with one row per row of positions, the uppermost first. If that is too wide, one line
-/// per position.
+/// A row of numbers a row of positions, the uppermost first, and a table for each knowledge of the force; where that would
+/// be too wide, a line a position.
 fn print_plane(limits: &Limits) -> Result<(), Failure> {
     const MOST_COLUMNS: usize = 12;
     let mut rows: Vec<&[Position]> = limits.listed.chunk_by(|a, b| a.y_m == b.y_m).collect();
@@ -417,7 +417,7 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
     output::say(summary_rows(limits).into_iter().fold(table, Table::row))
 }
 
-/// A limit in millimetres, or words for one that the readings do not determine.
+/// A limit in millimetres, or that the readings do not tell it.
 fn limit_figure(bound: Option<&Bound>) -> String {
     told(bound.map(|bound| bound.sd_position_m * 1e3))
 }
@@ -426,30 +426,27 @@ fn told(value: Option<f64>) -> String {
     value.map_or_else(|| "not told".to_owned(), |value| figure(Some(value)))
 }
 
-/// Positions that the readings do not determine and that the limits over the surface exclude, in one line for each knowledge of the
-/// force.
+/// Positions left out of the limits over the surface, as the readings do not tell them, in a line for each knowledge of the force.
 fn not_told_in_words(limits: &Limits) -> String {
     let line = |(curve, name): (&LimitCurve, &str)| {
         let words = curve.not_told_in_words()?;
-        Some(format!(
-            "\nforce {name}: not determined, and left out of the limits over the surface, {words}\n"
-        ))
+        Some(format!("\nforce {name}: not told, and left out of the limits over the surface, {words}\n"))
     };
     [(&limits.known, "known"), (&limits.unknown, "unknown")].into_iter().filter_map(line).collect()
 }
 
-/// A force with three digits; a dash for `None`.
+/// A force with three digits; a dash for none.
 fn force_figure(force_n: Option<f64>) -> String {
     let three = |force_n: f64| -> f64 { format!("{force_n:.2e}").parse().unwrap_or(force_n) };
     force_n.map_or_else(|| "–".to_owned(), |force_n| three(force_n).to_string())
 }
 
-/// The smallest detectable force over the surface, in words.
+/// The lightest touch over the surface, in words.
 fn lightest_touch_in_words(limits: &Limits) -> String {
     let extent = limits.known.extent;
     let rate = limits.touch.rate();
     let [Some(half), Some(surely)] = &limits.touches else {
-        return format!("smallest detectable force: none is detected at {rate} of false alarms");
+        return format!("lightest touch: none is told from noise at {rate} of false alarms");
     };
     let without = match surely.without {
         0 => String::new(),
@@ -467,7 +464,7 @@ fn lightest_touch_in_words(limits: &Limits) -> String {
     )
 }
 
-/// Rows of the limit over the whole surface, for any listed positions.
+/// Rows of the limit over the whole surface, whatever positions are listed.
 fn summary_rows(limits: &Limits) -> Vec<Vec<String>> {
     let summaries = [limits.known.summary(), limits.unknown.summary()];
     let row = |name: &str, of: fn(&LimitSummary) -> f64| {

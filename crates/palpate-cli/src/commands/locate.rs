@@ -1,4 +1,4 @@
-//! `palpate locate`: reads readings and prints estimates, line by line.
+//! `palpate locate`: readings in, estimates out, line by line.
 
 use crate::estimate_columns::{EstimateColumns, Guesses};
 use crate::failure::{Complaint, Failure};
@@ -43,13 +43,12 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut locator = input::read_locator(&arguments.locator)?;
     for channel in &arguments.dead {
-        // Channel 0 does not exist, like those beyond the last.
+        // Channel 0 is none, like those beyond the last.
         let left_out = locator.leave_out(channel.wrapping_sub(1));
         left_out.map_err(|error| Complaint::new(format!("--dead {channel}: {error}")))?;
     }
     if arguments.shape.is_some() && locator.kind() != "digit" {
-        let complaint =
-            format!("--shape: a locator of kind `{}` does not estimate the shape", locator.kind());
+        let complaint = format!("--shape: a locator of kind `{}` does not tell the shape", locator.kind());
         return Err(Complaint::new(complaint).help("only the `digit` estimator does").into());
     }
     let path = arguments.readings.as_deref().unwrap_or(Path::new("-"));
@@ -83,11 +82,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             Some(estimate) => columns.row(vec![line.to_string()], &EstimateRecord::new(estimate, extent)),
         };
         output::print(&mut out, text.as_bytes())?;
-        // The reader of a pipe gets each estimate at once.
+        // A reader at the other end of a pipe wants each estimate now.
         output::flush(&mut out)?;
     }
     if readings.awaits_columns() && readings.lines.is_whole() {
-        let complaint = Complaint::new(format!("{} has no reading", readings.lines.name()));
+        let complaint = Complaint::new(format!("{} holds no reading", readings.lines.name()));
         return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
     }
     if let Some(taring) = &taring {
@@ -96,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     readings.lines.finish("estimate")
 }
 
-/// The estimate of a reading; `None` for an untouched one of the baseline.
+/// The estimate of a reading; `None` of one that is taken for an untouched one.
 fn locate(
     locator: &Locator,
     taring: Option<&mut Taring>,
@@ -110,14 +109,14 @@ fn locate(
     }
 }
 
-/// The status of an untouched reading of the baseline, which is not located.
+/// The status of a reading that is taken for an untouched one, and is not located.
 const TARE: &str = "tare";
 
 fn untouched_json(line: u64) -> Result<String, Failure> {
     json_line(&object! { "line": line, "status": TARE })
 }
 
-/// A line of JSON: the estimate of the reading in line `line` of its source, and the shape if it is requested.
+/// A line of JSON: all that the locator says of the reading in line `line` of its source, and the shape where it is asked for.
 fn json(
     estimate: &Estimate,
     line: u64,
@@ -141,7 +140,7 @@ fn json_line(object: &impl Serialize) -> Result<String, Failure> {
     serde_json::to_string(object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
 }
 
-/// A point of the bent finger's centre line: its distance along the line, its position, and its uncertainty.
+/// A point of the bent finger's centre line: how far along it, where, and how sure.
 fn shape_point(point: &ShapePoint) -> impl Serialize {
     object! {
         "at_mm": point.at_m * 1e3,

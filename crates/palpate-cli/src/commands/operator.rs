@@ -55,7 +55,7 @@ pub fn ask(
 /// Warning about a calibration with one weight.
 pub fn single_weight(force_n: f64) -> String {
     format!(
-        "all presses have {force_n} N, and the force in use is unknown: one weight does not show how readings grow with the force"
+        "all presses have {force_n} N, and the force in use is unknown: one weight cannot tell how readings grow with the force"
     )
 }
 

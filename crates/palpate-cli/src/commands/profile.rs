@@ -1,4 +1,4 @@
-//! `palpate profile`: the distribution of force over the surface, reading by reading.
+//! `palpate profile`: how force is spread over the surface, reading by reading.
 
 use crate::failure::{Complaint, Failure};
 use crate::input::RigOrLocator;
@@ -77,9 +77,9 @@ struct Printer<'a> {
     subject: &'a RigOrLocator,
     profiler: &'a Profiler<'a>,
     report: Option<&'a Target>,
-    /// The simulated loads.
+    /// The loads that were simulated.
     truth: &'a [UniformLoad],
-    /// Number of readings with a profile.
+    /// Readings that gave a profile.
     told: u64,
 }
 
@@ -115,7 +115,7 @@ impl Printer<'_> {
             self.tell(&reading, Some(readings.lines.count))?;
         }
         if self.told == 0 && readings.lines.is_whole() {
-            return Err(Complaint::new(format!("{} has no reading", readings.lines.name())).into());
+            return Err(Complaint::new(format!("{} holds no reading", readings.lines.name())).into());
         }
         readings.lines.finish("profile")
     }
@@ -166,14 +166,14 @@ impl Printer<'_> {
             truth: self.truth,
             source: &source,
         };
-        // The page contains its figures; the other files are copies of them.
+        // The page holds its figures; the others are copies of them.
         let files = profile_report(&report);
         let page = files.iter().find(|file| file.name.ends_with(".html"));
         page.map_or(Ok(()), |page| target.write(&page.bytes))
     }
 }
 
-/// Prints a profile as text.
+/// Prints a profile for people.
 fn print(told: &JsonProfile) -> Result<(), Failure> {
     let interval = |value: &Interval, unit: &str| {
         format!("{:.3} {unit} ({})", value.value, ends(value.low, value.high, ""))
@@ -192,10 +192,13 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
         if told.misfit < 1e6 { format!("{:.1}", told.misfit) } else { format!("{:.1e}", told.misfit) };
     output::say(format!("misfit {misfit}; noise seldom makes more than {:.1}", told.worst_misfit))?;
     let Some(centre) = &told.centre_x_mm else { return Ok(()) };
-    output::say(format!("total force         {}, for any shape of the load", interval(&told.total_n, "N")))?;
+    output::say(format!(
+        "total force         {}, whatever the shape of the load",
+        interval(&told.total_n, "N")
+    ))?;
     let Seen { margin_mm, low_n, high_n } = told.seen;
     output::say(format!(
-        "                    {} without a load within {margin_mm:.0} mm of an edge",
+        "                    {} where nothing lies within {margin_mm:.0} mm of an edge",
         ends(low_n, high_n, " N")
     ))?;
     output::say(format!("centre of pressure  {}", interval(centre, "mm")))?;
@@ -224,7 +227,7 @@ fn ends(low: f64, high: f64, unit: &str) -> String {
     }
 }
 
-/// Load profile of a reading as JSON; null for values that the reading does not determine.
+/// Load profile of a reading as JSON; what the reading does not tell is null.
 #[derive(serde::Serialize)]
 struct JsonProfile {
     /// The line of the reading; null for a simulated one.
@@ -240,16 +243,16 @@ struct JsonProfile {
     /// Median width of the averaging kernels.
     resolution_mm: Option<f64>,
     patches: Vec<JsonPatch<Interval>>,
-    /// The simulated loads.
+    /// The loads that were simulated.
     loads: Vec<JsonPatch<f64>>,
     profile: Vec<JsonCell>,
-    /// Residual of each channel over its noise; null for disabled channels.
+    /// Residual of each channel over its noise; null for dead ones.
     residuals: Vec<Option<f64>>,
     #[serde(skip)]
     extent: Extent,
 }
 
-/// The ends of the total force's 95 % interval if no load is within `margin_mm` of an edge.
+/// The ends of the total force's 95 % interval where nothing lies within a distance of an edge.
 #[derive(Clone, Copy, serde::Serialize)]
 struct Seen {
     margin_mm: f64,
@@ -266,7 +269,7 @@ struct Interval {
     high: f64,
 }
 
-/// A patch of the profile, or, with plain numbers, a simulated load.
+/// A patch of the profile, or with plain numbers a load that was simulated.
 #[derive(serde::Serialize)]
 struct JsonPatch<T> {
     stretch_mm: [f64; 2],

@@ -120,7 +120,7 @@ fn by_the_same(
     match others {
         0 => remark!("{all} estimates, each as recorded to the last bit"),
         _ => remark!(
-            "{all} estimates, {} not as recorded, by palpate {}",
+            "{all} estimates, of which {} are not as recorded, by palpate {}",
             format_count(others),
             playback.head().version
         ),
@@ -170,7 +170,7 @@ fn check_losses(arguments: &Arguments, playback: &Playback, count: u64, record: 
     if passed_over.foreign > 0 {
         remark!("{} messages on topics of other programs are left out", format_count(passed_over.foreign));
     }
-    let nothing = (count == 0).then(|| format!("it has no {record}"));
+    let nothing = (count == 0).then(|| format!("it holds no {record}"));
     let losses: Vec<String> = nothing.into_iter().chain(passed_over.loss()).collect();
     if losses.is_empty() {
         return Ok(());

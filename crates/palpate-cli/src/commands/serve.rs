@@ -157,7 +157,7 @@ fn check_folder(folder: &Path) -> Result<(), Failure> {
     match folder.ancestors().find(is_there) {
         Some(found) if !found.as_os_str().is_empty() && !found.is_dir() => {
             let complaint =
-                Complaint::new(format!("--record {}: {} is not a folder", folder.display(), found.display()));
+                Complaint::new(format!("--record {}: {} is no folder", folder.display(), found.display()));
             Err(complaint.help("name the folder that recordings go into").into())
         }
         _ => Ok(()),
@@ -336,7 +336,7 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
     if let Estimator::Auto(Auto { only }) = &rig.estimator
         && only.is_empty()
     {
-        let complaint = Complaint::about(path, "the estimator is `auto`, and the choice may take minutes");
+        let complaint = Complaint::about(path, "the estimator is `auto`, whose choice may take minutes");
         return Err(complaint
             .help("name its candidates by `only`, or `palpate fit` it once and serve the locator")
             .into());

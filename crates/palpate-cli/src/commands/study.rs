@@ -86,8 +86,8 @@ impl Arguments {
             && self.earlier_run() == EarlierRun::Leave
         {
             let complaint = match found {
-                RESULTS_JSON => format!("{} has the results of a run that was finished", out.display()),
-                SHARD_JSON => format!("{} has a shard that was finished", out.display()),
+                RESULTS_JSON => format!("{} holds the results of a run that was finished", out.display()),
+                SHARD_JSON => format!("{} holds a shard that was finished", out.display()),
                 table => format!("{} is of a run that was not finished", out.join(table).display()),
             };
             let complaint = Complaint::new(complaint);
@@ -100,7 +100,7 @@ impl Arguments {
             .into());
         }
         if self.shard.is_some() && out.join(REPORT_HTML).exists() {
-            let complaint = Complaint::new(format!("{} has a report, and a shard has none", out.display()));
+            let complaint = Complaint::new(format!("{} holds a report, and a shard has none", out.display()));
             return Err(complaint.help("--out names another folder").into());
         }
         Ok(folder)
@@ -341,7 +341,7 @@ fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
     }
     columns
         .push(column("over the limit", move |arm| Some(spread(&arm.limit.as_ref()?.error_over_limit?, 2))));
-    columns.push(column("95 % cover, %", move |arm| Some(spread(&arm.coverage_percent?, 1))));
+    columns.push(column("95 % hold, %", move |arm| Some(spread(&arm.coverage_percent?, 1))));
     columns
 }
 

@@ -79,7 +79,7 @@ fn what_is_no_text_is_refused_at_its_first_zero_byte() {
     for verb in ["inspect", "limit", "init"] {
         let told = complaint(&[("rig.toml", &utf16)], &[verb, "rig.toml"]);
         assert!(
-            told.contains("rig.toml is not text: byte 2 is 0") && told.contains("UTF-8"),
+            told.contains("rig.toml is no text: byte 2 is 0") && told.contains("UTF-8"),
             "{verb}: {told}"
         );
     }

@@ -61,12 +61,12 @@ fn a_session_without_a_reading_fails_with_the_cause_and_the_last_line() {
         (b"", &["there was no reading: the source ended"]),
         (
             b"hello\n",
-            &["1 frame is no reading: a value is not a number; the last is `hello`; print a decimal number"],
+            &["1 frame is no reading: a value is no number; the last is `hello`; print a decimal number"],
         ),
         (b"1,2,3\n", &["another number of values", "the last is `1,2,3`", "columns="]),
         (b"S1:1,S2:2,S3:3,X:4\n", &["a channel is missing", "the last is `S1:1,S2:2,S3:3,X:4`"]),
         (b"\x80\xFE\x07\xFF", &["not text", "the last is `\\x80\\xFE\\x07\\xFF`", "check the baud rate"]),
-        (b"nan,1,2,3\nnan,1,2,3\n", &["a value is not a number", "the last is `nan,1,2,3`"]),
+        (b"nan,1,2,3\nnan,1,2,3\n", &["a value is no number", "the last is `nan,1,2,3`"]),
     ];
     for (i, (input, expected)) in cases.into_iter().enumerate() {
         let said = complained(&record(&format!("none-{i}.mcap"), input), 3);
@@ -78,7 +78,7 @@ fn a_session_without_a_reading_fails_with_the_cause_and_the_last_line() {
     );
     let server = TcpListener::bind("127.0.0.1:0").unwrap();
     let silent = record_from("silent.mcap", &format!("tcp://{}", server.local_addr().unwrap()));
-    assert!(silent.contains("silent; check that the board is on"), "{silent}");
+    assert!(silent.contains("sends nothing; check that the board is on"), "{silent}");
 }
 
 #[test]

@@ -281,5 +281,5 @@ fn a_locator_of_one_file_locates_its_other_forms() {
 
     fs::write(folder.join("no-heading.csv"), "S1,S2\nbeside,others\n").unwrap();
     let complaint = complained(&run(folder, &["locate", "locator.json", "no-heading.csv"]), 2);
-    assert!(complaint.contains("no column is named `S3`; there are `S1`, `S2`"), "{complaint}");
+    assert!(complaint.contains("there is no column `S3`; there are `S1`, `S2`"), "{complaint}");
 }

@@ -170,9 +170,7 @@ fn bad_input_is_refused_with_its_place() {
 #[test]
 fn a_folder_of_recordings_that_is_none_is_refused_before_anything_is_served() {
     let folder = bench();
-    for (given, what) in
-        [("rig.toml", "rig.toml is not a folder"), ("rig.toml/new", "rig.toml is not a folder")]
-    {
+    for (given, what) in [("rig.toml", "rig.toml is no folder"), ("rig.toml/new", "rig.toml is no folder")] {
         let serve = ["serve", "locator.json", "--listen", "127.0.0.1:0", "--record", given];
         let told = complained(&run(folder.path(), &serve), 2);
         assert!(told.contains(&format!("--record {given}")) && told.contains(what), "{told}");

@@ -102,10 +102,10 @@ fn what_is_no_file_is_not_replaced() {
     refused("/dev/stdout", "it is a pipe (FIFO)");
     refused("about", "cannot write about");
     refused("out", "it is a folder");
-    refused("-", "stdout is for the output of the command");
+    refused("-", "stdout is for what the command says");
     refused("none/..", "it names no file");
     refused("rig.toml/a.csv", "cannot write rig.toml/a.csv");
-    refused("none/a.csv", "there is not a folder none");
+    refused("none/a.csv", "there is no folder none");
     assert!(fs::symlink_metadata(at("pipe")).unwrap().file_type().is_fifo());
     assert!(fs::symlink_metadata(at("null")).unwrap().file_type().is_symlink());
     let limit = |out: &str, why: &str| {
@@ -113,9 +113,9 @@ fn what_is_no_file_is_not_replaced() {
         assert!(complaint.contains(why), "{out}: {complaint}");
     };
     limit("out", "it is a folder");
-    limit("rig.toml", "rig.toml is not a folder");
-    limit("rig.toml/out", "rig.toml is not a folder");
-    limit("pipe", "pipe is not a folder");
+    limit("rig.toml", "rig.toml is no folder");
+    limit("rig.toml/out", "rig.toml is no folder");
+    limit("pipe", "pipe is no folder");
 }
 
 #[test]
@@ -180,7 +180,7 @@ fn finished_studies_are_kept() {
         (&["simulate", "rig.toml", "-o", "out/networks.csv"], "networks.csv"),
         (&["profile", "load.toml", "--report", "out/report.html"], "report.html"),
     ] {
-        kept(path, arguments, &format!("out/{name}"), "it is a result of the study with the");
+        kept(path, arguments, &format!("out/{name}"), "it is a result of the study whose");
     }
     said(&run(path, &["fit", "rig.toml", "-o", "out/locator.json"]));
 

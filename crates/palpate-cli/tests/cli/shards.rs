@@ -214,7 +214,7 @@ fn outputs_of_shards_follow_the_rules_of_a_study() {
     study(folder, &one);
     let before = text(folder, "one/networks.csv");
     let told = complaint(folder, &one);
-    assert!(told.contains("one has a shard that was finished") && told.contains("--resume"), "{told}");
+    assert!(told.contains("one holds a shard that was finished") && told.contains("--resume"), "{told}");
     // Neither another shard nor the whole study goes on from it.
     for arguments in
         [&["--shard", "2/2", "--seeds", "1"][..], &["--shard", "1/2", "--seeds", "2"], &["--seeds", "1"]]
@@ -236,11 +236,11 @@ fn outputs_of_shards_follow_the_rules_of_a_study() {
     assert_eq!(text(folder, "one/networks.csv"), before);
     merge(folder, &["one".to_owned(), "two".to_owned()], "both");
     let told = complaint(folder, &["--out", "both", "--merge", "one", "two"]);
-    assert!(told.contains("both has the results of a run that was finished"), "{told}");
+    assert!(told.contains("both holds the results of a run that was finished"), "{told}");
     assert!(told.contains("--overwrite") && !told.contains("--resume"), "{told}");
     said(&run(folder, &["study", "small.toml", "--out", "both", "--overwrite", "--merge", "one", "two"]));
     let told = complaint(folder, &["--shard", "1/2", "--out", "both", "--overwrite"]);
-    assert!(told.contains("both has a report, and a shard has none"), "{told}");
+    assert!(told.contains("both holds a report, and a shard has none"), "{told}");
 
     for (shard, why) in [("3/2", "from 1 to 2"), ("1/0", "from 1 to 1000000"), ("one", "it must be K/N")] {
         let told = complaint(folder, &["--shard", shard]);

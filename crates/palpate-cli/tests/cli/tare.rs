@@ -272,7 +272,7 @@ fn held_out_readings_are_judged_without_the_drift_of_the_recording() {
     assert!(tared && (compared_mm / tared_mm - 1.0).abs() < 1e-9, "{compared_mm} mm, {tared_mm} mm");
     let refused =
         complained(&run(folder.path(), &["evaluate", "rig.toml", "--data", "drift.csv", "--tare", "5"]), 2);
-    assert!(refused.contains("--tare auto subtracts the drift"), "{refused}");
+    assert!(refused.contains("--tare auto takes off the drift"), "{refused}");
     // `auto` judges likewise.
     file("auto.toml", &RIG.replace("\"influence\"", "\"auto\""));
     let options = ["--data", "drift.csv", "--auto-seconds", "30", "-o", "auto.json"];

@@ -1,4 +1,4 @@
-//! Task of a design of training positions, and the methods that place them.
+//! Task of a design of training positions, and the ways in which they are placed.
 
 use crate::contacts::{ContactPrior, WeightedContacts};
 use crate::sensors::{SensorDesign, TOLERANCE_M};
@@ -12,35 +12,35 @@ use palpate_numerics::OutOfRange;
 use palpate_numerics::regression::RegressionError;
 use palpate_numerics::watch::Cancelled;
 
-/// Task of placing training positions: presses, estimator, contacts, and the effort of the search.
+/// Task of placing training positions: presses, estimator, contacts, and how long is searched.
 /// [`PositionProblem::new`](super::PositionProblem::new) checks it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PositionDesign {
-    /// The estimator to calibrate; any but `auto`.
+    /// The estimator that is calibrated; any but `auto`.
     pub estimator: Estimator,
-    /// Number of training positions; at least 1.
+    /// Training positions; at least 1.
     pub count: usize,
-    /// Presses at each position; at least 1.
+    /// Presses at each; at least 1.
     pub repeats: usize,
-    /// Present training of the surface. It gives the force of the presses where that differs from the contacts' force. The
-    /// present positions are compared with the others if they are equally many.
+    /// Present training of the surface: tells the force of the presses where that is not the contacts', and the positions that are
+    /// compared with where they are as many.
     pub existing: Option<Training>,
-    /// Contacts that are located after the calibration; all over the surface if `None`.
+    /// The contacts that are located after calibrating; all over the surface where `None`.
     pub contacts: Option<ContactPrior>,
-    /// Whether their force is known to the locator, if it is known to the setup.
+    /// Whether the locator will know their force, where the setup does.
     pub force: Force,
-    /// Tolerance of the location error, in metres; greater than 0.
+    /// An error up to this is good enough, in metres; greater than 0.
     pub tolerance_m: f64,
-    /// Simulated calibrations that evaluate an arrangement in a search; at least 1.
+    /// Simulated calibrations that an arrangement is judged by while searching; at least 1.
     pub calibrations: usize,
-    /// Largest number of arrangements in the search.
+    /// Arrangements that the search may try.
     pub trials: usize,
     /// Calibrations with fresh noise that verify each arrangement; at least 1.
     pub verifications: usize,
-    /// Stopping rule: a recording has enough presses if infinitely many more would lower the error by less than this, in %; between
-    /// 0 and 100.
+    /// Presses of a recording begun are enough once endlessly many more would lower the error by less than this, in %; between 0
+    /// and 100.
     pub stop_percent: f64,
-    /// Seed of all noise and of the initial weights of every network.
+    /// Fixes all noise and every network's first weights.
     pub seed: u64,
 }
 
@@ -65,31 +65,31 @@ impl Default for PositionDesign {
 }
 
 impl PositionDesign {
-    /// A design with the numbers of positions and presses of an existing arrangement, which is compared with the result.
+    /// As many positions and presses as an existing arrangement has, and compared with it.
     pub fn for_training(existing: &Training) -> Self {
         let (count, repeats) = (existing.count, existing.repeats);
         Self { count, repeats, existing: Some(existing.clone()), ..Self::default() }
     }
 
-    /// This design for another estimator.
+    /// The same for another estimator.
     #[must_use]
     pub fn estimator(self, estimator: Estimator) -> Self {
         Self { estimator, ..self }
     }
 
-    /// This design with another number of training positions.
+    /// The same with another number of training positions.
     #[must_use]
     pub fn count(self, count: usize) -> Self {
         Self { count, ..self }
     }
 
-    /// This design with another number of presses at each position.
+    /// The same with another number of presses at each.
     #[must_use]
     pub fn repeats(self, repeats: usize) -> Self {
         Self { repeats, ..self }
     }
 
-    /// This design with the contacts, the tolerance and the knowledge of the force of a sensor design.
+    /// The same for the contacts that sensors are designed for, with their tolerance and what is known of their force.
     #[must_use]
     pub fn contacts_of(self, design: &SensorDesign) -> Self {
         let SensorDesign { contacts, force, tolerance_m, .. } = design;
@@ -118,11 +118,11 @@ impl PositionDesign {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Placement {
-    /// The present training positions.
+    /// As they are pressed now.
     Existing,
-    /// Evenly spaced: the reference of the others.
+    /// Evenly: what the others are compared with.
     Even,
-    /// Denser towards the ends, as in the founding paper.
+    /// More of them towards the ends, as the founding paper has it.
     EdgeDense,
     /// Chebyshev's nodes; on a plane a grid of them.
     Chebyshev,
@@ -133,7 +133,7 @@ pub enum Placement {
 }
 
 impl Placement {
-    /// Name of the method in tables.
+    /// Name in tables.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Existing => "existing",
@@ -146,38 +146,38 @@ impl Placement {
     }
 }
 
-/// A setup, a design or a recording without a possible arrangement of training positions.
+/// A setup, a design or a recording that no training positions can be found for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PositionError {
     /// The design was stopped.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
-    /// The surface has no model.
+    /// A surface without a model.
     #[error("a measured surface has no model to simulate calibrations with")]
     NoModel,
-    /// The force of the presses is missing.
+    /// The force of the presses is not given.
     #[error("the force of the presses is not known")]
     NoForce,
-    /// The estimator is `auto`.
+    /// The estimator is not decided on.
     #[error("the estimator is `auto`; positions are designed for one estimator")]
     Auto,
-    /// There are fewer positions than the estimator needs.
+    /// Fewer positions than the estimator needs.
     #[error("{count} training position(s); an estimator of kind `{kind}` needs at least {needed}")]
     TooFew {
         /// Number of training positions.
         count: usize,
-        /// Least number of training positions.
+        /// Least number.
         needed: usize,
         /// The estimator's kind.
         kind: &'static str,
     },
-    /// The existing training positions do not fit the surface.
+    /// The existing training positions cannot be laid out.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),
     /// A calibration cannot be simulated.
     #[error(transparent)]
     Calibration(#[from] EvaluationError<FitError>),
-    /// A number out of its range.
+    /// A number that is not in its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
     /// The influence functions cannot be learnt.
@@ -188,22 +188,20 @@ pub enum PositionError {
     Channels {
         /// Sensors of the setup.
         needed: usize,
-        /// Channels in the recording.
+        /// Channels of the recording.
         found: usize,
     },
-    /// Too few places are pressed to estimate the smoothness of the influence functions.
-    #[error(
-        "the recording has {found} distinct positions; at least {needed} determine the smoothness of the surface"
-    )]
+    /// Too few places pressed to see how smooth the influence functions are.
+    #[error("the recording has {found} distinct positions; at least {needed} tell how smooth the surface is")]
     TooFewPresses {
         /// Number of distinct positions in the recording.
         found: usize,
         /// Least number.
         needed: usize,
     },
-    /// The presses cover a small part of the surface, which does not determine the readings elsewhere.
+    /// Presses of a small part of the surface, which do not tell the rest.
     #[error(
-        "the presses reach over {:.1} mm of {:.1} mm along {axis}, and do not show how readings change elsewhere",
+        "the presses reach over {:.1} mm of {:.1} mm along {axis}, and do not tell how readings change elsewhere",
         reach_m * 1e3,
         side_m * 1e3
     )]
@@ -215,20 +213,22 @@ pub enum PositionError {
         /// Length of the surface, in metres.
         side_m: f64,
     },
-    /// The readings at all places are equal to within noise.
+    /// Presses of which every place reads alike.
     #[error(
         "readings at different positions differ by no more than noise; check the channels and the positions of the presses"
     )]
     NothingTold,
-    /// The presses have different forces on a surface without a model, and the offsets of the channels are unknown.
-    #[error("the forces of the presses differ, and the untouched reading of the channels is unknown")]
-    NoOffset,
-    /// The noise of a channel is unknown.
+    /// Presses of forces that differ on a surface without a model, of whose readings without contact nothing is known.
     #[error(
-        "the noise of channel {channel} is unknown: no position was pressed twice, or its repeats are equal, and the setup states no noise"
+        "the forces of the presses differ, and nothing says what the channels read while nothing touches"
+    )]
+    NoOffset,
+    /// A channel of unknown noise.
+    #[error(
+        "nothing says how noisy channel {channel} is: no position was pressed twice, or its repeats are equal, and the setup states no noise"
     )]
     NoNoise {
-        /// Number of the channel, from 1.
+        /// Which channel, from 1.
         channel: usize,
     },
 }

@@ -341,13 +341,13 @@ pub enum DesignError {
         kind: SensorKind,
     },
     /// All contacts are over supports.
-    #[error("all {contacts} contacts are over supports, where no layout determines an unknown force")]
+    #[error("all {contacts} contacts are over supports, where no layout tells a force that is not known")]
     OverSupports {
         /// Number of contacts.
         contacts: usize,
     },
     /// Fewer sites than sensors.
-    #[error("{count} sensors are wanted, but only {sites} sites can have one")]
+    #[error("{count} sensors are wanted, but only {sites} sites can hold one")]
     TooFewSites {
         /// Requested number of sensors.
         count: usize,
@@ -397,7 +397,7 @@ pub enum DesignError {
         mirrored: bool,
     },
     /// A fixed sensor at a position where it would always read 0.
-    #[error("the {kind} sensor of {list} at {} would always read 0 there", extent.place_in_words(*position))]
+    #[error("the {kind} sensor of {list} at {} would read nothing there", extent.place_in_words(*position))]
     MustHaveReadsNothing {
         /// The list that contains it.
         list: FixedList,
@@ -435,7 +435,7 @@ pub enum DesignError {
         extent: Extent,
     },
     /// A fixed sensor with a mirror image where no sensor can be.
-    #[error("symmetry is wanted, but the mirror image of the {kind} sensor of {list} at {} is not a place for one", extent.place_in_words(*position))]
+    #[error("symmetry is wanted, but the mirror image of the {kind} sensor of {list} at {} is no place for one", extent.place_in_words(*position))]
     MustHaveWithoutTwin {
         /// The list that contains it.
         list: FixedList,
@@ -475,7 +475,7 @@ pub enum DesignError {
         method: &'static str,
     },
     /// More candidates and contacts than fit into memory.
-    #[error("{sites} candidate sites and {contacts} contacts need {:.1} GB; at most {:.1} GB are available", bytes / 1e9, most / 1e9)]
+    #[error("{sites} candidate sites and {contacts} contacts need {:.1} GB; at most {:.1} GB can be held", bytes / 1e9, most / 1e9)]
     TooLarge {
         /// Number of candidates.
         sites: usize,

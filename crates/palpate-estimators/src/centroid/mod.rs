@@ -55,7 +55,7 @@ pub enum CentroidFitError {
         kind: SensorKind,
     },
     /// All sensors are at the same place, or all readings are alike.
-    #[error("the centroids of the recording do not distinguish its positions: {0}")]
+    #[error("the centroids of the recording do not tell its positions apart: {0}")]
     Alike(#[from] NotPositiveDefinite),
     /// The recording's channels are not the setup's.
     #[error(transparent)]

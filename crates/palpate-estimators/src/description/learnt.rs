@@ -98,7 +98,7 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     }
     if !linear.tells_untouched() {
         lines.push(
-            "the offsets are undetermined: no reading is `no_contact` without untouched rows (force 0) in the recording"
+            "the offsets are open by what touches read: no reading is `no_contact`, before some rows are recorded untouched (force 0)"
                 .to_owned(),
         );
     }
@@ -115,7 +115,7 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
 pub fn noise_is_hardly_told(presses: usize) -> String {
     let presses = format_count(presses as u64);
     format!(
-        "{presses} presses, hardly any repeated: the noise is badly determined, and assumed to be about a hundredth of what presses change; press one place three times, or leave rows untouched (force 0)"
+        "{presses} presses, hardly any repeated: the noise is hardly told, and taken to be about a hundredth of what presses change; press one place three times, or leave rows untouched (force 0)"
     )
 }
 
@@ -142,7 +142,7 @@ fn influences(linear: &ForceLinearLocator) -> String {
         Source::Deflection => "deflection",
     };
     let rest = smooth.map(|smooth| format!(", and {smooth}")).unwrap_or_default();
-    format!("those of sensors of {kind} at places that the presses determine, polynomials{rest}")
+    format!("those of sensors of {kind} at places that the presses tell, polynomials{rest}")
 }
 
 #[cfg(test)]

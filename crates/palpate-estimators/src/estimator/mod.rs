@@ -377,7 +377,7 @@ where
 /// A locator without an untouched reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "a locator of kind `{kind}`, fitted to a recording without rows of force 0, has no untouched reading of its surface"
+    "a locator of kind `{kind}`, fitted to a recording without rows of force 0, does not know what its surface reads untouched"
 )]
 pub struct NoBaseline {
     /// The locator's kind.
@@ -388,7 +388,7 @@ pub struct NoBaseline {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LeaveOutError {
     /// The channel does not exist.
-    #[error("no channel has the number {channel}; the locator has channels 1 to {channels}")]
+    #[error("there is no channel {channel}; the locator has channels 1 to {channels}")]
     NoChannel {
         /// Number of the named channel, from 1.
         channel: usize,
@@ -673,7 +673,7 @@ pub enum NotTrackable {
     },
     /// The first mode of its surface is not known.
     #[error(
-        "inertia is included on a beam on two simple supports, where the first mode is half a sine; this surface has other supports: follow it in balance, without a natural frequency"
+        "inertia is reckoned with on a beam on two simple supports, whose first mode is half a sine; this surface is held otherwise: follow it in balance, without a natural frequency"
     )]
     Mode,
 }

@@ -89,7 +89,7 @@ fn rows_have_times_where_a_column_tells_them() {
     assert_eq!(times(&columns, "X;Pl;Pr;F;Zeit [ms]\n10;1;2;3;2,5\n").unwrap(), Some(vec![0.0025]));
 
     let missing = times(&foreign().time("Zeit"), "X,Pl,Pr,F\n10,1,2,3\n").unwrap_err().to_string();
-    assert_eq!(missing, "bench.csv:1: no column is named `Zeit`; there are `X`, `Pl`, `Pr`, `F`");
+    assert_eq!(missing, "bench.csv:1: there is no column `Zeit`; there are `X`, `Pl`, `Pr`, `F`");
     let headless = times(&foreign(), "10,1,2.5,3\n12,1,2,3\n").unwrap_err().to_string();
     assert!(headless.contains("`2.5`, `3`: numbers; where no line names the columns"), "{headless}");
     let other = times(&foreign().time("Zeit"), "X,Pl,Pr,F,Zeit\n10,1,2,3,14:03:25\n11,1,2,3,4\n");

@@ -48,7 +48,7 @@ pub enum MachineError {
     #[error("the machine was stopped by hand")]
     ByHand,
     /// No page is connected.
-    #[error("no page has watched the machine for {seconds} s: its finger was lifted")]
+    #[error("nobody has watched the machine for {seconds} s: its finger was lifted")]
     Unwatched {
         /// Seconds without an open page.
         seconds: u64,
@@ -87,7 +87,7 @@ impl MachineError {
             Self::Silent => "see to the board that sends the readings; then reset the machine",
             Self::Unwatched { .. } => "keep a page open while it presses",
             Self::Unseen => "jog the finger to the untouched surface, and write its z as `touch`",
-            Self::NoRest => "keep everything else off the surface",
+            Self::NoRest => "see that nothing else touches or shakes the surface",
         }
     }
 }

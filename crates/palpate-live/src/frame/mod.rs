@@ -71,7 +71,7 @@ impl BadFrame {
             Self::TooLong => "longer than any frame",
             Self::Channels => "another number of values than channels",
             Self::MissingChannel => "a channel is missing",
-            Self::NotANumber => "a value is not a number",
+            Self::NotANumber => "a value is no number",
             Self::OtherUnit => "a value has another unit than before, or than the channel",
             Self::Encoding => "not text",
             Self::Checksum => "the checksum is wrong",

@@ -59,14 +59,14 @@ pub enum RecordingError {
     },
     /// A name that a recording cannot have.
     #[error(
-        "`{name}` is not a name of a recording: at most 100 letters, digits, dots, dashes and underscores, beginning without a dot"
+        "`{name}` is no name of a recording: at most 100 letters, digits, dots, dashes and underscores, of which a dot is not the first"
     )]
     Name {
         /// The name.
         name: String,
     },
     /// A link, a pipe, a device or a folder has the name of a recording.
-    #[error("{path} is not a regular file")]
+    #[error("{path} is no regular file")]
     NotRegular {
         /// The file.
         path: String,
@@ -78,13 +78,13 @@ pub enum RecordingError {
         name: String,
     },
     /// The file is not MCAP.
-    #[error("{path} is not an MCAP file")]
+    #[error("{path} is no MCAP file")]
     NotMcap {
         /// The file.
         path: String,
     },
     /// The file is MCAP, but not a recording of palpate.
-    #[error("{path} is not a recording of palpate: {lacks}")]
+    #[error("{path} is no recording of palpate: {lacks}")]
     NotOurs {
         /// The file.
         path: String,

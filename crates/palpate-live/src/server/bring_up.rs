@@ -28,7 +28,7 @@ pub enum BringUpError {
         from: String,
     },
     /// The port does not exist.
-    #[error("no serial port is named {port}")]
+    #[error("there is no serial port {port}")]
     NoPort {
         /// Name.
         port: String,

@@ -111,7 +111,7 @@ pub enum CalibratorError {
     #[error("no press was taken yet")]
     NoPress,
     /// The press to be struck out does not exist.
-    #[error("press {press} does not exist; {presses} were taken")]
+    #[error("there is no press {press}; {presses} were taken")]
     NoSuchPress {
         /// Number, from 1.
         press: usize,

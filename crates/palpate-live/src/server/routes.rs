@@ -23,9 +23,9 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// Largest number of bytes of a body.
+/// Most bytes of a body.
 const MOST_BYTES: usize = 1 << 16;
-/// Largest number of characters of a mark.
+/// Most characters of a mark.
 const MOST_OF_A_MARK: usize = 200;
 
 type Answer = Result<JsonAnswer<Value>, Refusal>;
@@ -69,7 +69,7 @@ async fn history(State(live): State<Arc<Live>>) -> Response {
     ([(CONTENT_TYPE, "application/json")], live.past()).into_response()
 }
 
-/// An object without relevant fields.
+/// An object without fields that matter.
 #[derive(Deserialize)]
 struct Nothing {}
 
@@ -85,9 +85,8 @@ struct Mark {
 async fn mark(State(live): State<Arc<Live>>, JsonBody(Mark { text }): JsonBody<Mark>) -> Answer {
     let length = text.chars().count();
     if length == 0 || length > MOST_OF_A_MARK || text.chars().any(char::is_control) {
-        let error = format!(
-            "a mark of {length} characters; it may have 1 to {MOST_OF_A_MARK}, without control characters"
-        );
+        let error =
+            format!("a mark of {length} characters; it may have 1 to {MOST_OF_A_MARK}, none of control");
         return Err(Refusal::new(StatusCode::BAD_REQUEST, error, "write less, on one line"));
     }
     done(live.command(Command::Mark(text)))
@@ -127,12 +126,12 @@ async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBod
             "name other sources by `palpate serve LOCATOR --from URL`",
         ));
     }
-    // This waits for the end of a session, and prepares a board.
+    // A session that ends is waited for, and a board is prepared.
     blocking(move || live.begin_simulated()).await.map(|()| JsonAnswer(json!({})))
 }
 
 async fn bring_up(State(live): State<Arc<Live>>) -> Result<JsonAnswer<BringUpRecord>, Refusal> {
-    // This searches for ports.
+    // Ports are looked for.
     blocking(move || live.seen()).await.map(JsonAnswer)
 }
 
@@ -159,12 +158,12 @@ async fn make_rig(
     State(live): State<Arc<Live>>,
     JsonBody(form): JsonBody<RigForm>,
 ) -> Result<JsonAnswer<MadeRigRecord>, Refusal> {
-    // This waits for the end of a source, and writes the rig to disk.
+    // A source that ends is waited for, and the rig is written to the disk.
     blocking(move || live.make_rig(&form)).await.map(JsonAnswer)
 }
 
 async fn calibration(State(live): State<Arc<Live>>) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
-    // A step in progress may have the lock.
+    // A step that goes on may have it.
     blocking(move || {
         live.attend();
         live.calibration()
@@ -173,12 +172,12 @@ async fn calibration(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Calibra
     .map(JsonAnswer)
 }
 
-/// The presses so far. They are not part of the state, because their traces are long.
+/// The presses so far; apart from the state, as their traces are long.
 async fn calibration_presses(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Vec<PressRecord>>, Refusal> {
     blocking(move || Ok(live.calibrator()?.presses())).await.map(JsonAnswer)
 }
 
-/// Stops the machine of a calibration without waiting for anything else, not even the rest of the request.
+/// Stops the machine of a calibration before anything else is waited for, be it the rest of the request.
 async fn emergency_stop(State(live): State<Arc<Live>>) -> Answer {
     done(live.calibrator().and_then(|calibrator| Ok(calibrator.halt()?)))
 }
@@ -213,12 +212,12 @@ enum Axis {
 #[derive(Deserialize)]
 struct Calibrate {
     step: Step,
-    /// For `strike`: the number of the press.
+    /// Of `strike`: the number of the press.
     press: Option<usize>,
-    /// For `jog`: the axis, and the distance.
+    /// Of `jog`: the axis, and the distance.
     axis: Option<Axis>,
     by_mm: Option<f64>,
-    /// For `begin`: the statements of the operator.
+    /// Of `begin`: what the operator states.
     placement_mm: Option<f64>,
     second_force_n: Option<f64>,
     #[serde(default)]
@@ -226,7 +225,7 @@ struct Calibrate {
 }
 
 impl Calibrate {
-    /// The distances of a jog along x, y and z; all 0 if no axis is named.
+    /// The distances of a jog along x, y and z; 0 where it names none.
     fn jog(&self) -> SetUpTask {
         let by_m = self.by_mm.unwrap_or_default() * 1e-3;
         SetUpTask::Jog(match self.axis {
@@ -246,12 +245,12 @@ impl Calibrate {
     }
 }
 
-/// Executes a step; the answer is the state after it.
+/// Does a step; the answer is the state after it.
 async fn calibrate(
     State(live): State<Arc<Live>>,
     JsonBody(wish): JsonBody<Calibrate>,
 ) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
-    // This waits for the end of a source, and writes presses to disk.
+    // A source that ends is waited for, and presses are written to the disk.
     blocking(move || {
         live.attend();
         match wish.step {
@@ -303,7 +302,7 @@ fn refusal(error: &LiveError) -> Refusal {
         LiveError::Calibrator(CalibratorError::NoSuchPress { .. }) => {
             (StatusCode::BAD_REQUEST, "GET /api/calibration/presses lists them")
         }
-        LiveError::Calibrator(_) => (StatusCode::CONFLICT, "GET /api/calibration gives its progress"),
+        LiveError::Calibrator(_) => (StatusCode::CONFLICT, "GET /api/calibration says how far it is"),
         LiveError::NoSession => (StatusCode::CONFLICT, "choose a source first"),
         LiveError::Behind => (StatusCode::SERVICE_UNAVAILABLE, "try it again"),
         LiveError::Calibrates { .. } => (
@@ -333,7 +332,7 @@ fn refusal(error: &LiveError) -> Refusal {
         LiveError::AlarmFile { .. } => {
             (StatusCode::INTERNAL_SERVER_ERROR, "see that the folder takes files; the alarms are as before")
         }
-        LiveError::Rule(_) => (StatusCode::BAD_REQUEST, "docs/live-recording.md describes rules"),
+        LiveError::Rule(_) => (StatusCode::BAD_REQUEST, "docs/live-recording.md says what a rule has"),
         LiveError::Session(_) => (StatusCode::CONFLICT, "start `palpate serve` without --track"),
         LiveError::Thread(_) => (StatusCode::INTERNAL_SERVER_ERROR, "start palpate again"),
         LiveError::NoFolder => (StatusCode::CONFLICT, "start `palpate serve` with --record FOLDER"),
@@ -361,7 +360,7 @@ struct Record {
 }
 
 async fn record(State(live): State<Arc<Live>>, JsonBody(Record { on, name }): JsonBody<Record>) -> Answer {
-    // This first waits until a recording that ends is written completely.
+    // A recording that ends is written to its last byte first.
     blocking(move || {
         let status = if on { live.begin_recording(name.as_deref()).map(Some) } else { live.end_recording() };
         status.map(|status| json!({ "recording": status }))
@@ -374,7 +373,7 @@ async fn recordings(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Vec<Reco
     blocking(move || live.list_recordings()).await.map(JsonAnswer)
 }
 
-/// Part of a recording, and its resolution.
+/// Part of a recording, and how finely it is told.
 #[derive(Deserialize)]
 struct Part {
     from_s: Option<f64>,
@@ -382,7 +381,7 @@ struct Part {
     points: Option<usize>,
 }
 
-/// Default and largest number of samples of a part of a recording.
+/// Samples of a part of a recording unless more or fewer are asked for, and at most.
 const POINTS: (usize, usize) = (2000, 20_000);
 
 async fn recording(
@@ -399,7 +398,7 @@ async fn recording(
     blocking(move || live.read_recording(&name, span_s, points)).await.map(JsonAnswer)
 }
 
-/// Largest size in bytes of a recording that is sent whole, because it is then in memory.
+/// Most bytes of a recording that is sent whole; it is held in memory meanwhile.
 const MOST_OF_A_FILE: u64 = 256 << 20;
 
 async fn recording_file(
@@ -435,7 +434,7 @@ async fn recording_file(
     }
 }
 
-/// Runs a function that may wait for a disk or a thread.
+/// Does what may wait for a disk or a thread.
 async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, LiveError> + Send + 'static,
 ) -> Result<T, Refusal> {
@@ -448,13 +447,13 @@ async fn blocking<T: Send + 'static>(
 }
 
 async fn unknown() -> Refusal {
-    Refusal::new(StatusCode::NOT_FOUND, "this request does not exist", "docs/live-server.md lists them")
+    Refusal::new(StatusCode::NOT_FOUND, "there is no such request", "docs/live-server.md lists them")
 }
 
-/// Answer for an existing path with an unsupported method; the supported methods are in the header `Allow`.
+/// A path that is there, asked by a method that it has not; those that it has are in the header `Allow`.
 async fn other_method(method: Method) -> Refusal {
-    let error = format!("{method} is not a method of this request");
-    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, error, "docs/live-server.md gives GET or POST")
+    let error = format!("{method} is no method of this request");
+    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, error, "docs/live-server.md says GET or POST")
 }
 
 /// The name of a recording in a path.

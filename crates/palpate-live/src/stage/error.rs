@@ -12,7 +12,7 @@ pub enum StageError {
     Line(#[from] io::Error),
     /// The firmware is unknown.
     #[error(
-        "the machine is neither Marlin nor GRBL by its answer: {}. Is the baud rate right?",
+        "the machine says neither that it is Marlin nor that it is GRBL; it said: {}. Is the baud rate right?",
         quoted(said)
     )]
     Unknown {

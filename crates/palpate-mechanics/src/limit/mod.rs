@@ -279,7 +279,7 @@ struct Columns {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LimitError {
     /// The surface has no model.
-    #[error("a measured surface has no model, and without influence functions its limit cannot be computed")]
+    #[error("a measured surface has no model, and without influence functions there is no limit to compute")]
     NoModel,
     /// The noise is singular, and the limit would be 0; or no sensor is active.
     #[error(transparent)]

@@ -277,7 +277,7 @@ impl LimitWarning {
                 "a sensor that breaks the symmetry; less noise does not help".to_owned()
             }
             Self::Mirror { distance, .. } => {
-                format!("{}, or a sensor that distinguishes the two", less_noise(bound / distance))
+                format!("{}, or a sensor that tells the two apart", less_noise(bound / distance))
             }
             // Over a rigid support the surface does not move, even with quiet sensors and a large force.
             Self::Faint { signal_to_noise, reactions_would_help, .. } if *signal_to_noise < NO_SIGNAL => {
@@ -318,7 +318,7 @@ impl fmt::Display for LimitWarning {
             Self::Blind { zone, force, sd_m: None, .. } => {
                 write!(
                     f,
-                    "blind at {zone} with {} force: the readings do not determine the position",
+                    "blind at {zone} with {} force: the readings do not tell the position",
                     force.name()
                 )
             }

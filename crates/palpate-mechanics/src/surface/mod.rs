@@ -212,7 +212,7 @@ pub enum InsensitiveSensor {
         kind: SensorKind,
     },
     /// The edge of a plate fixes the measured quantity.
-    #[error("the {edge} edge, which is {held}, has no {kind} for any contact")]
+    #[error("the {edge} edge, which is {held}, has no {kind} wherever the plate is touched")]
     AtEdge {
         /// Name of the edge.
         edge: &'static str,
@@ -232,9 +232,9 @@ pub enum InsensitiveSensor {
 /// Text of the reason for which a beam's sensor of this kind reads 0.
 fn held(kind: SensorKind) -> &'static str {
     match kind {
-        SensorKind::Deflection => "a support fixes the surface",
-        SensorKind::Slope => "a support fixes the slope",
-        SensorKind::Strain => "no contact bends the surface",
+        SensorKind::Deflection => "a support holds the surface",
+        SensorKind::Slope => "a support holds the slope",
+        SensorKind::Strain => "nothing bends the surface",
         SensorKind::Reaction | SensorKind::Raw => "nothing acts",
     }
 }

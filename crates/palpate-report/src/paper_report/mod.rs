@@ -70,7 +70,7 @@ impl Paper<'_> {
                 .table(self.published_table()),
             Section::new("claims", "The paper's claims").text(self.about_claims()).table(self.claims_table()),
             Section::new("not-replicated", "What does not replicate").text(self.not_replicated()),
-            Section::new("open", "What the paper does not specify")
+            Section::new("open", "What the paper leaves open")
                 .text(self.about_open())
                 .table(self.open_table()),
             Section::new("arms", "All arms").table(arms_table(self.report)),
@@ -105,7 +105,7 @@ impl Paper<'_> {
         let Agreement { agreeing, within_seeds, compared } = Agreement::new(&self.published);
         html! {
             @if compared == 0 {
-                "No arm with a published figure was run, so no figure is compared."
+                "No arm with a published figure was run, so nothing is compared."
             } @else if agreeing == compared {
                 "All of the " a href="#published" { (counted(compared, "published figure", "published figures")) }
                 " with an arm here agree with the medians found here, as far as was fixed beforehand; " (within_seeds)
@@ -216,7 +216,7 @@ fn training() -> Markup {
             "Each way to train is an " b { "arm" } " of the study, named after what the output stands for or where the \
              training positions are, and after their number: " code { "position-10" } " has the plain position as its output \
              and ten training positions, " code { "normalized-20" } " the position divided by the length and twenty, "
-            code { "middle4-30" } " thirty, with four in the middle portion, and again a normalized output."
+            code { "middle4-30" } " thirty, four of which lie in the middle portion, and again a normalized output."
         }
     }
 }

@@ -369,7 +369,7 @@ impl Paper<'_> {
             .words("setting", |[setting, ..]| setting.clone())
             .words("the paper", |[_, paper, _]| paper.clone())
             .words("this study", |[.., study]| study.clone())
-            .caption(html! { "Settings of this study, beside those of the paper." })
+            .caption(html! { "Settings of this study, beside what the paper says of them." })
     }
 
     /// Remark on the deflection with the modulus as printed, unless the study uses that modulus.

@@ -97,7 +97,7 @@ fn assert_sound(files: &[ReportFile], figures: usize) {
     let text = shown_text(html);
     let bare = |word: &str| word.trim_matches(|c: char| !c.is_alphanumeric()).to_owned();
     let no_number = |word: String| word == "inf" || word.contains("NaN");
-    assert!(!text.split_whitespace().map(bare).any(no_number), "the page shows what is not a number");
+    assert!(!text.split_whitespace().map(bare).any(no_number), "the page shows what is no number");
     let mut names: Vec<String> = (1..=figures).map(|number| format!("figure-{number}.svg")).collect();
     names.insert(0, "report.html".to_owned());
     assert_eq!(files.iter().map(|file| &file.name).collect::<Vec<_>>(), names.iter().collect::<Vec<_>>());

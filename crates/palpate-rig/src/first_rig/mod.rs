@@ -1,4 +1,4 @@
-//! A first rig for a user's own recording, with the guesses marked by comments.
+//! A first rig for somebody's own recording, its guesses as comments.
 
 mod roles;
 
@@ -15,8 +15,8 @@ use crate::error::RigError;
 use crate::rig::Rig;
 use roles::{Left, PositionRole, Roles, name_and_unit, range};
 
-/// Hints about a recording. Columns are given by their headings, with or without units, or by their numbers from 1 in a file without
-/// a header.
+/// Hints about a recording: columns by their headings, with or without units, or by their numbers from 1 where there is
+/// no header.
 #[derive(Clone, Debug, Default)]
 pub struct Hints {
     /// The position along a line.
@@ -33,7 +33,7 @@ pub struct Hints {
     pub nuisance: Option<String>,
     /// The marks of untouched rows.
     pub untouched: Option<String>,
-    /// The channels; they are guessed when this is empty.
+    /// The channels; those that are guessed where there are none.
     pub channels: Vec<String>,
     /// Separator of the fields.
     pub separator: Option<Separator>,
@@ -41,16 +41,16 @@ pub struct Hints {
     pub decimal: Option<Decimal>,
 }
 
-/// Greatest number of columns of a file for a rig to be guessed: every name is compared with every other.
+/// Columns of a file that a rig is guessed for, at most: every name is compared with every other.
 const MOST_COLUMNS: usize = 10_000;
 
-/// Error of guessing a rig from a recording.
+/// A recording that no rig can be guessed for.
 #[derive(Debug, thiserror::Error)]
 pub enum FirstRigError {
     /// The file cannot be read.
     #[error(transparent)]
     Csv(#[from] CsvError),
-    /// The file has too many columns.
+    /// More columns than roles are sought among.
     #[error("the file has {columns} columns; a rig is guessed for at most {MOST_COLUMNS}")]
     TooManyColumns {
         /// Columns of the file.
@@ -68,7 +68,7 @@ pub enum FirstRigError {
         /// Their headings.
         candidates: String,
     },
-    /// No column without another role can be a channel.
+    /// No column is left for a channel.
     #[error(
         "no column is left that may be a channel: a channel has a number in every row, and not always the same; the columns are {columns}"
     )]
@@ -76,8 +76,8 @@ pub enum FirstRigError {
         /// The columns and their contents.
         columns: String,
     },
-    /// The column of a hint is missing, or several columns match it.
-    #[error("{flag}: `{name}` is not the name of exactly one column; the columns are {columns}")]
+    /// A hint names a column that is not there, or not the only one.
+    #[error("{flag}: there is no one column `{name}`; the columns are {columns}")]
     NoSuchColumn {
         /// The flag of the hint.
         flag: &'static str,
@@ -86,25 +86,27 @@ pub enum FirstRigError {
         /// The columns and their contents.
         columns: String,
     },
-    /// The column of a hint contains words.
+    /// A hint names a column with words in it.
     #[error("{flag}: column `{column}` has `{text}` on line {line}; every row must have a number")]
     NotNumbers {
         /// The flag of the hint.
         flag: &'static str,
         /// The heading.
         column: String,
-        /// The first field that is not a number.
+        /// The first field that is no number.
         text: String,
         /// Line.
         line: usize,
     },
-    /// The column of the hint `--untouched` does not mark rows.
-    #[error("--untouched: column `{column}` must be 1, true or yes, or 0, false, no or empty, in every row")]
+    /// A hint names a column that marks no rows.
+    #[error(
+        "--untouched: column `{column}` must say 1, true or yes, or 0, false, no or nothing, in every row"
+    )]
     NotMarks {
         /// The heading.
         column: String,
     },
-    /// The column of a hint contains no numbers.
+    /// A hint names a column without numbers.
     #[error("{flag}: column `{column}` has no numbers")]
     NoNumbers {
         /// The flag of the hint.
@@ -120,7 +122,7 @@ pub enum FirstRigError {
         /// Value.
         value: f64,
     },
-    /// The unit in a column's heading is not one of the units of its role.
+    /// The heading of a column says a unit in which its role is not read.
     #[error("column `{column}` is in `{unit}`; {} is one of {}", wanted.noun(), symbols(*wanted))]
     ForeignUnit {
         /// The heading.
@@ -130,7 +132,7 @@ pub enum FirstRigError {
         /// Quantity that the column should measure.
         wanted: Dimension,
     },
-    /// The guessed rig is invalid.
+    /// The rig that was guessed cannot be used.
     #[error("the rig that was guessed from the file cannot be used: {0}")]
     Refused(RigError),
 }
@@ -140,7 +142,7 @@ fn symbols(dimension: Dimension) -> String {
 }
 
 impl FirstRigError {
-    /// The flags of `palpate init` that replace a failed guess.
+    /// The flags of `palpate init` that say what could not be guessed.
     pub fn help(&self) -> Option<&'static str> {
         match self {
             Self::NoPosition { .. } | Self::ManyPositions { .. } => Some(
@@ -153,13 +155,13 @@ impl FirstRigError {
                 Some("--separator says which")
             }
             Self::Csv(CsvError { problem: CsvProblem::DoubtfulNumber { .. }, .. }) => {
-                Some("--decimal comma chooses the second")
+                Some("--decimal comma takes it for the second")
             }
             Self::Csv(CsvError { problem: CsvProblem::DoubtfulThousands { text, .. }, .. }) => {
                 Some(if text.contains(',') {
-                    "--decimal comma chooses the second"
+                    "--decimal comma takes it for the second"
                 } else {
-                    "--decimal point chooses the second"
+                    "--decimal point takes it for the second"
                 })
             }
             _ => None,
@@ -167,7 +169,7 @@ impl FirstRigError {
     }
 }
 
-/// A rig guessed from a recording.
+/// A rig that was guessed from a recording.
 ///
 /// ```
 /// use palpate_rig::{FirstRig, Hints, Rig};
@@ -185,18 +187,18 @@ pub struct FirstRig {
     table: Table,
     hints: Hints,
     roles: Roles,
-    /// Start and end of the surface and of the presses, by coordinate.
+    /// Start and end of the surface by coordinate, and those of the presses.
     sides: Vec<Side>,
-    /// Forces that are 0 apart from noise; `None` without any.
+    /// Forces that are 0 but for noise, where there are any.
     zero_force: Option<ZeroForce>,
     warnings: Vec<String>,
 }
 
 impl FirstRig {
-    /// Guesses the rig of a recording; `source` is the name of its file.
+    /// The rig of a recording; `source` is the name of its file.
     ///
     /// # Errors
-    /// [`FirstRigError`] for an unreadable file, and for columns with undetermined roles.
+    /// [`FirstRigError`] for a file that cannot be read, and for one of which the columns cannot be told.
     pub fn guess(source: &str, bytes: &[u8], hints: &Hints) -> Result<Self, FirstRigError> {
         let table = Table::read(source, bytes, hints.separator, hints.decimal)?;
         let columns = table.columns.len();
@@ -229,12 +231,12 @@ impl FirstRig {
         Ok(first)
     }
 
-    /// The sides of a surface that contains the presses, one for each coordinate.
+    /// The sides of a surface that holds the presses, one a coordinate.
     fn sides(&self) -> Result<Vec<Side>, FirstRigError> {
         self.roles.position.columns().into_iter().map(|column| self.side(column)).collect()
     }
 
-    /// Warnings about the recording and the guesses.
+    /// Warnings for the bench's owner.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -263,7 +265,7 @@ impl FirstRig {
         words.join(", ")
     }
 
-    /// The commands to type next; `rig` is the file of the rig.
+    /// The commands to type next, where the rig is in the file `rig`.
     pub fn next_commands(&self, rig: &str) -> [String; 3] {
         let [rig, data] = [rig, &self.source].map(shell_word);
         [
@@ -273,7 +275,7 @@ impl FirstRig {
         ]
     }
 
-    /// The text of the rig file; `name` is its name.
+    /// The rig file; `name` is the name that it will have.
     pub fn to_toml(&self, name: &str) -> String {
         let mut toml = Toml::default();
         let rows = self.table.rows;
@@ -285,7 +287,7 @@ impl FirstRig {
         self.warnings.iter().for_each(|warning| toml.comment(&format!("Warning: {warning}")));
         self.write_surface(&mut toml);
         toml.section("sensors");
-        toml.line("measure = \"raw\"", "readings of the channels: counts, volts");
+        toml.line("measure = \"raw\"", "whatever the channels read: counts, volts");
         self.write_recording(&mut toml);
         toml.section("estimator");
         let Auto { only } = Auto::quick();
@@ -369,7 +371,7 @@ impl FirstRig {
         if let Some(untouched) = roles.untouched {
             let marks = self.table.columns[untouched].marks().unwrap_or_default();
             let count = marks.iter().filter(|mark| **mark).count();
-            let marked = format!("{count} of {} rows, untouched", marks.len());
+            let marked = format!("{count} of {} rows, in which nothing touched", marks.len());
             let comment = match self.hints.untouched {
                 Some(_) => marked,
                 None => format!("a guess by its name: it marks {marked}"),
@@ -393,12 +395,12 @@ impl FirstRig {
 
     fn write_unit(&self, toml: &mut Toml, key: &str, column: usize, wanted: Dimension) {
         let unit = own_unit(&self.table.columns[column]);
-        let comment = if unit.is_some() { "" } else { "a guess: the header has no unit" };
+        let comment = if unit.is_some() { "" } else { "a guess: the header does not say" };
         let unit = unit.unwrap_or_else(|| usual_unit(wanted));
         toml.line(&format!("{key} = \"{unit}\""), comment);
     }
 
-    /// The column as a rig names it: without its unit if that is unique, by its number if its heading is not unique.
+    /// The column as a rig names it: without its unit where that is clear, by its number where its heading is not its own.
     fn key(&self, column: usize) -> String {
         let heading = &self.table.columns[column].heading;
         if self.table.header == Header::Absent {
@@ -420,35 +422,36 @@ impl FirstRig {
     fn left_in_words(&self, column: usize, left: &Left) -> String {
         let heading = &self.table.columns[column].heading;
         let reason = match left {
-            Left::Empty => "it is empty".to_owned(),
+            Left::Empty => "there is nothing in it".to_owned(),
             Left::Words => "there are words in it".to_owned(),
-            Left::Word { line, text } => format!("`{text}` on line {line} is not a number"),
-            Left::Gap { line } => format!("it is empty on line {line}"),
+            Left::Word { line, text } => format!("`{text}` on line {line} is no number"),
+            Left::Gap { line } => format!("there is nothing in it on line {line}"),
             Left::Unnamed => format!("column {} has no heading", column + 1),
             Left::Constant(value) => format!("it is {value} in every row"),
-            Left::Dead(value) => format!("it is {value} in every row, so a channel cannot be learnt"),
+            Left::Dead(value) => format!("it is {value} in every row, which teaches a channel nothing"),
             Left::Counter => "it numbers the rows".to_owned(),
             Left::Circumstance => {
                 let unit = own_unit(&self.table.columns[column]);
                 let unit = unit.map_or(String::new(), |unit| format!(" and nuisance_unit = \"{unit}\""));
                 format!(
-                    "if readings depend on it and it is unknown in use, set nuisance = {}{unit}",
+                    "if readings depend on it and it is unknown in use, say nuisance = {}{unit}",
                     self.key(column)
                 )
             }
             Left::Single => {
-                "if it is a channel, add it to them; if readings depend on it, set `nuisance`".to_owned()
+                "if it is a channel, add it to them; if readings depend on it, say it as `nuisance`"
+                    .to_owned()
             }
             Left::OneOfForces => {
-                format!("it may be the force, as others may: set force = {}", self.key(column))
+                format!("it may be the force, as others may: say force = {}", self.key(column))
             }
-            Left::Second => "another column has the role of its name".to_owned(),
+            Left::Second => "another column has the role that its name says".to_owned(),
             Left::Unit(unit) => format!("palpate does not read it in `{unit}`; convert it"),
         };
         format!("`{heading}`: {reason}.")
     }
 
-    /// The unit of a column; an error for a unit of another quantity.
+    /// The unit of a column, refused where it is another quantity's.
     fn unit(&self, column: usize, wanted: Dimension) -> Result<Unit, FirstRigError> {
         let TableColumn { heading, .. } = &self.table.columns[column];
         let foreign = |unit: &str| FirstRigError::ForeignUnit {
@@ -464,7 +467,7 @@ impl FirstRig {
         }
     }
 
-    /// The range of a coordinate that the presses cover, and that of a surface which contains it.
+    /// The stretch of a coordinate that the presses cover, and a surface's that holds it.
     fn side(&self, column: usize) -> Result<Side, FirstRigError> {
         let unit = self.unit(column, Dimension::Length)?;
         let heading = &self.table.columns[column].heading;
@@ -480,7 +483,7 @@ impl FirstRig {
         Ok(Side::around(metres(low), metres(high)))
     }
 
-    /// The numbers of a column in touched rows; in all rows if every row is untouched.
+    /// The numbers of a column in rows that are not untouched, where there are any.
     fn pressed(&self, column: usize) -> Vec<f64> {
         let numbers = self.table.columns[column].numbers().unwrap_or_default();
         let forces = self.roles.force.and_then(|force| self.table.columns[force].numbers());
@@ -507,10 +510,10 @@ impl FirstRig {
                     "column `{heading}` is {value} in every row and was left out: is it a channel, and is it connected?"
                 )),
                 Left::Word { line, text } => {
-                    Some(format!("column `{heading}` was left out: `{text}` on line {line} is not a number"))
+                    Some(format!("column `{heading}` was left out: `{text}` on line {line} is no number"))
                 }
                 Left::Gap { line } => {
-                    Some(format!("column `{heading}` was left out: it is empty on line {line}"))
+                    Some(format!("column `{heading}` was left out: there is nothing in it on line {line}"))
                 }
                 Left::Unit(unit) => Some(format!(
                     "column `{heading}` was left out: palpate does not read it in `{unit}`; convert it"
@@ -536,7 +539,7 @@ impl FirstRig {
         warnings
     }
 
-    /// Warnings about headings that several columns share, exactly or except for case and blanks.
+    /// Warnings of headings that several columns have, exactly or but for case and blanks.
     fn warnings_of_headings(&self) -> Vec<String> {
         if self.table.header == Header::Absent {
             return Vec::new();
@@ -570,7 +573,7 @@ impl FirstRig {
         if !self.roles.many_forces.is_empty() {
             let forces: Vec<String> = self.roles.many_forces.iter().map(|column| self.key(*column)).collect();
             warnings.push(format!(
-                "columns {} may all be the force, and none was chosen; choose one with --force",
+                "columns {} may all be the force, and none was taken; say which with --force",
                 forces.join(", ")
             ));
         }
@@ -592,12 +595,12 @@ impl FirstRig {
     }
 }
 
-/// The unit in a heading.
+/// The unit that a heading says.
 fn own_unit(column: &TableColumn) -> Option<Unit> {
     name_and_unit(Heading::parse(&column.heading)).1
 }
 
-/// The default unit of a dimension.
+/// The unit that numbers of a dimension are in where nothing is said.
 fn usual_unit(dimension: Dimension) -> Unit {
     let symbol = match dimension {
         Dimension::Length => "mm",
@@ -610,17 +613,17 @@ fn usual_unit(dimension: Dimension) -> Unit {
 /// One coordinate of a surface around its presses.
 #[derive(Clone, Debug, PartialEq)]
 struct Side {
-    /// The file's coordinate of the surface's start, as text for a rig.
+    /// The file's coordinate of the surface's start, as a rig says it.
     origin: String,
-    /// The surface's length or width, as text for a rig.
+    /// The surface's length or width, as a rig says it.
     size: String,
     /// The first and the last press.
     pressed_m: (f64, f64),
 }
 
 impl Side {
-    /// A surface that contains presses from `low_m` to `high_m`. It begins at 0 if the presses lie on the positive side, not far from 0. It
-    /// extends as far beyond the last press as the first press is from its start, to the next round number.
+    /// A surface that begins at 0 where presses lie on the one side of it not far away, and ends as far beyond the last of them as the
+    /// first is from its start, at the next round number.
     fn around(low_m: f64, high_m: f64) -> Self {
         let span_m = high_m - low_m;
         let (digit, exponent) = round_step(span_m / 20.0);
@@ -639,7 +642,7 @@ impl Side {
     }
 }
 
-/// 1, 2 or 5 times a power of ten: the least such number that is not smaller than `value`.
+/// 1, 2 or 5 and a power of ten: the least such number that is no smaller than `value`.
 fn round_step(value: f64) -> (i64, i32) {
     let exponent = value.log10().floor();
     let mantissa = value / 10f64.powf(exponent);
@@ -677,12 +680,12 @@ impl Toml {
     }
 }
 
-/// A text with its control characters, which are not allowed in a comment, replaced by `?`.
+/// A text without the characters that a comment cannot hold.
 fn printable(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '?' } else { c }).collect()
 }
 
-/// A text as TOML quotes it.
+/// A text as TOML writes it.
 fn quoted(text: &str) -> String {
     let mut quoted = String::from("\"");
     for c in text.chars() {
@@ -698,7 +701,7 @@ fn quoted(text: &str) -> String {
     quoted
 }
 
-/// A file's name, quoted for a shell if necessary.
+/// A file's name as a shell takes it.
 fn shell_word(name: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "._-/\\:".contains(c);
     if !name.is_empty() && name.chars().all(plain) { name.to_owned() } else { format!("\"{name}\"") }

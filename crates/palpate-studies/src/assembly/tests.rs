@@ -255,7 +255,7 @@ fn rows_that_are_wrong_are_refused_with_their_line_and_cell() {
         evaluations(&move |cells| cells[i] = text.clone())
     };
     assert_eq!(cell(0, "nobody"), "the study has no arm `nobody`");
-    assert_eq!(cell(0, "lanes"), "arm `lanes` is of networks, and networks.csv keeps all of them");
+    assert_eq!(cell(0, "lanes"), "arm `lanes` is of networks, of which networks.csv keeps all");
     assert_eq!(cell(1, "-1"), "seed: `-1` is not a whole number");
     assert_eq!(cell(2, "0.1 0.2"), "estimates_m: there are 2 values; the arm is judged by 20 readings");
     assert_eq!(cell(2, "0.1 NaN"), "estimates_m: `NaN` is not a finite number");

@@ -174,7 +174,7 @@ pub enum RowProblem {
         wanted: usize,
     },
     /// A row of a network in `evaluations.csv`, which has none.
-    #[error("arm `{arm}` is of networks, and networks.csv keeps all of them")]
+    #[error("arm `{arm}` is of networks, of which networks.csv keeps all")]
     Network {
         /// The arm.
         arm: String,

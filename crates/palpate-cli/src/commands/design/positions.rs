@@ -154,7 +154,7 @@ fn help(error: &PositionError) -> &'static str {
         PositionError::NoForce => {
             "add `force = \"3 N\"` to [contact], or to [training] where it is not known afterwards"
         }
-        PositionError::Auto => "choose one: `kind = \"influence\"` in [estimator]",
+        PositionError::Auto => "say which: `kind = \"influence\"` in [estimator]",
         PositionError::TooFew { .. } => "--count takes a larger number",
         PositionError::Arrangement(_) | PositionError::Calibration(_) | PositionError::Regression(_) => {
             "check [training], [sensors] and [estimator] of the rig"

@@ -207,7 +207,7 @@ const MOST_COUNT: usize = 200;
 
 /// "2..16" as a range, both ends included.
 fn counts(text: &str) -> Result<RangeInclusive<usize>, String> {
-    let form = || format!("`{text}` is not a range; write the least and the most, as in 2..16");
+    let form = || format!("`{text}` is no range; write the least and the most, as in 2..16");
     let (from, to) = text.split_once("..").ok_or_else(form)?;
     let number = |text: &str| text.trim_start_matches('=').trim().parse::<usize>().map_err(|_| form());
     let (from, to) = (number(from)?, number(to)?);
@@ -293,7 +293,7 @@ fn print(outcome: &Outcome) -> Result<(), Failure> {
 /// "1 contact, at 12000 mm, is over a support …": the excluded contacts; `None` if there are none.
 fn left_out_in_words(problem: &SensorProblem) -> Option<String> {
     let places = problem.contacts_over_supports();
-    let reason = "where no layout determines an unknown force: left out of scores and limits";
+    let reason = "where no layout tells a force that is not known: left out of scores and limits";
     match places.as_slice() {
         [] => None,
         [place] => Some(format!(

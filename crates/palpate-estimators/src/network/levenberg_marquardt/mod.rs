@@ -74,7 +74,7 @@ pub enum LevenbergMarquardtFitError {
     Features(#[from] NoFeatures),
     /// Readings that differ by no more than noise.
     #[error(
-        "the recording's readings do not differ by more than noise; a network cannot distinguish positions by them"
+        "the recording's readings do not differ by more than noise; a network has nothing to tell positions by"
     )]
     Alike,
     /// Every training diverged to numbers that are not finite.

@@ -1,25 +1,25 @@
-//! A Zenoh router, and the names of a session in ROS.
+//! A Zenoh router, and the names by which ROS knows a session.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// A Zenoh router, and the names of a session in ROS: `tcp/host:7447?domain=0&name=palpate&frame=surface`.
+/// A Zenoh router, and the names by which ROS knows a session: `tcp/host:7447?domain=0&name=palpate&frame=surface`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RosUrl {
-    /// The router in the notation of Zenoh: `tcp/host:7447`.
+    /// The router, as Zenoh names it: `tcp/host:7447`.
     pub router: String,
-    /// ROS domain, 0 to 232; 0 by default.
+    /// Domain of ROS, 0 to 232; 0 by default.
     pub domain: u8,
-    /// Namespace and name of the node, and prefix of the topics; `palpate` by default.
+    /// Namespace and name of the node, under which the topics are; `palpate` unless it is said.
     pub name: String,
-    /// Frame of points and wrenches; `surface` by default.
+    /// Frame of points and wrenches; `surface` unless it is said.
     pub frame: String,
 }
 
-/// Text that is not a [`RosUrl`].
+/// Text that is no [`RosUrl`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{text}` is not a Zenoh router with names of ROS, as in `tcp/host:7447?domain=0&name=palpate&frame=surface`: {problem}"
+    "`{text}` is no Zenoh router with names of ROS, as in `tcp/host:7447?domain=0&name=palpate&frame=surface`: {problem}"
 )]
 pub struct RosUrlError {
     /// The text.
@@ -30,7 +30,7 @@ pub struct RosUrlError {
 
 /// Port of Zenoh routers.
 const PORT: u16 = 7447;
-/// Greatest ROS domain.
+/// Greatest domain of ROS.
 const GREATEST_DOMAIN: u8 = 232;
 /// Most bytes of a name or frame.
 const LONGEST: usize = 200;
@@ -43,7 +43,7 @@ impl FromStr for RosUrl {
     }
 }
 
-/// Router, domain, name and frame, including defaults.
+/// Router, domain, name and frame; without those that are not said otherwise.
 impl fmt::Display for RosUrl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { router, domain, name, frame } = self;
@@ -63,7 +63,7 @@ fn parse(text: &str) -> Result<RosUrl, &'static str> {
             _ => return Err("its parameters are domain, name and frame"),
         };
         if said_before {
-            return Err("a parameter is given twice");
+            return Err("a parameter is said twice");
         }
     }
     Ok(RosUrl {
@@ -76,12 +76,11 @@ fn parse(text: &str) -> Result<RosUrl, &'static str> {
 
 fn router_of(text: &str) -> Result<String, &'static str> {
     let address = text.strip_prefix("tcp/").ok_or("it does not begin with tcp/")?;
-    // The colons of an IPv6 address are within brackets.
+    // The colons of an address of IPv6 are within brackets.
     let (host, port) = match address.rsplit_once(':') {
-        Some((host, port)) if !port.ends_with(']') => (
-            host,
-            port.parse().ok().filter(|&port| port > 0).ok_or("its port is not a number of 1 to 65535")?,
-        ),
+        Some((host, port)) if !port.ends_with(']') => {
+            (host, port.parse().ok().filter(|&port| port > 0).ok_or("its port is no number of 1 to 65535")?)
+        }
         _ => (address, PORT),
     };
     let bare = host.strip_prefix('[').and_then(|host| host.strip_suffix(']'));
@@ -96,7 +95,7 @@ fn router_of(text: &str) -> Result<String, &'static str> {
 
 fn domain_of(text: &str) -> Result<u8, &'static str> {
     let domain = text.parse().ok().filter(|domain| *domain <= GREATEST_DOMAIN);
-    domain.ok_or("its domain is not a number of 0 to 232")
+    domain.ok_or("its domain is no number of 0 to 232")
 }
 
 fn name_of(text: &str) -> Result<String, &'static str> {

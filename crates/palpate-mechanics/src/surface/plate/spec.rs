@@ -176,7 +176,7 @@ pub enum PlateError {
         value: f64,
     },
     /// A support on an edge that is already supported.
-    #[error("support {number} is on the {edge} edge, which is supported already; leave it out")]
+    #[error("support {number} is on the {edge} edge, which is held already; leave it out")]
     SupportOnHeldEdge {
         /// Number of the support, from 1.
         number: usize,
@@ -212,18 +212,18 @@ pub enum PlateError {
     },
     /// A plate without supports.
     #[error(
-        "the plate has no support: it can move up and down and tilt every way; support an edge, or three points"
+        "nothing holds the plate: it can move up and down and tilt every way; hold an edge, or three points"
     )]
     NotHeld,
     /// A plate with a single point support.
-    #[error("the plate is supported at {} only: it can tilt about it every way; support it at three points at least", Point(*at))]
+    #[error("the plate is held at {} only: it can tilt about it every way; hold it at three points at least", Point(*at))]
     HeldAtOnePoint {
         /// The point.
         at: Position,
     },
     /// A plate with all its supports on one line.
     #[error(
-        "the plate can turn about the line through {} and {}, on which all its supports are; support it beside that line",
+        "the plate can turn about the line through {} and {}, on which all its supports are; hold it beside that line",
         Point(*from), Point(*to)
     )]
     HeldOnALine {
@@ -250,7 +250,7 @@ pub enum Unsolvable {
     #[error(transparent)]
     Stiffness(#[from] palpate_numerics::SparseCholeskyError),
     /// The compliances of the simple supports have no factor.
-    #[error("the forces of the supports at points are not determined: {0}")]
+    #[error("what the supports at points do is not told: {0}")]
     Supports(#[from] palpate_numerics::NotPositiveDefinite),
     /// Supports and edges do not balance a force.
     #[error(
