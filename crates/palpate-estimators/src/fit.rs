@@ -21,7 +21,7 @@ use crate::status::{FalseAlarmRate, unless_left_open};
 use crate::thinning::thinned;
 use crate::tried::Tried;
 use crate::untouched_drift::UntouchedDrift;
-use crate::untouched_scatter::{Rests, UntouchedScatter};
+use crate::untouched_scatter::{Deviations, UntouchedScatter};
 
 /// Task of a fit: setup, recording and seed.
 #[derive(Clone, Copy, Debug)]
@@ -548,8 +548,9 @@ impl<M: Locate> Fitted<M> {
     pub fn with_scatter_of(self, recording: &Recording) -> Self {
         let of_check = || self.check.as_ref()?.false_alarm_rate();
         let rate = self.method.false_alarm_rate().or_else(of_check);
-        let by_noise = || Rests::of_single_rows(recording).or_else(|| Rests::of_repeats(recording));
-        let rests = Rests::of_recording(recording).or_else(|| if rate.is_none() { by_noise() } else { None });
+        let by_noise = || Deviations::of_single_rows(recording).or_else(|| Deviations::of_repeats(recording));
+        let rests =
+            Deviations::of_rests(recording).or_else(|| if rate.is_none() { by_noise() } else { None });
         let centre = self.method.offsets().or_else(|| self.untouched.clone());
         let Some((centre, rests)) = centre.zip(rests) else { return self };
         if rate.is_some() && self.noise_sd().is_some_and(|noise_sd| rests.are_noise(&noise_sd)) {

@@ -188,16 +188,15 @@ impl PlaceRegions {
     }
 
     fn coverage(&self) -> Option<Coverage> {
-        let Widening { added_sd, factor } = self.widening_without(None)?;
+        let of_all = self.widening_without(None)?;
         let folds = self.groups.iter().map(|(fold, _)| fold + 1).max()?;
-        let of_all = Widening { added_sd, factor };
         let of_others: Vec<Widening> =
             (0..folds).map(|fold| self.widening_without(Some(fold)).unwrap_or(of_all)).collect();
         Some(Coverage {
             before_percent: self.covered_percent(|_| Widening::NONE),
             after_percent: self.covered_percent(|fold| of_others[fold]),
-            added_sd,
-            factor,
+            added_sd: of_all.added_sd,
+            factor: of_all.factor,
         })
     }
 

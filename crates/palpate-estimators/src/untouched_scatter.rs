@@ -21,6 +21,7 @@ use crate::status::{FalseAlarmRate, SIGNIFICANCE};
 use palpate_mechanics::sensing::Layout;
 use palpate_numerics::{chi_squared_critical_value, mean, median, normal_quantile};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 use tails::HeavyTails;
 
 /// Scatter of an untouched surface from one rest to the next; see [the module](self).
@@ -40,22 +41,22 @@ pub struct UntouchedScatter {
 /// degrees of freedom.
 pub(crate) const FEWEST_RESTS: usize = 5;
 
-/// Rests of a recording, as deviations from their slow course.
-pub(crate) struct Rests {
-    /// Deviation of each untouched row from the course, with the share that the row has of its rest.
-    deviations: Vec<(Vec<f64>, f64)>,
+/// Deviations of rows from what is steady in them: of untouched rows from their slow course, or of repeats from their means.
+pub(crate) struct Deviations {
+    /// Deviation of each row, with its weight: the share that the row has of its rest, or of the freedom of its repeats.
+    rows: Vec<(Vec<f64>, f64)>,
     /// ν.
     freedom: f64,
     /// Deviations of repeated presses from their means, where these scatter no more than the rests: noise of the same kind, in larger number.
-    noise: Option<Box<Rests>>,
+    noise: Option<Box<Self>>,
 }
 
-impl Rests {
+impl Deviations {
     /// Parameters of a line.
     const OF_LINE: usize = 2;
 
     /// The rests of a recording; `None` where it has too few, or its rows have no order in time.
-    pub fn of_recording(recording: &Recording) -> Option<Self> {
+    pub fn of_rests(recording: &Recording) -> Option<Self> {
         let rests = Self::new(recording, &recording.rests())?;
         let noise = Self::of_repeats(&recording.touched()).filter(|noise| rests.scatter_as_much_as(noise));
         Some(Self { noise: noise.map(Box::new), ..rests })
@@ -94,7 +95,7 @@ impl Rests {
             };
             group.iter().filter(move |_| share > 0.0).map(move |row| (off(row), share))
         });
-        Some(Self { deviations: deviations.collect(), freedom: freedom as f64, noise: None })
+        Some(Self { rows: deviations.collect(), freedom: freedom as f64, noise: None })
     }
 
     fn new(recording: &Recording, rests: &[Vec<usize>]) -> Option<Self> {
@@ -113,11 +114,7 @@ impl Rests {
             let values = recording.rows[row].reading.iter().zip(&lines);
             (values.map(|(value, [level, slope])| value - level - slope * times_s[row]).collect(), share)
         });
-        Some(Self {
-            deviations: deviations.collect(),
-            freedom: (rests.len() - Self::OF_LINE) as f64,
-            noise: None,
-        })
+        Some(Self { rows: deviations.collect(), freedom: (rests.len() - Self::OF_LINE) as f64, noise: None })
     }
 
     /// True where normal noise of these standard deviations explains the deviations at the 5 % level: their mean square, in units of the noise, is about normal,
@@ -127,26 +124,27 @@ impl Rests {
             noise_sd.iter().enumerate().filter_map(|(channel, sd)| Some((channel, (*sd)?))).collect();
         let square =
             |row: &[f64]| -> f64 { channels.iter().map(|(channel, sd)| (row[*channel] / sd).powi(2)).sum() };
-        let sum: f64 = self.deviations.iter().map(|(row, share)| share * square(row)).sum();
+        let sum: f64 = self.rows.iter().map(|(row, share)| share * square(row)).sum();
         let of_all = channels.len() as f64 * self.freedom;
         sum <= of_all + normal_quantile(1.0 - SIGNIFICANCE) * (2.0 * of_all).sqrt()
             && self.heavy_tails(&channels.iter().map(|(channel, _)| *channel).collect::<Vec<_>>()).is_none()
     }
 
     /// True where repeats scatter no more than the rests, in the mean over the channels, at the 5 % level. The test compares the median
-    /// absolute deviation, which hardly depends on the tails; for n normal values it has a relative variance of 1.36/n (Serfling,
-    /// *Approximation Theorems of Mathematical Statistics*, 1980).
+    /// absolute deviation, which hardly depends on the tails; for n normal values with the quartile q it has the relative variance
+    /// 1/(16·q²·φ(q)²·n) (Serfling, *Approximation Theorems of Mathematical Statistics*, 1980).
     fn scatter_as_much_as(&self, repeats: &Self) -> bool {
-        const RELATIVE_VARIANCE: f64 = 1.36;
-        let spread =
-            |rests: &Self, c: usize| median(rests.deviations.iter().map(|(row, _)| row[c].abs()).collect());
-        let channels = self.deviations.first().map_or(0, |(row, _)| row.len());
+        let quartile = normal_quantile(0.75);
+        let density = (-0.5 * quartile * quartile).exp() / TAU.sqrt();
+        let relative_variance = (4.0 * quartile * density).powi(-2);
+        let spread = |of: &Self, c: usize| median(of.rows.iter().map(|(row, _)| row[c].abs()).collect());
+        let channels = self.rows.first().map_or(0, |(row, _)| row.len());
         let ratios: Vec<f64> = (0..channels)
             .filter_map(|c| Some(spread(repeats, c)? / spread(self, c)?))
             .filter(|ratio| ratio.is_finite())
             .collect();
         let variance =
-            RELATIVE_VARIANCE * (self.freedom.recip() + repeats.freedom.recip()) / ratios.len() as f64;
+            relative_variance * (self.freedom.recip() + repeats.freedom.recip()) / ratios.len() as f64;
         mean(ratios) <= 1.0 + normal_quantile(1.0 - SIGNIFICANCE) * variance.sqrt()
     }
 
@@ -158,7 +156,7 @@ impl Rests {
             .iter()
             .map(|c| (*c, noise.product(*c, *c).sqrt()))
             .filter(|(_, sd)| *sd > 0.0)
-            .flat_map(|(c, sd)| noise.deviations.iter().map(move |(row, share)| (row[c] / sd, *share)))
+            .flat_map(|(c, sd)| noise.rows.iter().map(move |(row, share)| (row[c] / sd, *share)))
             .collect();
         let shares = channels.iter().map(|c| noise.product(*c, *c) / self.product(*c, *c));
         let share = shares.filter(|share| share.is_finite()).fold(0.0, f64::max);
@@ -167,7 +165,7 @@ impl Rests {
 
     /// Covariance of two channels.
     fn product(&self, a: usize, b: usize) -> f64 {
-        self.deviations.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.freedom
+        self.rows.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.freedom
     }
 
     /// Scatter of the rests about `centre`, for the channels that are not disabled.

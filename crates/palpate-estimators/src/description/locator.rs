@@ -1,7 +1,6 @@
 //! Locators in words.
 
-use super::learnt::decimals;
-use super::learnt::learnt;
+use super::learnt::{decimals, learnt};
 use crate::centroid::Weighing;
 use crate::estimator::{Locator, Method, Tried};
 use crate::influence::InfluenceLocator;

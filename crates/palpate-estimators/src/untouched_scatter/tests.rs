@@ -42,7 +42,7 @@ fn false_alarms(rests: usize, parts: [f64; 2], drift: f64, rate: f64) -> f64 {
     let mut beyond = 0;
     for _ in 0..RECORDINGS {
         let recording = recording(&mut rng, rests, parts, drift);
-        let found = Rests::of_recording(&recording).unwrap();
+        let found = Deviations::of_rests(&recording).unwrap();
         let scatter =
             found.scatter(vec![0.0; CHANNELS], setup().layout(), FalseAlarmRate::new(rate).unwrap());
         let [own, shared] = parts;
@@ -73,7 +73,7 @@ fn false_alarms_of_rests_are_at_most_about_the_rate() {
 fn a_steady_drift_is_no_scatter() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let scatter = |drift: f64, rng: &mut Xoshiro256PlusPlus| {
-        let rests = Rests::of_recording(&recording(rng, 200, [3.0, 0.0], drift)).unwrap();
+        let rests = Deviations::of_rests(&recording(rng, 200, [3.0, 0.0], drift)).unwrap();
         rests.scatter(vec![0.0; CHANNELS], setup().layout(), FalseAlarmRate::DEFAULT).sd
     };
     for drift in [0.0, 50.0] {
@@ -88,7 +88,7 @@ fn noise_explains_the_rests_of_19_recordings_in_20_and_no_residue() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
     let mut explained = |residue: f64| {
         let is_noise = |_: &usize| {
-            let rests = Rests::of_recording(&recording(&mut rng, 20, [1.0, residue], 0.0)).unwrap();
+            let rests = Deviations::of_rests(&recording(&mut rng, 20, [1.0, residue], 0.0)).unwrap();
             rests.are_noise(&[Some(1.0); CHANNELS])
         };
         (0..400).filter(is_noise).count()
@@ -102,17 +102,17 @@ fn noise_explains_the_rests_of_19_recordings_in_20_and_no_residue() {
 fn few_rests_or_one_long_one_tell_no_scatter() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut few = recording(&mut rng, 4, [3.0, 0.0], 0.0);
-    assert!(Rests::of_recording(&few).is_none());
+    assert!(Deviations::of_rests(&few).is_none());
     few.rows.sort_by(|a, b| a.force_n.unwrap().total_cmp(&b.force_n.unwrap()));
     few.rows = few.rows.iter().cycle().take(4 * few.rows.len()).cloned().collect();
     few.rows.sort_by(|a, b| a.force_n.unwrap().total_cmp(&b.force_n.unwrap()));
-    assert!(Rests::of_recording(&few).is_none());
+    assert!(Deviations::of_rests(&few).is_none());
 }
 
 #[test]
 fn disabled_channels_say_nothing() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-    let rests = Rests::of_recording(&recording(&mut rng, 40, [3.0, 0.0], 0.0)).unwrap();
+    let rests = Deviations::of_rests(&recording(&mut rng, 40, [3.0, 0.0], 0.0)).unwrap();
     let mut setup = setup();
     let scatter = |setup: &Setup| rests.scatter(vec![0.0; CHANNELS], setup.layout(), FalseAlarmRate::DEFAULT);
     let mut reading = [0.0; CHANNELS];
@@ -197,7 +197,7 @@ fn heavy_tails_of_repeated_presses_bound_the_rests() {
                 });
             }
         }
-        let rests = Rests::of_recording(&Recording::new(setup().layout(), "rests", rows)).unwrap();
+        let rests = Deviations::of_rests(&Recording::new(setup().layout(), "rests", rows)).unwrap();
         are_noise += usize::from(rests.are_noise(&[Some(2f64.sqrt()); CHANNELS]));
         let scatter =
             rests.scatter(vec![0.0; CHANNELS], setup().layout(), FalseAlarmRate::new(RATE).unwrap());

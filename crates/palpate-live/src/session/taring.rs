@@ -17,12 +17,12 @@ pub struct Taring {
     follows: bool,
     /// Time of the next reading, in seconds.
     now_s: f64,
-    taken: Option<Taken>,
+    pending: Option<PendingBaseline>,
 }
 
 /// A baseline in progress.
 #[derive(Debug)]
-struct Taken {
+struct PendingBaseline {
     tare: Tare<Vec<f64>>,
     /// Time of the first reading, in seconds.
     since_s: Option<f64>,
@@ -38,7 +38,7 @@ impl Taring {
             Estimation::Track { creep: Some(_), .. } => tare.without_rests(),
             _ => tare,
         });
-        Self { tare, follows, now_s: 0.0, taken: None }
+        Self { tare, follows, now_s: 0.0, pending: None }
     }
 
     /// Notes the time of the next reading, in seconds.
@@ -51,8 +51,9 @@ impl Taring {
 
     /// Begins a new baseline.
     pub fn begin(&mut self) {
-        let taken = |tare: &Tare<Vec<f64>>| Taken { tare: tare.restarted(), since_s: None, readings: 0 };
-        self.taken = self.tare.as_ref().map(taken);
+        let begun =
+            |tare: &Tare<Vec<f64>>| PendingBaseline { tare: tare.restarted(), since_s: None, readings: 0 };
+        self.pending = self.tare.as_ref().map(begun);
     }
 
     /// The estimate of a reading, and whether the reading completes a baseline; `tared` contains the tared reading afterwards. `None` for a reading
@@ -63,7 +64,7 @@ impl Taring {
         reading: &[f64],
         tared: &mut [f64],
     ) -> Option<(Estimate, bool)> {
-        let tares = self.take(reading);
+        let tares = self.complete_baseline(reading);
         let Some(tare) = &mut self.tare else { return Some((locator.locate(reading).ok()?, tares)) };
         if self.follows {
             return Some((locator.locate_following(tare, reading, tared).ok()?, tares));
@@ -84,8 +85,8 @@ impl Taring {
     }
 
     /// Adds a reading to the baseline in progress. True if this completes it; it then replaces the present baseline.
-    fn take(&mut self, reading: &[f64]) -> bool {
-        let Some(Taken { tare, since_s, readings }) = &mut self.taken else { return false };
+    fn complete_baseline(&mut self, reading: &[f64]) -> bool {
+        let Some(PendingBaseline { tare, since_s, readings }) = &mut self.pending else { return false };
         if tare.add_untouched(reading).is_err() {
             return false;
         }
@@ -94,7 +95,7 @@ impl Taring {
         if *readings < BASELINE_READINGS || self.now_s - since_s < BASELINE_S {
             return false;
         }
-        self.tare = self.taken.take().map(|taken| taken.tare);
+        self.tare = self.pending.take().map(|pending| pending.tare);
         true
     }
 }
