@@ -149,7 +149,7 @@ class Influence(Estimator):
         The most contacts that may touch at once, more than one only on a line with a model; 1.
     force_sd : float or str, optional
         Standard deviation of the contact's force about the setup's, in newtons or with a unit; 0.
-    structure : {"auto", "force-linear", "force-monotone", "free"}, optional
+    structure : {"auto", "force-linear", "force-saturating", "force-monotone", "free"}, optional
         Structure of the readings of a measured surface; "auto".
     false_alarm_rate : float or str, optional
         Share of untouched readings that may be taken for a contact; 0.1 %.

@@ -26,8 +26,8 @@ class Inspection:
     says : list of str
         The description, line by line.
     learnt : dict or None
-        What a locator of a surface without a model has learnt of it: "structure", "asked_structure", "force_exponent", "presses", "channels" (each
-        with "name", "offset", "noise_sd", "drift_sd", "scatter_sd", in its own unit), "drift_course", "noise_by_place", "scatter_force" in newtons,
+        What a locator of a surface without a model has learnt of it: "structure", "asked_structure", "force_exponent", "saturation", "presses", "channels" (each
+        with "name", "offset", "noise_sd", "drift", "scatter_sd", in its own unit), "drift_course", "noise_by_place", "scatter_force" in newtons,
         "rows_set_aside", the indices of rows; None of others.
     """
 

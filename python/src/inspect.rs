@@ -69,7 +69,7 @@ fn of_linear(linear: &ForceLinearLocator, locator: &estimator::Locator) -> Value
             "name": names[c],
             "offset": offset,
             "noise_sd": noise_sd,
-            "drift_sd": size_of(&drifts, c),
+            "drift": size_of(&drifts, c),
             "scatter_sd": size_of(scatters, c),
         })
     });
@@ -78,9 +78,10 @@ fn of_linear(linear: &ForceLinearLocator, locator: &estimator::Locator) -> Value
         ends.map(|(times, position)| json!({ "times": times, "at": values::place(position, extent) }))
     });
     json!({
-        "structure": if linear.response() == 1.0 { "force-linear" } else { "force-monotone" },
+        "structure": linear.structure(),
         "asked_structure": linear.asked_structure(),
         "force_exponent": linear.response(),
+        "saturation": linear.saturation_share(),
         "presses": linear.presses(),
         "channels": Value::from_iter(channels),
         "drift_course": linear.drift_course(),

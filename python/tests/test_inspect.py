@@ -55,7 +55,7 @@ def test_what_a_locator_has_learnt_is_told_as_the_command_tells_it(command, exam
     assert learnt["drift_course"] == theirs.get("drift_course")
     assert [row + 1 for row in learnt["rows_set_aside"]] == theirs["rows_set_aside"]
     for channel, one in zip(learnt["channels"], theirs["channels"]):
-        assert channel == {"drift_sd": None, "scatter_sd": None, **one}
+        assert channel == {"drift": None, "scatter_sd": None, **one}
 
 
 def test_a_recording_is_told_as_the_command_tells_it(command, examples, tmp_path):

@@ -145,14 +145,14 @@ fn decide(rig: &Rig, recording: &Recording, arguments: &Arguments) -> Result<Opt
         "chosen: {}, by mean error × interval score at held-out positions ({CHOICE_FOLDS} folds)",
         choice.best.name()
     );
-    remark!("{:<24} {:>12} {:>20} {:>14}", "", "mean error", "score of 95 %", "95 % covers");
+    remark!("{:<26} {:>12} {:>20} {:>14}", "", "mean error", "score of 95 %", "95 % covers");
     for Tried { name, mean_error_m, interval_score_m, coverage_percent } in &choice.tried {
         let covers = coverage_percent.map_or_else(|| "–".to_owned(), |percent| format!("{percent:.1} %"));
         let [error, score] = [mean_error_m, interval_score_m].map(|length_m| format_length_mm(*length_m));
-        remark!("{name:<24} {error:>12} {score:>20} {covers:>14}");
+        remark!("{name:<26} {error:>12} {score:>20} {covers:>14}");
     }
     for (name, reason) in &choice.left_out {
-        remark!("{name:<24} left out: {reason}");
+        remark!("{name:<26} left out: {reason}");
     }
     Ok(Some(choice))
 }

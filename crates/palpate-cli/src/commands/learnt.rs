@@ -21,14 +21,15 @@ pub fn json(linear: &ForceLinearLocator, names: &[String]) -> impl Serialize + u
             "name": names[c].clone(),
             "offset": offset,
             "noise_sd": noise_sd,
-            "drift_sd"?: size_of(&drifts, c),
+            "drift"?: size_of(&drifts, c),
             "scatter_sd"?: size_of(scatters, c),
         }
     });
     object! {
-        "structure": if linear.response() == 1.0 { "force-linear" } else { "force-monotone" },
+        "structure": linear.structure(),
         "asked_structure": linear.asked_structure(),
         "force_exponent": linear.response(),
+        "saturation"?: linear.saturation_share(),
         "presses": linear.presses(),
         "channels": channels.collect::<Vec<_>>(),
         "drift_course"?: linear.drift_course(),

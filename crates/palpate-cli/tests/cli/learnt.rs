@@ -50,8 +50,8 @@ fn drift_scatter_and_what_was_set_aside_are_said() {
     assert_eq!(learnt["drift_course"], "linear");
     let channel = &learnt["channels"][0];
     // 60 counts over the recording; a newton moves the strip by some 30 counts.
-    let drift_sd = channel["drift_sd"].as_f64().unwrap();
-    assert!((15.0..240.0).contains(&drift_sd), "{learnt}");
+    let drift = channel["drift"].as_f64().unwrap();
+    assert!((45.0..75.0).contains(&drift), "{learnt}");
     assert!((0.5..15.0).contains(&channel["scatter_sd"].as_f64().unwrap()), "{learnt}");
 
     let rig = json(&["inspect", "rig.toml", "--json"]);
@@ -122,6 +122,7 @@ fn structures_are_compared_as_estimators_of_their_own() {
     };
     let mut all = names("influence");
     all.sort();
-    assert_eq!(all, ["influence force-linear", "influence force-monotone", "influence free"]);
+    let structures = ["force-linear", "force-monotone", "force-saturating", "free"];
+    assert_eq!(all, structures.map(|structure| format!("influence {structure}")));
     assert_eq!(names("influence free"), ["influence free"]);
 }

@@ -44,6 +44,12 @@ pub fn learnt_summary(linear: &ForceLinearLocator, names: &[String]) -> Vec<Stri
 /// The structure, and the reason for it.
 fn structure(linear: &ForceLinearLocator) -> String {
     let exponent = linear.response();
+    if let Some(share) = linear.saturation_share() {
+        let percent = 100.0 * share;
+        return format!(
+            "structure: force-saturating; the largest readings are {percent:.1} % below proportion to the force"
+        );
+    }
     match (linear.asked_structure(), exponent == 1.0) {
         (Structure::Auto, true) => {
             "structure: force-linear, as the presses are not e¹⁰ times as probable with another power of the force, \
@@ -54,6 +60,9 @@ fn structure(linear: &ForceLinearLocator) -> String {
             "structure: force-monotone; readings follow the force to the power of {exponent:.2}, with which the \
              presses are e¹⁰ times as probable"
         ),
+        (Structure::ForceSaturating, true) => {
+            "structure: force-linear, as the presses show no saturation".to_owned()
+        }
         (_, true) => "structure: force-linear".to_owned(),
         (_, false) => format!(
             "structure: force-monotone; readings follow the force to the power of {exponent:.2}"
@@ -74,9 +83,10 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
             DriftCourse::Linear => "in proportion to the time",
             DriftCourse::Smooth => "a smooth function of the time",
         };
+        let drifts = linear.drifts();
+        let sizes = if drifts.is_empty() { String::new() } else { format!(": {}", by_channel(&drifts)) };
         lines.push(format!(
-            "drift over the recording, {course}: {}, taken off; the offsets are those at its end",
-            by_channel(&linear.drifts())
+            "drift over the recording, {course}{sizes}; subtracted, and the offsets are those at its end"
         ));
     }
     if let Some(Scatter { force_n, sd }) = linear.scatter() {

@@ -78,10 +78,8 @@ impl Estimator {
 impl Estimator {
     /// True for structures of influence functions that learn from presses how readings depend on the force.
     fn needs_forces(&self) -> bool {
-        matches!(
-            self,
-            Self::Influence(Influence { structure: Structure::ForceMonotone | Structure::Free, .. })
-        )
+        let Self::Influence(Influence { structure, .. }) = self else { return false };
+        matches!(structure, Structure::ForceSaturating | Structure::ForceMonotone | Structure::Free)
     }
 
     /// The choice among its candidates; `None` for an estimator without candidates. If no structure of influence functions is compared within the
@@ -114,7 +112,7 @@ impl Estimator {
     }
 
     /// The estimator for an evaluation in folds. The structure of influence functions is chosen once, by all presses: the folds would choose among
-    /// the same three at sixteen times the cost. The choice of `auto` is repeated in each fold.
+    /// the same structures at sixteen times the cost. The choice of `auto` is repeated in each fold.
     ///
     /// # Errors
     /// As for [`Estimator::decide`].
@@ -144,12 +142,15 @@ struct Trial {
 }
 
 impl Trial {
-    /// Rank of the structure of influence functions, the simplest first; `None` for another estimator.
+    /// Rank of the structure of influence functions by its number of parameters, the simplest first; `None` for another estimator.
     fn structure_rank(&self) -> Option<usize> {
         let Estimator::Influence(Influence { structure, .. }) = self.estimator else { return None };
-        [Structure::ForceLinear, Structure::ForceMonotone, Structure::Free]
-            .into_iter()
-            .position(|other| other == structure)
+        match structure {
+            Structure::Auto => None,
+            Structure::ForceLinear => Some(0),
+            Structure::ForceSaturating | Structure::ForceMonotone => Some(1),
+            Structure::Free => Some(2),
+        }
     }
 
     /// True where the mean score of another is smaller by more than two standard errors over the places. The cost of an estimate is half the sum of

@@ -211,7 +211,12 @@ impl Sizes {
             return self.over_a_model(surface);
         }
         if !is_free {
-            return self.force_linear(extent);
+            let learnt = self.force_linear(extent);
+            // Functions of the readings as they are, and of the linearized ones.
+            return match influence.structure {
+                Structure::ForceSaturating => learnt.and(FitCost { memory_bytes: 0.0, ..learnt }),
+                _ => learnt,
+            };
         }
         let nodes = most_nodes(extent) as f64;
         let has_depth = self.nuisances > 0 || recording.rows.iter().any(|row| row.force_n.is_some());

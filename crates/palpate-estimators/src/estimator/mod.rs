@@ -256,6 +256,7 @@ impl Estimator {
         match structure {
             Structure::Auto => self.kind(),
             Structure::ForceLinear => "influence force-linear",
+            Structure::ForceSaturating => "influence force-saturating",
             Structure::ForceMonotone => "influence force-monotone",
             Structure::Free => "influence free",
         }
@@ -266,7 +267,7 @@ impl Estimator {
     pub fn contenders(setup: &Setup) -> Vec<Self> {
         let structures: &[Structure] = match setup.surface().model() {
             Some(_) => &[Structure::Auto],
-            None => &[Structure::ForceLinear, Structure::ForceMonotone, Structure::Free],
+            None => &Structure::STATED,
         };
         let with = |structure: &Structure| {
             Self::Influence(Influence { structure: *structure, ..Influence::default() })

@@ -88,6 +88,7 @@ fn measured_influence(config: Influence) -> Vec<Setting> {
     let structure = match config.structure {
         Structure::Auto => "chosen at held-out positions; with fewer than 19, by the evidence",
         Structure::ForceLinear => "force-linear",
+        Structure::ForceSaturating => "force-saturating",
         Structure::ForceMonotone => "force-monotone",
         Structure::Free => "free",
     };

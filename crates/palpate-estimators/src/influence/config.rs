@@ -32,10 +32,17 @@ pub enum Structure {
     Auto,
     /// Offset + force × influence of the position.
     ForceLinear,
+    /// Offset + force × influence of the position, in channels that saturate: readings of hard presses fall short of proportion to the force.
+    ForceSaturating,
     /// Offset + a power of the force, the same at all positions, × influence of the position.
     ForceMonotone,
     /// Any function of the position and of the nuisance coordinate, or of the force.
     Free,
+}
+
+impl Structure {
+    /// The structures that a rig can state.
+    pub const STATED: [Self; 4] = [Self::ForceLinear, Self::ForceSaturating, Self::ForceMonotone, Self::Free];
 }
 
 /// Source of influence functions.

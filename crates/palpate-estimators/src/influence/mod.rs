@@ -162,7 +162,9 @@ impl Influence {
         }
         let fitted = force_linear::fit(task, self.structure)?;
         match (fitted, self.structure) {
-            (None, Structure::ForceLinear | Structure::ForceMonotone) => Err(InfluenceFitError::NoForces),
+            (None, Structure::ForceLinear | Structure::ForceSaturating | Structure::ForceMonotone) => {
+                Err(InfluenceFitError::NoForces)
+            }
             (fitted, _) => Ok(fitted.map(|fitted| fitted.with_false_alarm_rate(self.false_alarm_rate))),
         }
     }

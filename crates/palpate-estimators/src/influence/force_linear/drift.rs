@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 
 /// Time of the recording's last row, for whose offset is asked: what is located comes after it.
 pub(super) const END: f64 = 1.0;
+/// Time of the recording's first row.
+pub(super) const START: f64 = 0.0;
 
 /// Course of the drift, as a Gaussian process of the time from 0 at the recording's first row to 1 at its last.
 ///

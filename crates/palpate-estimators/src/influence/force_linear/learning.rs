@@ -5,7 +5,7 @@
 //! the process claims of them is checked, and its variance widened where it is too small. Presses that no function explains are set
 //! aside, and the rest learnt anew.
 
-use super::drift::{DriftCourse, END};
+use super::drift::{DriftCourse, END, START};
 use super::drift_fit::DriftFit;
 use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
 use super::outliers::OutlierTest;
@@ -216,6 +216,43 @@ impl Learnt {
         Ok(Some(all))
     }
 
+    /// Change of the offset of every channel in use from the first row to the last; empty without a drift.
+    pub fn drifts(&self) -> Result<Vec<f64>, MeasuredError> {
+        let ends = self.offsets_at(&[START, END])?.unwrap_or_default();
+        Ok(ends.into_iter().map(|offsets| offsets[1] - offsets[0]).collect())
+    }
+
+    /// Offset of every channel in use at each of some times, the same at all without a drift.
+    pub fn offsets_at_or_constant(&self, times: &[f64]) -> Result<Vec<Vec<f64>>, MeasuredError> {
+        if let Some(drifting) = self.offsets_at(times)? {
+            return Ok(drifting);
+        }
+        let constant = offsets(&self.prior, &self.presses, &self.fits, &self.sensors_m, &[END])?;
+        Ok(constant.into_iter().map(|offsets| vec![offsets[0].0; times.len()]).collect())
+    }
+
+    /// Log evidence of other readings of these presses under the prior, with the scatter that makes it largest.
+    pub fn log_evidence(
+        &self,
+        setup: &Setup,
+        recording: &Recording,
+        watch: Watch,
+    ) -> Result<f64, MeasuredError> {
+        /// One of so many places of sensors shows as much.
+        const ONE_OF: usize = 5;
+        let Some(presses) = Presses::of_recording(setup, recording, Repeats::Consecutive, &[]) else {
+            return Ok(f64::NEG_INFINITY);
+        };
+        let presses = presses.of_channels(&self.live);
+        let (extent, structure) = (setup.surface().extent(), Structure::ForceLinear);
+        let decades = (*ALL_DECADES.start(), *ALL_DECADES.end());
+        let mut search = Search { presses: &presses, extent, structure, noise: None, watch, decades };
+        let few: Vec<Vec<f64>> = self.sensors_m.iter().step_by(ONE_OF).cloned().collect();
+        let scatters = std::iter::once(0.0).chain(SCATTERS);
+        let priors = scatters.map(|scatter| Prior { scatter, ..self.prior.clone() });
+        Ok(search.best_of(priors, &few)?.0)
+    }
+
     /// First rows of presses that nothing explains.
     fn outliers(&self, watch: Watch) -> Result<Vec<usize>, MeasuredError> {
         /// Learning anew after each would take long.
@@ -423,7 +460,7 @@ impl Search<'_> {
         if let Some((_, scattered)) = self.scatter(best, &prior, &[])? {
             (best, prior) = self.climb_lengths(scattered)?;
         }
-        if self.structure != Structure::ForceLinear {
+        if matches!(self.structure, Structure::Auto | Structure::ForceMonotone) {
             (best, prior) = self.response(best, prior)?;
         }
         if self.structure == Structure::Auto {

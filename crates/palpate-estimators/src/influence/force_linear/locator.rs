@@ -5,6 +5,7 @@ use super::broad_scan::{BroadScan, ChannelAtPlace};
 use super::drift::DriftCourse;
 use super::posterior::Functions;
 use super::prior::{Prior, Source};
+use super::saturation::Saturation;
 use super::scan::Scan;
 use super::shared_errors::own_shares;
 use crate::fit::{Locate, LocatorFault, NoCheck};
@@ -123,6 +124,12 @@ pub(super) struct Stored {
     /// Loading of each channel in use on the errors that all share; none where they are small.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shared_errors: Vec<f64>,
+    /// Change of the offset of each channel in use from the first row of the recording to its last; empty without a drift, and in older files.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub drifts: Vec<f64>,
+    /// Saturation of the channels; the functions are those of linearized readings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub saturation: Option<Saturation>,
 }
 
 const fn one() -> f64 {
@@ -263,6 +270,7 @@ impl Stored {
             LocatorFault::check_count(what, places.saturating_mul(live), list.len())?;
         }
         numbers("offset", offsets, |_| true, "a finite number")?;
+        numbers("drift", &self.drifts, |_| true, "a finite number")?;
         let outermost_m = self.outermost_m.iter().flat_map(|(first_m, last_m)| [*first_m, *last_m]);
         LocatorFault::check_numbers("outermost press", outermost_m, |_| true, "a finite number")?;
         numbers("mean force", &[self.mean_force_n], |_| true, "a finite number")?;
@@ -276,6 +284,16 @@ impl Stored {
         numbers("channels as one", &[self.channels_as_one], |count| count >= 1.0, "at least 1")?;
         if !self.shared_errors.is_empty() {
             LocatorFault::check_count("loadings on shared errors", live, self.shared_errors.len())?;
+        }
+        if let Some(Saturation { share, ranges }) = &self.saturation {
+            numbers(
+                "saturation",
+                &[*share],
+                |share| (0.0..1.0).contains(&share),
+                "at least 0 and less than 1",
+            )?;
+            LocatorFault::check_count("ranges of channels", live, ranges.len())?;
+            numbers("range of a channel", ranges, |range| range > 0.0, "finite and greater than 0")?;
         }
         let is_share = |loading: f64| (-1.0..=1.0).contains(&loading);
         numbers("loading on shared errors", &self.shared_errors, is_share, "from -1 to 1")?;
@@ -327,6 +345,16 @@ impl ForceLinearLocator {
         locator
     }
 
+    /// The locator of readings that saturate, from that of linearized readings; `channels` are those of the ranges, from 0.
+    pub(super) fn with_saturation(mut self, saturation: Saturation, channels: &[usize]) -> Self {
+        let range_of = |c: &usize| channels.binary_search(c).map_or(f64::MAX, |i| saturation.ranges[i]);
+        let ranges = self.stored.live.iter().map(range_of).collect();
+        self.stored.saturation =
+            (saturation.share > 0.0).then_some(Saturation { share: saturation.share, ranges });
+        self.stored.structure = Structure::ForceSaturating;
+        self
+    }
+
     /// The same, whose noise is taken for a contact at another rate.
     pub(crate) fn with_false_alarm_rate(mut self, rate: FalseAlarmRate) -> Self {
         self.stored.false_alarm_rate = rate;
@@ -363,11 +391,15 @@ impl ForceLinearLocator {
         self.stored.prior.response
     }
 
-    /// Drift of each channel in use, from 0, over the recording: the standard deviation of the change from its first row to its
-    /// last, in its unit; nothing where the presses do not tell a drift.
+    /// Share by which the largest reading of the presses falls short of proportion to the force; `None` where readings are proportional to it.
+    pub fn saturation_share(&self) -> Option<f64> {
+        self.stored.saturation.as_ref().map(|saturation| saturation.share)
+    }
+
+    /// Drift of each channel in use, from 0: the change of its offset from the first row of the recording to the last, in its unit. Empty without a
+    /// drift, and for a file that does not contain it.
     pub fn drifts(&self) -> Vec<(usize, f64)> {
-        let sd = self.stored.prior.drift.sqrt();
-        if sd > 0.0 { self.channels().map(|(c, _, noise)| (c, sd * noise)).collect() } else { Vec::new() }
+        self.stored.live.iter().copied().zip(self.stored.drifts.iter().copied()).collect()
     }
 
     /// Course of the drift; `None` where the presses do not tell a drift.
@@ -403,7 +435,16 @@ impl ForceLinearLocator {
         Some([places().min_by(by_noise)?, places().max_by(by_noise)?])
     }
 
-    /// The structure that was asked for; what was found is its [`response`](Self::response).
+    /// The structure that was fitted.
+    pub fn structure(&self) -> Structure {
+        match (&self.stored.saturation, self.response() == 1.0) {
+            (Some(_), _) => Structure::ForceSaturating,
+            (None, true) => Structure::ForceLinear,
+            (None, false) => Structure::ForceMonotone,
+        }
+    }
+
+    /// The structure that was asked for.
     pub fn asked_structure(&self) -> Structure {
         self.stored.structure
     }
@@ -664,11 +705,17 @@ impl ForceLinearLocator {
         Directions { length: 0.5 * boundary, area }
     }
 
-    /// The reading less the offsets, over the noise.
+    /// The reading less the offsets, linearized, over the noise.
     pub(super) fn relative(&self, reading: &[f64]) -> Vec<f64> {
         let Tables { offsets, noise_sd, .. } = &self.stored.functions;
-        let channels = self.stored.live.iter().zip(offsets).zip(noise_sd);
-        channels.map(|((c, offset), noise)| (reading[*c] - offset) / noise).collect()
+        let deviations = self.stored.live.iter().zip(offsets).map(|(c, offset)| reading[*c] - offset);
+        let relative = deviations.enumerate().zip(noise_sd);
+        match &self.stored.saturation {
+            None => relative.map(|((_, deviation), noise)| deviation / noise).collect(),
+            Some(saturation) => {
+                relative.map(|((c, deviation), noise)| saturation.linearized(c, deviation) / noise).collect()
+            }
+        }
     }
 
     /// Variance of the noise: where it was learnt from few readings it may be larger than it seems, as that of Student's t is.

@@ -20,6 +20,7 @@ mod posterior;
 mod presses;
 mod prior;
 mod residuals;
+mod saturation;
 mod scan;
 mod seen;
 mod shared_errors;
@@ -63,6 +64,9 @@ pub(crate) const fn most_nodes(extent: Extent) -> usize {
 /// Learns the influence functions and offsets of a surface without a model; `None` where the presses do not tell them apart, as
 /// they have no forces or all the same one, and unless the structure is force-linear by demand, where they speak against it.
 pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLinearLocator>, MeasuredError> {
+    if structure == Structure::ForceSaturating {
+        return saturation::fit(task);
+    }
     let Some(locator) = fit_condensed(task, structure, MOST_PRESSES)? else { return Ok(None) };
     Ok(Some(match left_out::factor(task, structure, locator.presses())? {
         Some(factor) => locator.with_likelihood_divided_by(factor, task.recording),
@@ -128,6 +132,8 @@ fn fit_condensed(
         noise_freedom: presses.noise_freedom(),
         false_alarm_rate: FalseAlarmRate::DEFAULT,
         channels_as_one: channels_as_one(presses),
+        drifts: learnt.drifts()?,
+        saturation: None,
     }
     .into_locator();
     locator.limit_residuals(recording);

@@ -320,7 +320,7 @@ fn rounding_variance(values: &[f64]) -> f64 {
 }
 
 /// The time of each row as a share of the recording's; by the rows' order where it has no times.
-fn relative_times(recording: &Recording) -> Vec<f64> {
+pub(super) fn relative_times(recording: &Recording) -> Vec<f64> {
     let times = recording.times_or_order();
     shares(&times, &times)
 }

@@ -35,6 +35,7 @@ mod few;
 mod force_range;
 mod noise;
 mod one_weight;
+mod saturating;
 mod scatter;
 
 const STRIP_M: f64 = 0.3;

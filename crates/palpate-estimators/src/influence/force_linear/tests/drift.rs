@@ -154,7 +154,10 @@ fn drift_is_found_where_there_is_any() {
         let locator = bench.fit(Structure::Auto).unwrap();
         let drifts = locator.drifts();
         assert_eq!(drifts.len(), GAUGES);
-        assert!(drifts.iter().all(|(_, counts)| (2.0..60.0).contains(counts)), "{drifts:?}");
+        // The estimate at the first row, as at the last, errs by several counts.
+        for ((_, counts), end) in drifts.iter().zip(&ends) {
+            assert!((counts - end).abs() < 12.0, "{drifts:?} {ends:?}");
+        }
         for ((c, offset, _), end) in locator.channels().zip(&ends) {
             assert!((offset - bench.offsets[c] - end).abs() < 6.0, "gauge {c}: {offset}");
         }
