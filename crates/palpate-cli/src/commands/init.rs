@@ -1,6 +1,6 @@
 //! `palpate init`: a first rig for an existing recording.
 
-use super::sample_benches::{self, SampleBench};
+use super::sample_benches::{self, Request, SampleBench};
 use crate::failure::{Complaint, Failure};
 use crate::json::object;
 use crate::remark::remark;
@@ -32,7 +32,7 @@ Examples:
 pub struct Arguments {
     /// Recording: positions, channels, and forces if they were measured; with --example the folder to write into
     #[arg(value_name = "RECORDING|DIR")]
-    pub(super) recording: PathBuf,
+    recording: PathBuf,
     /// Write the rig to RIG.toml [default: stdout]
     #[arg(short, long, value_name = "RIG.toml", group = "written")]
     out: Option<PathBuf>,
@@ -43,7 +43,7 @@ pub struct Arguments {
     example: Option<SampleBench>,
     /// Overwrite existing files
     #[arg(long, requires = "written")]
-    pub(super) overwrite: bool,
+    overwrite: bool,
     /// Column of the position on a line [default: guessed]
     #[arg(long, value_name = "COLUMN", conflicts_with_all = ["x", "y"])]
     position: Option<String>,
@@ -76,12 +76,13 @@ pub struct Arguments {
     decimal: Option<Decimal>,
     /// Print the result as JSON
     #[arg(long, requires = "written")]
-    pub(super) json: bool,
+    json: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(bench) = arguments.example {
-        return sample_benches::run(bench, arguments);
+        let Arguments { overwrite, json, .. } = *arguments;
+        return sample_benches::run(&Request { bench, folder: &arguments.recording, overwrite, json });
     }
     let out = arguments.target()?;
     let name = arguments.recording.display().to_string();

@@ -3,7 +3,6 @@
 //! `samples` holds copies of files of the project's `examples`, because a package of this crate contains its own files only; `cargo xtask
 //! tidy` compares them. Benches with a model have data of the simulation, with fixed seeds.
 
-use super::init::Arguments;
 use super::simulate::simulated_csv;
 use crate::failure::{Complaint, Failure};
 use crate::input;
@@ -27,6 +26,16 @@ pub enum SampleBench {
     Plate,
     /// Flexible finger with five strain gauges, with its model
     Finger,
+}
+
+/// Where and how a bench is written.
+pub struct Request<'a> {
+    pub bench: SampleBench,
+    pub folder: &'a Path,
+    /// True if existing files are replaced.
+    pub overwrite: bool,
+    /// True for JSON instead of text on stdout.
+    pub json: bool,
 }
 
 /// Content of the files of a bench.
@@ -132,12 +141,12 @@ impl Paths {
     }
 }
 
-/// Writes the files of a bench into the folder of the arguments, and prints the next commands.
-pub fn run(bench: SampleBench, arguments: &Arguments) -> Result<(), Failure> {
-    let folder = &arguments.recording;
+/// Writes the files of a bench, and prints the next commands.
+pub fn run(request: &Request) -> Result<(), Failure> {
+    let Request { bench, folder, overwrite, json } = *request;
     let paths = Paths::new(bench, folder);
     let written = [&paths.rig, &paths.presses, &paths.touches];
-    if let (false, Some(path)) = (arguments.overwrite, written.iter().find(|path| path.exists())) {
+    if let (false, Some(path)) = (overwrite, written.iter().find(|path| path.exists())) {
         let complaint = Complaint::new(format!("{} already exists", path.display()));
         return Err(complaint.help("name another folder, or overwrite its files by --overwrite").into());
     }
@@ -149,7 +158,7 @@ pub fn run(bench: SampleBench, arguments: &Arguments) -> Result<(), Failure> {
         target?.write(bytes)?;
     }
     let commands = bench.next_commands(&paths);
-    if arguments.json {
+    if json {
         return output::say_json(&object! {
             "palpate": env!("CARGO_PKG_VERSION"),
             "rig": paths.rig.display().to_string(),

@@ -75,7 +75,7 @@ fn every_verb_has_examples_and_every_option_a_description() {
         let is_option = |line: &str| line.starts_with("  -") || line.starts_with("      --");
         for (i, line) in lines.iter().enumerate().filter(|(_, line)| is_option(line)) {
             // The description of a long option is on the next line.
-            let text = line.trim().split_once("  ").map_or(lines[i + 1], |(_, text)| text).trim();
+            let text = line.trim().split_once("  ").map_or_else(|| lines[i + 1], |(_, text)| text).trim();
             assert!(text.starts_with(char::is_uppercase), "{verb:?}: {line}");
         }
     }
