@@ -17,7 +17,7 @@ def recording(command, examples, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("live")
     rig, locator, out = examples / "noisy-beam.toml", folder / "locator.json", folder / "press.mcap"
     command("fit", rig, "-o", locator)
-    command("record", locator, "--from", f"simulated:{rig}?rate=500", "--out", out, "--seconds", 1.5)
+    command("record", locator, "--from", f"simulated:{rig}?rate=500", "--out", out, "--duration", "1.5 s")
     return out
 
 

@@ -67,7 +67,7 @@ describe.skipIf(!hasChromium())("calibration", () => {
   afterAll(() => browser?.close());
 
   test("records no press without a touch by a hand that taps, on a board with hysteresis, creep, drift and repeated readings", async () => {
-    const faults = ["--hysteresis", "0.01", "--creep", "0.02", "--drift", "0.000005", "--repeats", "1"];
+    const faults = ["--hysteresis", "0.01", "--creep", "0.02", "--drift", "0.000005", "--repeated-readings", "1"];
     const bench = await Bench.start("noisy-beam.toml", SIX_TWICE, faults);
     const server = await started(bench);
     const { page } = await open(browser, server.url);

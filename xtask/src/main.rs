@@ -1,4 +1,4 @@
-//! The project's chores: `cargo xtask test | validate | wire | web | wheel | tidy | rig-keys | bench | fuzz`.
+//! The project's chores: `cargo xtask test | validate | wire | web | wheel | tidy | rig-keys | man | bench | fuzz`.
 #![forbid(unsafe_code)]
 
 mod counts;
@@ -50,6 +50,8 @@ enum Chore {
     Wheel,
     /// Write docs/rig-keys.md from the types that rig and study files are read into
     RigKeys,
+    /// Write the manual pages of the command into target/man
+    Man,
     /// Check the rules that a program can check: dependencies, import circles, links
     Tidy,
     /// Run the benchmarks of the whole workspace
@@ -86,6 +88,11 @@ fn main() -> ExitCode {
         Chore::Web => dashboard::build(&root),
         Chore::Wheel => python::wheel(&root),
         Chore::RigKeys => rig_keys::run(&root),
+        Chore::Man => {
+            let mut man = Command::new("cargo");
+            man.args(["run", "--quiet", "--package", "palpate-cli", "--", "man", "--out", "target/man"]);
+            run::shown(man.current_dir(&root))
+        }
         Chore::Tidy => tidy::run(&root),
         Chore::Bench { for_cargo, for_benches } => {
             let mut bench = Command::new("cargo");

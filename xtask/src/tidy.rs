@@ -10,6 +10,7 @@ mod links;
 mod places;
 mod project;
 mod rust_text;
+mod samples;
 mod unfinished;
 mod used_paths;
 
@@ -36,7 +37,7 @@ impl Finding {
 
 type Rule = fn(&Project) -> Vec<Finding>;
 
-const RULES: [(&str, Rule); 7] = [
+const RULES: [(&str, Rule); 8] = [
     ("crates depend one way", crates::findings),
     ("no import circle between sibling files", circles::findings),
     ("documents name what exists", links::findings),
@@ -44,6 +45,7 @@ const RULES: [(&str, Rule); 7] = [
     ("nothing unfinished", unfinished::findings),
     ("text files only", binary::findings),
     ("the changelog knows the version", changelog::findings),
+    ("samples are the examples", samples::findings),
 ];
 
 /// Checks every rule and prints what breaks one; true when none is broken.

@@ -7,10 +7,10 @@ use palpate_estimators::estimator::{Estimator, FitCost, MemoryLimit, Size};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 
-/// The limit of memory of commands whose work may need much.
+/// The memory limit of commands whose work may need much.
 #[derive(clap::Args)]
 pub struct MemoryOption {
-    /// Refuse work that is estimated to need more memory than this
+    /// Refuse work with a larger estimate of memory than this, such as "2 GB"
     #[arg(long, value_name = "SIZE")]
     memory_limit: Option<MemoryLimit>,
 }

@@ -1,7 +1,7 @@
 //! Failure of a command: a message with its place, and an exit code.
 
 use crate::progress;
-use crate::remark::remark;
+use crate::remark::{alert, remark};
 use miette::{
     Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents,
 };
@@ -50,7 +50,7 @@ impl Failure {
     pub fn report(self) -> ExitCode {
         let (message, code) = match self {
             Self::BadInput(complaint) => {
-                remark!("{:?}", miette::Report::new(*complaint));
+                alert!("{:?}", miette::Report::new(*complaint));
                 return ExitCode::from(2);
             }
             Self::NobodyReads => return ExitCode::SUCCESS,
@@ -58,7 +58,7 @@ impl Failure {
             Self::DataLost(message) => (message, 3),
             Self::Interrupted(message) => (message, progress::interrupted_code()),
         };
-        remark!("palpate: {message}");
+        alert!("palpate: {message}");
         ExitCode::from(code)
     }
 }
@@ -176,7 +176,8 @@ impl SourceCode for Excerpt {
 
 /// Draws complaints in colour on a terminal and in plain characters elsewhere.
 pub fn install_handler() {
-    let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let no_colour = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    let colour = std::io::stderr().is_terminal() && !no_colour;
     let installed = miette::set_hook(Box::new(move |_| {
         Box::new(miette::MietteHandlerOpts::new().color(colour).terminal_links(false).width(100).build())
     }));

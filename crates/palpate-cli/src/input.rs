@@ -83,10 +83,10 @@ impl RigOrLocator {
 /// A recording: one file, or readings and contacts apart.
 #[derive(clap::Args)]
 pub struct RecordingFiles {
-    /// A recording [default: simulations, where the rig has a model]
+    /// Recording of readings with their contacts [default: a simulation, if the rig has a model]
     #[arg(long, value_name = "FILE.csv")]
     pub data: Option<PathBuf>,
-    /// The recording's contacts, where --data has the readings alone; row by row
+    /// Contacts of the recording, row by row, if --data contains readings only
     #[arg(long, value_name = "FILE.csv", requires = "data")]
     pub contacts: Option<PathBuf>,
 }

@@ -5,7 +5,7 @@ use crate::failure::{Complaint, Failure};
 use crate::input;
 use crate::json::object;
 use crate::output;
-use crate::remark::remark;
+use crate::remark::{alert, remark};
 use palpate_estimators::recording::{
     Column, Columns, CsvError, Dialect, Header, LineParser, ReadingParser, TextDecoder,
 };
@@ -125,9 +125,9 @@ impl Lines {
             None => (None, error.to_string(), format!("{}:{}: {error}", self.name(), self.count)),
         };
         if self.lost <= MOST_SKIPS {
-            remark!("palpate: skipped: {words}");
+            alert!("palpate: skipped: {words}");
         } else if self.lost == MOST_SKIPS + 1 {
-            remark!("palpate: skipped: further lines, which are counted at the end");
+            alert!("palpate: skipped: further lines, which are counted at the end");
         }
         if self.records == Records::None {
             return Ok(());

@@ -3,9 +3,8 @@
 //! ```console
 //! $ palpate fit examples/paper.toml -o locator.json
 //! $ palpate simulate examples/paper.toml --every "1 mm" -o presses.csv
-//! $ palpate evaluate locator.json --data presses.csv --out report
+//! $ palpate evaluate locator.json --data presses.csv --report report
 //! ```
-#![forbid(unsafe_code)]
 // These macros panic if the output is closed; `remark` and `output` have replacements.
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
@@ -23,22 +22,44 @@ mod progress;
 mod remark;
 mod rules;
 mod session;
+mod stdout;
 mod tables;
 mod tare;
 mod target;
 
-use crate::remark::remark;
-use clap::{Parser, Subcommand};
+use crate::remark::alert;
+use clap::{CommandFactory, Parser, Subcommand};
 use palpate_live::login::without_passwords;
 use std::io::Write;
 use std::process::ExitCode;
 
-/// Turns an elastic surface with a few sensors into a calibrated contact locator.
-///
-/// Exit codes: 0 done; 1 ran, but a stated goal was missed; 2 bad input; 3 finished with data lost; 130 interrupted by Ctrl-C; 143 ended by SIGTERM, 129 by SIGHUP, 131 by SIGQUIT.
+/// Examples and exit codes in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Write a first rig for a recording of presses
+  palpate init presses.csv -o rig.toml
+
+  # Fit a locator, and locate readings
+  palpate fit rig.toml --data presses.csv -o locator.json
+  palpate locate locator.json touches.csv
+
+Exit codes:
+  0    Done
+  1    Ran, but a stated goal was missed
+  2    Bad input, or an output that cannot be written
+  3    Finished with data lost
+  129  Ended by SIGHUP
+  130  Interrupted by Ctrl-C
+  131  Ended by SIGQUIT
+  143  Ended by SIGTERM";
+
+/// Turn an elastic surface with a few sensors into a calibrated contact locator
 #[derive(Parser)]
-#[command(name = "palpate", version, max_term_width = 100)]
+#[command(name = "palpate", version, max_term_width = 100, after_long_help = EXAMPLES)]
 struct Arguments {
+    /// Omit progress, notes and warnings; print errors only on stderr
+    #[arg(short, long, global = true, help_heading = "Global options")]
+    quiet: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -63,6 +84,9 @@ enum Command {
     Recover(commands::recover::Arguments),
     Replay(commands::replay::Arguments),
     SimulatedBoard(commands::simulated_board::Arguments),
+    Completions(commands::completions::Arguments),
+    #[command(hide = true)]
+    Man(commands::man::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -72,6 +96,9 @@ fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return answer(&error),
     };
+    if arguments.quiet {
+        remark::be_quiet();
+    }
     let result = match arguments.command {
         Command::Study(arguments) => commands::study::run(&arguments),
         Command::Init(arguments) => commands::init::run(&arguments),
@@ -91,6 +118,8 @@ fn main() -> ExitCode {
         Command::Recover(arguments) => commands::recover::run(&arguments),
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::SimulatedBoard(arguments) => commands::simulated_board::run(&arguments),
+        Command::Completions(arguments) => commands::completions::run(&arguments, Arguments::command()),
+        Command::Man(arguments) => commands::man::run(&arguments, Arguments::command()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -102,10 +131,13 @@ fn main() -> ExitCode {
 fn answer(error: &clap::Error) -> ExitCode {
     let text = error.to_string();
     let shown = without_passwords(&text);
+    if !error.use_stderr() && stdout::was_closed() {
+        return output::closed().report();
+    }
     let printed = match shown == text {
         true => error.print().and_then(|()| std::io::stdout().flush()),
         false => {
-            remark!("{}", shown.trim_end());
+            alert!("{}", shown.trim_end());
             Ok(())
         }
     };

@@ -1,6 +1,7 @@
 //! Output of a command on stdout: lines, JSON and tables.
 
 use crate::failure::{Complaint, Failure};
+use crate::stdout;
 use comfy_table::{CellAlignment, presets};
 use palpate_mechanics::units::format_count;
 use std::fmt::Display;
@@ -37,6 +38,9 @@ pub fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
 
 /// Writes to stdout or its replacement; a closed reader is not an error of ours.
 pub fn print(out: &mut impl Write, bytes: &[u8]) -> Result<(), Failure> {
+    if stdout::was_closed() {
+        return Err(closed());
+    }
     out.write_all(bytes).map_err(|error| unprinted(&error))
 }
 
@@ -51,6 +55,11 @@ pub fn unprinted(error: &std::io::Error) -> Failure {
         ErrorKind::BrokenPipe => Failure::NobodyReads,
         _ => Complaint::new(format!("cannot write to stdout: {error}")).into(),
     }
+}
+
+/// The failure of a write to a stdout that was closed at the start.
+pub fn closed() -> Failure {
+    Complaint::new("cannot write to stdout: it is closed").into()
 }
 
 /// A text table, made column by column; the columns after the first are aligned to the right.

@@ -1,6 +1,6 @@
 //! Progress of long work: a bar with rate and remaining time on a terminal, no output in a pipe; and Ctrl-C, which stops the work.
 
-use crate::remark::remark;
+use crate::remark::{alert, is_quiet};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_numerics::watch::{Progress, Watch};
 use std::error::Error;
@@ -21,7 +21,7 @@ const INTERRUPT: usize = 2;
 /// ended: all files that palpate writes are complete at any time. See [`finish_after_signal`] for work that must not be cut off.
 pub fn install_signal_handler() {
     if let Err(error) = begin_to_listen() {
-        remark!("Ctrl-C will end palpate at once: {error}");
+        alert!("Ctrl-C will end palpate at once: {error}");
     }
 }
 
@@ -59,7 +59,7 @@ fn begin_to_listen() -> Result<(), Box<dyn Error>> {
         if signals.next().is_some() {
             std::thread::sleep(PATIENCE);
             if FINISHES.load(Ordering::Relaxed) {
-                remark!("palpate: finishing; press Ctrl-C again to end at once");
+                alert!("palpate: finishing; press Ctrl-C again to end at once");
                 signals.next();
             }
             end();
@@ -74,7 +74,7 @@ fn begin_to_listen() -> Result<(), Box<dyn Error>> {
         let is_first = SIGNAL.swap(INTERRUPT, Ordering::Relaxed) == 0;
         std::thread::sleep(PATIENCE);
         if is_first && FINISHES.load(Ordering::Relaxed) {
-            return remark!("palpate: finishing; press Ctrl-C again to end at once");
+            return alert!("palpate: finishing; press Ctrl-C again to end at once");
         }
         end();
     })?)
@@ -102,7 +102,7 @@ pub fn finish_after_signal() {
 
 /// Ends the process if the work does not end.
 fn end() {
-    remark!("palpate: stopped");
+    alert!("palpate: stopped");
     std::process::exit(interrupted_code().into());
 }
 
@@ -126,7 +126,7 @@ const OF_ANY_LENGTH: &str = "{msg} {spinner} {prefix} {elapsed} so far";
 
 /// A bar of `length` steps on stderr; 0 for an unknown length.
 pub fn bar(length: u64, what: &str) -> ProgressBar {
-    let bar = ProgressBar::new(length);
+    let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new(length) };
     set_template(&bar, if length == 0 { OF_ANY_LENGTH } else { OF_LENGTH });
     bar.set_message(what.to_owned());
     bar.enable_steady_tick(Duration::from_millis(250));

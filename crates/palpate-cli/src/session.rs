@@ -8,22 +8,22 @@ use palpate_live::session::{CreepConfig, Estimation, Session, SessionConfig};
 use palpate_live::source::SourceUrl;
 use std::path::Path;
 
-/// How the session comes from readings to estimates.
+/// Options of a session: the way from readings to estimates.
 #[derive(clap::Args)]
 pub struct SessionOptions {
-    /// Filter the readings by a low-pass of the first order before they are located, with this cut-off, as in `--low-pass "20 Hz"`
+    /// Filter the readings by a first-order low-pass with this cut-off frequency, such as "20 Hz"
     #[arg(long, value_name = "FREQUENCY", value_parser = input::frequency, conflicts_with = "track")]
     low_pass: Option<f64>,
-    /// Follow contacts from reading to reading by the tracker of `palpate track`, instead of locating each reading by itself
+    /// Track contacts over successive readings, as `palpate track` [default: locate each reading separately]
     #[arg(long)]
     track: bool,
-    /// The first natural frequency of a beam on two simple supports: the tracker reckons with its inertia, and 1 % of the critical damping
+    /// First natural frequency of a simply supported beam, such as "12 Hz", to model its inertia with 1 % of the critical damping [default: no inertia]
     #[arg(long, value_name = "FREQUENCY", value_parser = input::frequency, requires = "track")]
     frequency: Option<f64>,
-    /// The creep of a soft surface, which the tracker takes off: how much a reading that is held for long grows, as a share of a fresh press
+    /// Correct the creep of a soft surface: its share of the first reading of a constant contact, from 0 to 1
     #[arg(long, value_name = "SHARE", value_parser = input::share, requires_all = ["track", "creep_time"])]
     creep: Option<f64>,
-    /// The time in which all but an e-th of the creep has come, as in `--creep-time "30 s"`
+    /// Time constant of the creep, such as "30 s"
     #[arg(long, value_name = "TIME", value_parser = input::time, requires = "creep")]
     creep_time: Option<f64>,
 }

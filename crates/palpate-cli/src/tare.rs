@@ -18,9 +18,10 @@ use std::str::FromStr;
 /// Source of the baseline.
 #[derive(clap::Args)]
 pub struct TareOption {
-    /// Take the untouched reading of today from the first N readings, from those of a time such as "2 s", from a FILE of untouched readings,
-    /// find and follow it (`auto`), or find the latest one (`last`). `N,auto` and "2 s,auto" take the first and follow from there. Every
-    /// reading is brought to the untouched reading of the calibration
+    /// Tare the readings: correct offsets that have changed since the calibration
+    ///
+    /// The baseline is the mean of the first N readings, of those of a time such as "2 s", or of a FILE of untouched readings. `auto` detects untouched
+    /// readings and updates the baseline with each; `last` takes the latest one. `N,auto` and "2 s,auto" begin with the first readings and continue so.
     #[arg(long, value_name = "N|TIME|FILE|auto|last|N,auto")]
     pub tare: Option<Source>,
 }

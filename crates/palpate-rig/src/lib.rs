@@ -64,7 +64,7 @@ mod training;
 mod values;
 
 pub use error::{RigError, RigProblem};
-pub use first_rig::{FirstRig, FirstRigError, Hints};
+pub use first_rig::{FirstRig, FirstRigError, Hints, shell_word};
 pub use rig::{Rig, RigSimulationError};
 pub use sections::RigSections;
 pub use stage::Stage;

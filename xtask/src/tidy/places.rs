@@ -7,8 +7,19 @@ use super::project::{File, Project};
 /// path is somebody's own.
 const EVERYWHERE: [&str; 6] = ["api", "dev", "etc", "palpate", "proc", "usr"];
 
-/// Hosts that readers are sent to, or that name a format. Packages are named, not their registries.
-const HOSTS: [&str; 5] = ["127.0.0.1", "doi.org", "example.org", "www.apache.org", "www.w3.org"];
+/// Hosts that readers are sent to, that name a format or a licence, or that have public recordings. Packages are named, not their
+/// registries.
+const HOSTS: [&str; 9] = [
+    "127.0.0.1",
+    "creativecommons.org",
+    "doi.org",
+    "example.org",
+    "github.com",
+    "raw.githubusercontent.com",
+    "schemas.openxmlformats.org",
+    "www.apache.org",
+    "www.w3.org",
+];
 
 /// Files that package managers write, which name the registries they use.
 const LOCKS: [&str; 3] = ["Cargo.lock", "package-lock.json", "uv.lock"];

@@ -3,8 +3,9 @@
 use super::jog::{Jog, JogEnd};
 use super::operator::{self, place};
 use crate::failure::{Complaint, Failure};
+use crate::json::object;
 use crate::progress::{self, Observer};
-use crate::remark::remark;
+use crate::remark::{alert, remark};
 use crate::target::{Inputs, Target};
 use crate::{input, output};
 use palpate_estimators::description;
@@ -24,53 +25,69 @@ use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_length_mm;
 use palpate_numerics::watch::Cancelled;
 use palpate_rig::{Rig, Stage};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel, sync_channel};
 use std::time::Duration;
 
-/// Calibrate by guided presses: each is taken once its reading is at rest, and the fit ends with a locator.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Calibrate a board at a serial port
+  palpate calibrate beam.toml --from serial:///dev/ttyACM0 --presses pressed.csv -o b.json
+
+  # Continue later with the remaining presses
+  palpate calibrate beam.toml --from serial:///dev/ttyACM0 --presses pressed.csv -o b.json --resume";
+
+/// Calibrate a board by guided presses, and write a locator
 ///
-/// Positions and repeats are those of the rig's [training]. Every press is in the file of presses before the next one is asked for, and --resume
-/// goes on from there. A person is asked first how well he meets the places, and for a second weight where one is too few. Between presses the surface is let go, and what it reads then is recorded too: offsets and drift follow from it.
-/// With --stage a machine presses by itself, with the positions and depths of the rig's [stage]: Enter or Ctrl-C stops it at once.
+/// Positions and repeats are those of the rig's [training]. A press is recorded once its reading is at rest, and is on disk before the next is
+/// requested. Between presses the untouched surface is recorded, for offsets and drift. A person is asked for the accuracy of the placement, and for
+/// a second weight if one is too few. With --stage a machine presses at the positions and depths of the rig's [stage]; Enter or Ctrl-C stops it
+/// at once.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The rig file
+    /// Rig file
     rig: PathBuf,
-    /// Source of the readings: `serial:///dev/ttyACM0`, `tcp://host:port`, `udp://:port`, `mqtt://host/topic`, `file:recording.mcap`, `-` for stdin
+    /// Source of the readings: `serial:///dev/ttyACM0?baud=115200`, `tcp://host:port`, `udp://:port`, `mqtt://host/topic`,
+    /// `file:recording.mcap?speed=1`, `simulated:RIG.toml?rate=100`, or `-` for stdin
     #[arg(long, value_name = "SOURCE")]
     from: SourceUrl,
-    /// A machine that presses: `gcode:serial:///dev/ttyUSB0?baud=115200` or `gcode:tcp://host:port`, of Marlin or GRBL firmware
+    /// Press by a machine with Marlin or GRBL firmware: `gcode:serial:///dev/ttyUSB0?baud=115200` or `gcode:tcp://host:port`
     #[arg(long, value_name = "MACHINE")]
     stage: Option<StageUrl>,
-    /// The recording of the presses
+    /// Write the presses to FILE.csv
     #[arg(long, value_name = "FILE.csv")]
     presses: PathBuf,
-    /// The locator to write
+    /// Write the locator to this file
     #[arg(short, long, value_name = "LOCATOR")]
     out: PathBuf,
-    /// Force of every press, as in `--force "2 N"` [default: the rig's, or unknown]
+    /// Force of every press, such as "2 N" [default: that of the rig, or unknown]
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     force: Option<f64>,
-    /// Travel to every position at the height of travel without a press; no file is read or written but the rig
+    /// Move the machine over every position without a press, and write no file
     #[arg(long, requires = "stage")]
     dry_run: bool,
     #[command(flatten)]
     operator: OperatorOptions,
-    /// Jog the machine by hand before the presses, and find the height at which its finger touches
+    /// Jog the machine by keys before the presses, and find the height of contact
     #[arg(long, requires = "stage", conflicts_with = "dry_run")]
     jog: bool,
-    /// Check the locator by presses at five fresh places after the fit
+    /// Check the locator after the fit by presses at five other positions
     #[arg(long)]
     check: bool,
-    /// Go on with the presses that the file of presses has
+    /// Continue an existing file of presses
     #[arg(long)]
     resume: bool,
     /// Seed of the fit
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Run the clock so many times as fast, for a simulated board and machine of the same --clock-speed
+    /// Print the result as a line of JSON, and that of a check as another
+    #[arg(long)]
+    json: bool,
+    /// Speed up the clock, as that of a simulated board and machine
     #[arg(long, value_name = "N", default_value_t = 1, hide = true, value_parser = input::clock_speed())]
     clock_speed: u32,
 }
@@ -78,15 +95,15 @@ pub struct Arguments {
 /// Statements of the person who presses.
 #[derive(clap::Args)]
 pub struct OperatorOptions {
-    /// How far off the asked place a person presses, as a standard deviation: `--placement "2 mm"` [default: the rig's, or asked for]
+    /// Standard deviation of the pressed from the requested position, such as "2 mm" [default: that of the rig, or asked for]
     #[arg(long, value_name = "LENGTH", value_parser = input::length)]
     placement: Option<f64>,
-    /// A second weight, by which every other place is pressed too [default: asked for where one weight is too few]
-    #[arg(long, value_name = "FORCE", value_parser = input::force, conflicts_with_all = ["force_is_known", "stage"])]
+    /// Press every other position also with a second weight, such as "4 N" [default: asked for if one weight is too few]
+    #[arg(long, value_name = "FORCE", value_parser = input::force, conflicts_with_all = ["known_force", "stage"])]
     second_force: Option<f64>,
-    /// Contacts in use have the force of the presses
+    /// Assume that contacts in use have the force of the presses
     #[arg(long)]
-    force_is_known: bool,
+    known_force: bool,
 }
 
 impl OperatorOptions {
@@ -95,7 +112,7 @@ impl OperatorOptions {
         match self.statements() {
             Statements { placement_sd_m: Some(_), .. } => Some("--placement"),
             Statements { second_force_n: Some(_), .. } => Some("--second-force"),
-            Statements { force_is_known: true, .. } => Some("--force-is-known"),
+            Statements { force_is_known: true, .. } => Some("--known-force"),
             _ => None,
         }
     }
@@ -105,7 +122,7 @@ impl OperatorOptions {
         Statements {
             placement_sd_m: self.placement,
             second_force_n: self.second_force,
-            force_is_known: self.force_is_known,
+            force_is_known: self.known_force,
         }
     }
 }
@@ -155,12 +172,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let bench = Bench { arguments, rig: &rig, keys: keys.as_ref(), clock };
     if let Some(press) = plan.first() {
         if let Some(force_n) = statements.single_weight_n(&rig, arguments.force).filter(|_| is_by_hand) {
-            remark!("{}", operator::single_weight(force_n));
+            alert!("{}", operator::single_weight(force_n));
         }
         let journal = Journal::new(&rig.setup, &arguments.presses, comment.clone(), before, depths)
             .map_err(|error| about_journal(&arguments.rig, &error))?;
         let extent = rig.setup.surface().extent();
-        remark!("{} presses to go; the first at {}", plan.len(), place(*press, extent));
+        alert!("{} presses to go; the first at {}", plan.len(), place(*press, extent));
         let calibration = bench.calibration(stage.as_ref(), plan, journal)?;
         let replan = |rows: &[Row]| to_come(&statements, rows);
         bench.press_all(stage.clone(), calibration, Some(&replan))?;
@@ -328,15 +345,18 @@ impl Bench<'_> {
         let depths = DepthKnowledge::for_stage(stage.as_ref());
         let journal = Journal::new(&rig.setup, &path, comment, Vec::new(), depths)
             .map_err(|error| about_journal(&arguments.rig, &error))?;
-        remark!("check at {} fresh places; the presses are in {}", plan.len(), path.display());
+        alert!("check at {} fresh places; the presses are in {}", plan.len(), path.display());
         let calibration = self.calibration(stage.as_ref(), plan, journal)?;
         self.press_all(stage, calibration, None)?;
         if !path.exists() {
-            remark!("no place was checked");
+            alert!("no place was checked");
             return Ok(());
         }
         let recording = input::read_recording(&rig.setup, &path)?;
         let check = Check::new(locator, &recording).map_err(Complaint::new)?;
+        if let (true, Some(check)) = (arguments.json, &check) {
+            return output::say_json_line(&object! { "check": operator::check_json(check) });
+        }
         operator::say_check(check.as_ref(), placement_sd_m, rig.setup.surface().extent())
     }
 
@@ -352,7 +372,7 @@ impl Bench<'_> {
         let mut machine = machine(arguments, stage, *clock)?;
         let extent = rig.setup.surface().extent();
         if machine.is_none() {
-            remark!("{}", help(replan.is_some()));
+            alert!("{}", help(replan.is_some()));
             operator::ask_for(&calibration, extent);
         }
         let mut ended = false;
@@ -386,7 +406,7 @@ impl Bench<'_> {
             }
         }
         for (cause, count) in calibration.bad_frames() {
-            remark!("{count} frames were no reading: {}", cause.describe());
+            alert!("{count} frames were no reading: {}", cause.describe());
         }
         if calibration.guide().waiting() != Waiting::Nothing {
             if let Some(machine) = machine {
@@ -431,7 +451,7 @@ fn open_stage(url: &StageUrl, stage: Stage, clock: HostClock) -> Result<StageThr
         let error = MachineError::from(error);
         Complaint::new(format!("--stage {url}: {error}")).help(error.help()).into()
     })?;
-    remark!(
+    alert!(
         "a machine of {} firmware at {url}; Enter stops it: {}",
         thread.firmware().name(),
         thread.stopping()
@@ -448,17 +468,20 @@ fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage, clock: HostClock) -> 
     let positions = calibration::dry_run(&plan);
     let keys = keys();
     let mut thread = open_stage(url, stage, clock)?;
-    remark!("the machine looks for its end stops");
+    alert!("the machine looks for its end stops");
     let orders = std::iter::once(Order::Home).chain(positions.iter().copied().map(Order::Travel));
     for order in orders {
         thread.order(order);
         wait_for(&mut thread, &keys)?;
         if let Order::Travel(position) = order {
             let press = Press { position, force_n: None, depth_m: None };
-            remark!("above {}", place(press, rig.setup.surface().extent()));
+            alert!("above {}", place(press, rig.setup.surface().extent()));
         }
     }
     thread.close();
+    if arguments.json {
+        return output::say_json_line(&object! { "dry_run_positions": positions.len() });
+    }
     output::say(format!(
         "dry run: {} positions reached at the height of travel, none pressed",
         positions.len()
@@ -494,10 +517,10 @@ fn step(
     }
     machine.heed(notes)?;
     match machine.step(now, calibration)? {
-        Some(MachineNote::Homing) => remark!("the machine looks for its end stops"),
-        Some(MachineNote::Unseen) => remark!("left out: a press that no reading showed"),
-        Some(MachineNote::NoRest) => remark!("left out: a press whose reading did not come to rest"),
-        Some(MachineNote::SetUp(note)) => remark!("{note}"),
+        Some(MachineNote::Homing) => alert!("the machine looks for its end stops"),
+        Some(MachineNote::Unseen) => alert!("left out: a press that no reading showed"),
+        Some(MachineNote::NoRest) => alert!("left out: a press whose reading did not come to rest"),
+        Some(MachineNote::SetUp(note)) => alert!("{note}"),
         None => {}
     }
     Ok(())
@@ -563,7 +586,7 @@ fn press_key(
     match (key.trim(), replan) {
         ("r", _) => {
             if !calibration.redo().map_err(|error| about(&error))? {
-                remark!("nothing was pressed yet");
+                alert!("nothing was pressed yet");
             }
         }
         ("s", _) => calibration.skip(),
@@ -579,12 +602,12 @@ fn press_key(
             if is_struck {
                 let to_come = replan(calibration.journal().rows())?;
                 calibration.replan(to_come);
-                remark!("struck out; it is asked for again");
+                alert!("struck out; it is asked for again");
             } else {
-                remark!("no such press; l lists them");
+                alert!("no such press; l lists them");
             }
         }
-        (_, replan) => remark!("{}", help(replan.is_some())),
+        (_, replan) => alert!("{}", help(replan.is_some())),
     }
     operator::ask_for(calibration, extent);
     Ok(())
@@ -631,12 +654,19 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Re
         observer.watch(|watch| rig.estimator.fit_task(task.watch(watch))).map_err(|error| failed(&error))?;
     out.write(locator.to_json().map_err(Complaint::new)?.as_bytes())?;
     let presses = recording.touched().rows.len();
+    let assess = || {
+        let assessment = observer.watch(|watch| Assessment::new(rig, &recording, arguments.seed, watch));
+        assessment
+            .map_err(|Cancelled| Failure::Interrupted("stopped before its error was estimated".to_owned()))
+    };
+    if arguments.json {
+        output::say_json_line(&result(arguments, &locator, presses, &assess()?))?;
+        return Ok((locator, recording));
+    }
     output::say(format!("{} fitted to {presses} presses: {}", locator.kind(), arguments.out.display()))?;
     let checked = description::interval_check(locator.interval_check.as_ref());
     checked.into_iter().try_for_each(output::say)?;
-    let assessment = observer
-        .watch(|watch| Assessment::new(rig, &recording, arguments.seed, watch))
-        .map_err(|Cancelled| Failure::Interrupted("stopped before its error was estimated".to_owned()))?;
+    let assessment = assess()?;
     if let Some(held_out) = assessment.held_out {
         let (median, mean) = (format_length_mm(held_out.median_m), format_length_mm(held_out.mean_m));
         let folds = held_out.folds;
@@ -656,4 +686,36 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Re
         None => {}
     }
     Ok((locator, recording))
+}
+
+/// JSON of a finished calibration.
+fn result(
+    arguments: &Arguments,
+    locator: &Locator,
+    presses: usize,
+    assessment: &Assessment,
+) -> impl Serialize + use<> {
+    let held_out = assessment.held_out.as_ref().map(|held_out| {
+        object! {
+            "folds": held_out.folds,
+            "median_mm": held_out.median_m * 1e3,
+            "mean_mm": held_out.mean_m * 1e3,
+        }
+    });
+    let gain = assessment
+        .gain
+        .as_ref()
+        .map(|gain| object! { "percent": gain.percent, "stop_below_percent": gain.stop_percent });
+    object! {
+        "palpate": env!("CARGO_PKG_VERSION"),
+        "locator": arguments.out.display().to_string(),
+        "recording": arguments.presses.display().to_string(),
+        "estimator": locator.kind(),
+        "seed": arguments.seed,
+        "presses": presses,
+        "interval_check": locator.interval_check,
+        "held_out": held_out,
+        "gain_of_more_presses": gain,
+        "remarks": assessment.remarks.clone(),
+    }
 }

@@ -24,36 +24,48 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Every estimator on the same folds of a recording (or on simulated calibrations), against what physics allows.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Compare two estimators on a recording
+  palpate compare beam.toml --data presses.csv --only influence --only neighbours
+
+  # Compare two estimators on one simulated calibration, and write a report
+  palpate compare beam.toml --only influence --only centroid --calibrations 1 --report comparison";
+
+/// Compare estimators on the same data, and with the physical limit
+///
+/// Every estimator that suits the rig is cross-validated on a recording, or without --data on simulated calibrations.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The rig file
+    /// Rig file
     rig: PathBuf,
     #[command(flatten)]
     files: RecordingFiles,
-    /// Folds of the cross-validation
+    /// Number of folds of the cross-validation; positions are held out as a whole
     #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=10_000))]
     folds: u16,
-    /// Simulated calibrations, where there is no recording
+    /// Number of simulated calibrations, without --data
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     calibrations: u16,
-    /// Only these kinds of estimators; may be repeated
+    /// Compare this kind of estimator only; may be repeated [default: all kinds]
     #[arg(long, value_name = "KIND")]
     only: Vec<String>,
-    /// An error up to this is good enough for the effective length or area
+    /// Largest error that counts towards the effective length or area
     #[arg(long, value_name = "LENGTH", default_value = "2 mm", value_parser = input::length)]
     tolerance: f64,
-    /// Seed of simulation and fits
+    /// Seed of simulations and fits
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
     tare: TareOption,
-    /// Folder for a report, with `errors.csv`, the errors of each position, and `trials.csv`, those of each trial
+    /// Write a report into DIR: report.html, its figures, errors.csv with the errors at each position, and trials.csv with those of each trial
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    report: Option<PathBuf>,
     #[command(flatten)]
     memory: MemoryOption,
-    /// Print the comparison as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
@@ -64,17 +76,18 @@ type LeftOut = (&'static str, String);
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.tare.check_recorded(&arguments.files)?;
     let inputs = Inputs::new(arguments.files.paths().chain([arguments.rig.as_path()]));
-    let out = arguments.out.as_ref().map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
+    let folder = arguments.report.as_ref();
+    let folder = folder.map(|folder| TargetFolder::for_report(folder, &inputs)).transpose()?;
     let rig = input::read_rig(&arguments.rig)?;
     let Trials { data, source, how, trials } = trials(arguments, &rig)?;
     let Compared { comparisons, left_out } = compare(arguments, &rig, &trials)?;
     let readings: usize = trials.iter().map(|trial| trial.judged.rows.len()).sum();
-    if let Some(out) = &out {
-        write_report(arguments, &rig, &how, &comparisons, &left_out, out)?;
+    if let Some(folder) = &folder {
+        write_report(arguments, &rig, &how, &comparisons, &left_out, folder)?;
         let comment =
             format!("estimators compared on {}, {source}, seed {}", arguments.rig.display(), arguments.seed);
-        errors_table(&comment, &comparisons, rig.setup.surface().extent()).write(out, ERRORS_CSV)?;
-        trials_table(&comment, &comparisons, &trials).write(out, "trials.csv")?;
+        errors_table(&comment, &comparisons, rig.setup.surface().extent()).write(folder, ERRORS_CSV)?;
+        trials_table(&comment, &comparisons, &trials).write(folder, "trials.csv")?;
     }
     if arguments.json {
         let estimators = comparisons.iter().filter_map(|comparison| json_row(&rig, comparison, arguments));
@@ -97,7 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     for (name, why) in &left_out {
         output::say(format!("\n{name} is left out: {why}"))?;
     }
-    output::say_report("\n", arguments.out.as_deref())
+    output::say_report("\n", arguments.report.as_deref())
 }
 
 fn write_report(
@@ -106,7 +119,7 @@ fn write_report(
     how: &str,
     comparisons: &[Comparison],
     left_out: &[LeftOut],
-    out: &TargetFolder,
+    folder: &TargetFolder,
 ) -> Result<(), Failure> {
     let report = ComparisonReport {
         title: &format!("Estimators compared on {}", arguments.rig.display()),
@@ -117,7 +130,7 @@ fn write_report(
         tolerance_m: arguments.tolerance,
         seed: arguments.seed,
     };
-    out.write_report(comparison_report(&report))
+    folder.write_report(comparison_report(&report))
 }
 
 /// The errors of each estimator at each position.

@@ -24,33 +24,47 @@ use palpate_report::{EvaluationReport, Judged, evaluation_report};
 use palpate_rig::Rig;
 use std::path::PathBuf;
 
-/// Errors by position, by portion, and the effective length of a locator; or, of a rig, cross-validated by position.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Evaluate a locator with recorded contacts, and write a report
+  palpate evaluate beam.json --data touches.csv --report evaluation
+
+  # Cross-validate the estimator of a rig, with figures of one portion
+  palpate evaluate beam.toml --data presses.csv --portion \"100..300 mm\"";
+
+/// Evaluate a locator, or cross-validate the estimator of a rig
+///
+/// Prints location errors by position and portion, the coverage of the 95 % intervals, and the effective length or area. Without --data the
+/// contacts are simulated.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// A locator; or a rig, whose estimator is then cross-validated on the recording
+    /// Locator to evaluate, or rig file whose estimator is cross-validated
+    #[arg(value_name = "LOCATOR|RIG")]
     subject: PathBuf,
     #[command(flatten)]
     files: RecordingFiles,
-    /// Folds of the cross-validation
+    /// Number of folds of the cross-validation; positions are held out as a whole
     #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=10_000))]
     folds: u16,
-    /// An error up to this is good enough for the effective length or area
+    /// Largest error that counts towards the effective length or area
     #[arg(long, value_name = "LENGTH", default_value = "2 mm", value_parser = input::length)]
     tolerance: f64,
-    /// A portion that is also judged by itself, as in `--portion "0 mm..100 mm"` or `--portion "0..100 mm"`; may be repeated
+    /// Evaluate a portion of the surface separately, such as "0..100 mm"; may be repeated
     #[arg(long, value_name = "FROM..TO", value_parser = portion)]
     portion: Vec<Portion>,
-    /// Seed of simulation and fits
+    /// Seed of simulations and fits
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
     tare: TareOption,
-    /// Folder for a report, with `errors.csv`, the errors of each position
+    /// Write a report into DIR: report.html, its figures, and errors.csv with the errors at each position
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    report: Option<PathBuf>,
     #[command(flatten)]
     memory: MemoryOption,
-    /// Print the errors as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
@@ -97,7 +111,8 @@ struct Answers {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let read = [Some(arguments.subject.as_path()), arguments.tare.path()].into_iter().flatten();
     let inputs = Inputs::new(arguments.files.paths().chain(read));
-    let out = arguments.out.as_ref().map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
+    let folder = arguments.report.as_ref();
+    let folder = folder.map(|folder| TargetFolder::for_report(folder, &inputs)).transpose()?;
     let subject = RigOrLocator::read(&arguments.subject)?;
     arguments.tare.check_drifts(&arguments.files, subject.setup())?;
     let answers = match subject {
@@ -105,7 +120,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         RigOrLocator::Locator(locator) => located(arguments, locator)?,
     };
     let errors = errors_by_portion(arguments, &answers)?;
-    if let Some(out) = &out {
+    if let Some(folder) = &folder {
         let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
         let report = EvaluationReport {
             title: &format!("Location errors of {}", arguments.subject.display()),
@@ -118,8 +133,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             portions: &arguments.portion,
             tolerance_m: arguments.tolerance,
         };
-        out.write_report(evaluation_report(&report))?;
-        errors_table(arguments, &answers).write(out, ERRORS_CSV)?;
+        folder.write_report(evaluation_report(&report))?;
+        errors_table(arguments, &answers).write(folder, ERRORS_CSV)?;
     }
     let evaluation = &answers.evaluation;
     let folds = matches!(answers.subject, RigOrLocator::Rig(_)).then_some(arguments.folds);
@@ -325,7 +340,7 @@ fn print(
             shares.map(|(status, percent)| format!("{percent:.1} % `{}`", status.name())).collect();
         output::say(format!("statuses: {}", shares.join(", ")))?;
     }
-    output::say_report("", arguments.out.as_deref())
+    output::say_report("", arguments.report.as_deref())
 }
 
 #[cfg(test)]

@@ -21,25 +21,39 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Calibrate: fit the rig's estimator to a recording, or to the simulation when there is none.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Fit to a recording of presses
+  palpate fit beam.toml --data presses.csv -o beam.json
+
+  # Fit to a simulated calibration, before a bench exists
+  palpate fit beam.toml -o simulated.json";
+
+/// Fit the estimator of a rig and write a locator
+///
+/// The estimator is fitted to a recording of presses, or without --data to a simulated calibration.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The rig file
+    /// Rig file
     rig: PathBuf,
     #[command(flatten)]
     files: RecordingFiles,
-    /// The locator to write
+    /// Write the locator to this file
     #[arg(short, long, value_name = "LOCATOR")]
     out: PathBuf,
-    /// Seed of the fit, and of the simulation
+    /// Seed of the fit and of the simulation
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Seconds that the choice of `auto` may take; an estimator that is not done by then is stopped and left out
-    #[arg(long, value_name = "SECONDS", default_value_t = 300)]
-    auto_seconds: u32,
+    /// Longest time of the comparison by which `auto` chooses an estimator, such as "2 min"
+    ///
+    /// A candidate that is not fitted in time is stopped and excluded.
+    #[arg(long, value_name = "TIME", default_value = "300 s", value_parser = input::time)]
+    time_limit: f64,
     #[command(flatten)]
     memory: MemoryOption,
-    /// Print the outcome as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
@@ -110,7 +124,7 @@ fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
     let cost = rig.estimator.fit_cost(&rig.setup, recording);
     let task = FitTask::new(&rig.setup, recording);
     let Some(candidates) = rig.estimator.candidates(task) else { return cost.with_interval_check(recording) };
-    let choice = cost.seconds.min(f64::from(arguments.auto_seconds));
+    let choice = cost.seconds.min(arguments.time_limit);
     // The chosen estimator takes at most as long as the slowest one.
     let costs = candidates.iter().map(|candidate| candidate.fit_cost(&rig.setup, recording));
     let slowest = costs.fold(FitCost { seconds: 0.0, ..cost }, |slowest, cost| FitCost {
@@ -125,8 +139,8 @@ fn decide(rig: &Rig, recording: &Recording, arguments: &Arguments) -> Result<Opt
     let task = FitTask::new(&rig.setup, recording).seed(arguments.seed);
     let start = Instant::now();
     let clock = || start.elapsed().as_secs_f64();
-    let seconds = arguments.auto_seconds;
-    let limit = TimeLimit { clock: &clock, seconds: f64::from(seconds) };
+    let seconds = arguments.time_limit;
+    let limit = TimeLimit { clock: &clock, seconds };
     let choice = Observer::of_stages()
         .watch(|watch| rig.estimator.decide(task.watch(watch), Some(limit)))
         .map_err(|error| Failure::from_error(&error))?;

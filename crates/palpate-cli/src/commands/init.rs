@@ -1,6 +1,8 @@
 //! `palpate init`: a first rig for an existing recording.
 
+use super::sample_benches::{self, Request, SampleBench};
 use crate::failure::{Complaint, Failure};
+use crate::json::object;
 use crate::remark::remark;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
@@ -9,52 +11,79 @@ use palpate_estimators::recording::{Decimal, Separator};
 use palpate_rig::{FirstRig, FirstRigError, Hints, Rig};
 use std::path::PathBuf;
 
-/// Look at a recording and write a first rig for it, its guesses as comments.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Write a rig with recordings into the current folder, and print the next commands
+  palpate init --example beam .
+
+  # Write a rig for a recording
+  palpate init presses.csv -o first.toml
+
+  # Name the column of the force, and print the rig
+  palpate init presses.csv --force 2";
+
+/// Write a first rig for a recording, or an example with its data
 ///
-/// A column is named by its heading, with or without the unit behind it, or by its number from 1 where no heading is that number.
+/// Comments in the rig mark what is guessed. Name a column by its heading, with or without the unit, or by its number from 1 if no heading is
+/// that number.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The recording: positions, channels, and forces where they were measured
+    /// Recording: positions, channels, and forces if they were measured; with --example the folder to write into
+    #[arg(value_name = "RECORDING|DIR")]
     recording: PathBuf,
-    /// The rig to write [default: print it]
-    #[arg(short, long, value_name = "RIG.toml")]
+    /// Write the rig to RIG.toml [default: stdout]
+    #[arg(short, long, value_name = "RIG.toml", group = "written")]
     out: Option<PathBuf>,
-    /// Write over a rig that is there
-    #[arg(long, requires = "out")]
+    /// Write an example into DIR: rig, presses and touches, and print the next commands
+    #[arg(long, value_name = "BENCH", group = "written", conflicts_with_all = [
+        "position", "x", "y", "force", "time", "nuisance", "untouched", "channel", "separator", "decimal",
+    ])]
+    example: Option<SampleBench>,
+    /// Overwrite existing files
+    #[arg(long, requires = "written")]
     overwrite: bool,
-    /// Column of the position along a line
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y"])]
+    /// Column of the position on a line [default: guessed]
+    #[arg(long, value_name = "COLUMN", conflicts_with_all = ["x", "y"])]
     position: Option<String>,
-    /// Column of the position along a plane
-    #[arg(long, value_name = "NAME", requires = "y")]
+    /// Column of the position along a plane [default: guessed]
+    #[arg(long, value_name = "COLUMN", requires = "y")]
     x: Option<String>,
-    /// Column of the position across a plane
-    #[arg(long, value_name = "NAME", requires = "x")]
+    /// Column of the position across a plane [default: guessed]
+    #[arg(long, value_name = "COLUMN", requires = "x")]
     y: Option<String>,
-    /// Column of the force
-    #[arg(long, value_name = "NAME")]
+    /// Column of the force [default: guessed]
+    #[arg(long, value_name = "COLUMN")]
     force: Option<String>,
-    /// Column of the time
-    #[arg(long, value_name = "NAME")]
+    /// Column of the time [default: guessed]
+    #[arg(long, value_name = "COLUMN")]
     time: Option<String>,
-    /// Column of a coordinate that readings depend on and that is unknown in use
-    #[arg(long, value_name = "NAME")]
+    /// Column of a nuisance coordinate: it changes the readings and is unknown in use
+    #[arg(long, value_name = "COLUMN")]
     nuisance: Option<String>,
-    /// Column that marks the rows in which nothing touched, with 1, true or yes
-    #[arg(long, value_name = "NAME")]
+    /// Column that marks untouched rows by 1, true or yes
+    #[arg(long, value_name = "COLUMN")]
     untouched: Option<String>,
-    /// Column of a channel; may be repeated
-    #[arg(long, value_name = "NAME")]
+    /// Column of a channel; may be repeated [default: all other columns]
+    #[arg(long, value_name = "COLUMN")]
     channel: Vec<String>,
-    /// Separator of the fields: comma, semicolon, tab, pipe or blanks [default: that of the file]
+    /// Separator of the fields: comma, semicolon, tab, pipe or blanks [default: detected]
     #[arg(long, value_name = "WORD", value_parser = separator)]
     separator: Option<Separator>,
-    /// Decimal mark: point or comma [default: that of the file]
+    /// Decimal mark: point or comma [default: detected]
     #[arg(long, value_name = "WORD", value_parser = decimal)]
     decimal: Option<Decimal>,
+    /// Print the result as JSON
+    #[arg(long, requires = "written")]
+    json: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(bench) = arguments.example {
+        let Arguments { overwrite, json, .. } = *arguments;
+        return sample_benches::run(&Request { bench, folder: &arguments.recording, overwrite, json });
+    }
     let out = arguments.target()?;
     let name = arguments.recording.display().to_string();
     let bytes = input::read_bytes(&arguments.recording)?;
@@ -76,6 +105,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return output::print(&mut std::io::stdout().lock(), text.as_bytes());
     };
     out.write(text.as_bytes())?;
+    if arguments.json {
+        return output::say_json(&object! {
+            "palpate": env!("CARGO_PKG_VERSION"),
+            "rig": &rig_name,
+            "files": [&rig_name],
+            "commands": first.next_commands(&rig_name),
+        });
+    }
     output::say(format!("{rig_name}: {}", first.summary()))?;
     output::say("Check what is marked as a guess there; then:")?;
     first.next_commands(&rig_name).iter().try_for_each(|command| output::say(format!("  {command}")))

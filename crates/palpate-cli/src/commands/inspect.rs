@@ -8,15 +8,25 @@ use palpate_estimators::description;
 use palpate_rig::table_in_words;
 use std::path::{Path, PathBuf};
 
-/// Say in words what a file holds: a rig, a study, a locator, a recording or a study's networks.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Describe a locator
+  palpate inspect beam.json
+
+  # Describe a recording of a rig
+  palpate inspect presses.csv --rig beam.toml";
+
+/// Describe a rig, study, locator, recording or table of networks in words
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The file
+    /// File to describe
     file: PathBuf,
-    /// The rig whose recording it is, to read a CSV by
+    /// Rig file by which a CSV is read as a recording [default: read it as a table]
     #[arg(long, value_name = "RIG")]
     rig: Option<PathBuf>,
-    /// Print what is said as JSON, and what a locator of a surface without a model has learnt of it as numbers
+    /// Print the description as JSON, with the fitted parameters of a locator of a surface without a model
     #[arg(long)]
     json: bool,
 }

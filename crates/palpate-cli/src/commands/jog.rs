@@ -2,7 +2,7 @@
 
 use super::operator::say;
 use crate::progress;
-use crate::remark::remark;
+use crate::remark::alert;
 use palpate_live::calibration::{Calibration, Machine, MachineError, MachineNote, SetUpNote, SetUpTask};
 use palpate_live::input::Input;
 use palpate_live::stamp::HostClock;
@@ -74,7 +74,7 @@ impl Jog {
         inputs: &Receiver<Input>,
         keys: &Receiver<String>,
     ) -> Result<JogOutcome, MachineError> {
-        remark!("{KEYS}");
+        alert!("{KEYS}");
         while !self.machine.is_done(&self.calibration) {
             if progress::interrupted() {
                 // Dropping the machine stops it.
@@ -93,12 +93,12 @@ impl Jog {
             self.take_keys(keys)?;
             self.machine.heed(&notes)?;
             match self.machine.step(self.clock.elapsed(), &mut self.calibration)? {
-                Some(MachineNote::Homing) => remark!("the machine looks for its end stops"),
+                Some(MachineNote::Homing) => alert!("the machine looks for its end stops"),
                 Some(MachineNote::SetUp(note)) => {
                     if let SetUpNote::Touch(z_m) = note {
                         self.touch_z_m = Some(z_m);
                     }
-                    remark!("{note}");
+                    alert!("{note}");
                 }
                 Some(MachineNote::Unseen | MachineNote::NoRest) | None => {}
             }
@@ -134,7 +134,7 @@ impl Jog {
                 self.end = end;
                 self.machine.ask(SetUpTask::End);
             }
-            Key::Unknown => remark!("{KEYS}"),
+            Key::Unknown => alert!("{KEYS}"),
         }
         Ok(())
     }

@@ -25,33 +25,43 @@ use palpate_report::{LimitReport, limit_report};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Cramér–Rao bound of position and force at the sensors' noise, the lightest touch that is told from noise,
-/// and what the bench cannot tell.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Compute the limit of a rig at a spacing of 50 mm
+  palpate limit beam.toml --every \"50 mm\"
+
+  # Compute the limit of noisier sensors for a contact of unknown force
+  palpate limit beam.toml --noise \"20 um\" --unknown-force";
+
+/// Compute the physical limit of the errors: the Cramér–Rao bound of position and force
 ///
-/// A surface without a model has influence functions and noise once a locator has learnt them: name the locator.
+/// Prints the bound at a list of positions, the smallest detectable force, and warnings about contacts that the sensors cannot locate. For a
+/// surface without a model, name a locator: influence functions and noise are those of its fit.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The rig file, or a locator
+    /// Rig file or locator
     #[arg(value_name = "RIG|LOCATOR")]
     rig: PathBuf,
-    /// List every so far instead of a few positions, as in `--every "10 mm"`
+    /// Spacing of the listed positions [default: nine positions on a line, 49 on a plane]
     #[arg(long, value_name = "LENGTH", value_parser = input::length)]
     every: Option<f64>,
-    /// The contact force [default: the rig's]
+    /// Contact force, such as "3 N" [default: that of the rig]
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     force: Option<f64>,
-    /// Warn of what cannot be told when the force is not known; so it is for a rig without a force
+    /// Assume an unknown force (default when the rig has none)
     #[arg(long)]
     unknown_force: bool,
-    /// Noise of every sensor that measures in this unit, instead of the rig's, as in `--noise "5 um"`; may be repeated
+    /// Noise of all sensors that measure in this unit, such as "5 um"; may be repeated [default: that of the rig]
     #[arg(long, value_name = "NOISE", value_parser = input::quantity)]
     noise: Vec<Quantity>,
-    /// Folder for a report, with `limit.csv`, all over the surface
+    /// Write a report into DIR: report.html, its figures, and limit.csv with the bound all over the surface
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    report: Option<PathBuf>,
     #[command(flatten)]
     memory: MemoryOption,
-    /// Print the limit as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
@@ -71,9 +81,9 @@ struct Limits<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let out = arguments.out.as_ref();
+    let folder = arguments.report.as_ref();
     let inputs = Inputs::new([arguments.rig.as_path()]);
-    let out = out.map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
+    let folder = folder.map(|folder| TargetFolder::for_report(folder, &inputs)).transpose()?;
     let bench = RigOrLocator::read(&arguments.rig)?;
     let setup = setup(&bench, arguments)?;
     let complain = |error| complaint(error, &arguments.rig);
@@ -102,8 +112,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let limits = Observer::of_stages()
         .watch(|watch| limits(&limit, &touch, &setup, listed, arguments, watch))
         .map_err(complain)?;
-    if let Some(out) = &out {
-        write_report(&limits, &setup, arguments, out)?;
+    if let Some(folder) = &folder {
+        write_report(&limits, &setup, arguments, folder)?;
     }
     if arguments.json {
         output::say_json(&json(&limits, &setup, arguments))
@@ -238,7 +248,7 @@ fn write_report(
     limits: &Limits,
     setup: &Setup,
     arguments: &Arguments,
-    out: &TargetFolder,
+    folder: &TargetFolder,
 ) -> Result<(), Failure> {
     let report = LimitReport {
         title: &format!("What physics allows: the limit of {}", arguments.rig.display()),
@@ -251,8 +261,8 @@ fn write_report(
         listed: &limits.listed,
         touch: limits.touch,
     };
-    out.write_report(limit_report(&report))?;
-    limit_table(limits, arguments).write(out, "limit.csv")
+    folder.write_report(limit_report(&report))?;
+    limit_table(limits, arguments).write(folder, "limit.csv")
 }
 
 /// The limit and the lightest touch all over the surface. What the readings do not tell is an empty cell.
@@ -372,7 +382,7 @@ fn print(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Result<(), Fa
     for warning in &limits.warnings {
         output::say(format!("\nwarning: {warning}\n  would help: {}", warning.help()))?;
     }
-    output::say_report("\n", arguments.out.as_deref())
+    output::say_report("\n", arguments.report.as_deref())
 }
 
 fn print_line(limits: &Limits, extent: Extent) -> Result<(), Failure> {

@@ -14,38 +14,50 @@ use serde::Serialize;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Locate readings: CSV in (a file, or stdin), estimates out as they come.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Locate the readings of a file
+  palpate locate beam.json touches.csv
+
+  # Locate readings from a pipe, as JSON
+  cat touches.csv | palpate locate beam.json --json";
+
+/// Locate the contact of each reading
+///
+/// Reads CSV line by line and prints position, force, 95 % intervals and status as CSV, each before it reads the next line.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The locator
+    /// Locator
     locator: PathBuf,
-    /// The readings; `-` or nothing for stdin
+    /// CSV file of readings, `-` for stdin [default: stdin]
     readings: Option<PathBuf>,
-    /// The readings have no header: a row is one value a channel, in the locator's order
+    /// Read a CSV without a header: one column for each channel, in the locator's order
     #[arg(long)]
     no_header: bool,
-    /// Leave a dead channel out, by its number from 1; may be repeated
+    /// Ignore a channel, by its number from 1; may be repeated
     #[arg(long, value_name = "CHANNEL")]
-    dead: Vec<usize>,
+    disable: Vec<usize>,
     #[command(flatten)]
     tare: TareOption,
-    /// Print the best guess of readings that are `no_contact` or `outside_model`, too; their cells are empty otherwise
+    /// Print the estimate also where the status is `no_contact` or `outside_model`
     #[arg(long, conflicts_with = "json")]
     all: bool,
-    /// Print one JSON object a line instead of CSV; it has the best guess of every reading
+    /// Print one JSON object per reading, with the estimate whatever its status
     #[arg(long)]
     json: bool,
-    /// Add the shape of a flexible digit to every estimate, at so many points from clamp to tip
+    /// Add the shape of a flexible digit to each estimate, at this number of points from clamp to tip
     #[arg(long, value_name = "POINTS", requires = "json", value_parser = clap::value_parser!(u16).range(2..=10_000))]
     shape: Option<u16>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut locator = input::read_locator(&arguments.locator)?;
-    for channel in &arguments.dead {
+    for channel in &arguments.disable {
         // Channel 0 is none, like those beyond the last.
         let left_out = locator.leave_out(channel.wrapping_sub(1));
-        left_out.map_err(|error| Complaint::new(format!("--dead {channel}: {error}")))?;
+        left_out.map_err(|error| Complaint::new(format!("--disable {channel}: {error}")))?;
     }
     if arguments.shape.is_some() && locator.kind() != "digit" {
         let complaint = format!("--shape: a locator of kind `{}` does not tell the shape", locator.kind());

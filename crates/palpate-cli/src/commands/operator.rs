@@ -1,7 +1,8 @@
 //! Questions to the person who presses in `palpate calibrate`, and displays of the presses and of a check.
 
 use crate::failure::Failure;
-use crate::remark::remark;
+use crate::json::object;
+use crate::remark::alert;
 use crate::{input, output, progress};
 use palpate_estimators::recording::Row;
 use palpate_live::calibration::{
@@ -12,6 +13,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_length_mm;
 use palpate_rig::Rig;
+use serde::Serialize;
 use std::io::IsTerminal;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
@@ -28,14 +30,14 @@ pub fn ask(
         return Ok(stated);
     }
     if stated.placement_sd_m.is_none() {
-        remark!(
+        alert!(
             "how far off the asked place do you press, as a standard deviation? as in 2 mm; Enter: unknown"
         );
         stated.placement_sd_m = answer(keys, |text| input::length(text).map(Some))?;
     }
     if let Some(force_n) = stated.single_weight_n(rig, force_n) {
-        remark!("{}", single_weight(force_n));
-        remark!(
+        alert!("{}", single_weight(force_n));
+        alert!(
             "second weight? as in {} N; `known`: contacts in use have {force_n} N; Enter: go on with one",
             2.0 * force_n
         );
@@ -64,7 +66,7 @@ pub fn wants_check(keys: &Receiver<String>) -> bool {
     if !std::io::stdin().is_terminal() {
         return false;
     }
-    remark!("check the locator at five fresh places? y and Enter: yes; Enter: no");
+    alert!("check the locator at five fresh places? y and Enter: yes; Enter: no");
     let parse = |text: &str| match text {
         "y" | "yes" => Ok(Some(())),
         "n" | "no" => Ok(None),
@@ -84,7 +86,7 @@ fn answer<T>(
             Ok(line) if line.trim().is_empty() => return Ok(None),
             Ok(line) => match parse(line.trim()) {
                 Ok(parsed) => return Ok(parsed),
-                Err(problem) => remark!("{problem}"),
+                Err(problem) => alert!("{problem}"),
             },
             Err(RecvTimeoutError::Timeout) if progress::interrupted() => {
                 return Err(Failure::Interrupted("stopped before the first press".to_owned()));
@@ -99,7 +101,7 @@ fn answer<T>(
 pub fn list(rows: &[Row], extent: Extent) {
     let touched = rows.iter().enumerate().filter(|(_, row)| row.touches());
     if touched.clone().next().is_none() {
-        remark!("no press was taken yet");
+        alert!("no press was taken yet");
     }
     for (press, (at, row)) in touched.enumerate() {
         let place = place(Press { position: row.position, force_n: row.force_n, depth_m: None }, extent);
@@ -107,14 +109,14 @@ pub fn list(rows: &[Row], extent: Extent) {
             || "no other at its place".to_owned(),
             |off| format!("{off:.2} % off the others of its place"),
         );
-        remark!("press {}: {place}, {off}", press + 1);
+        alert!("press {}: {place}, {off}", press + 1);
     }
 }
 
 /// Prints the errors of the locator at the places of a check.
 pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Extent) -> Result<(), Failure> {
     let Some(check) = check else {
-        remark!("no place was checked");
+        alert!("no place was checked");
         return Ok(());
     };
     let at = |position: Position| place(Press { position, force_n: None, depth_m: None }, extent);
@@ -139,29 +141,49 @@ pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Ext
     output::say(format!("error at fresh places: median {median}, mean {mean}{covered}{placement}"))
 }
 
+/// JSON of a check.
+pub fn check_json(check: &Check) -> impl Serialize + use<> {
+    let places = check.places.iter().map(|checked| {
+        object! {
+            "x_mm": checked.position.x_m * 1e3,
+            "y_mm": checked.position.y_m * 1e3,
+            "estimate_x_mm": checked.estimate.x_m * 1e3,
+            "estimate_y_mm": checked.estimate.y_m * 1e3,
+            "error_mm": checked.error_m * 1e3,
+            "covered": checked.covered,
+        }
+    });
+    object! {
+        "places": places.collect::<Vec<_>>(),
+        "median_mm": check.median_m * 1e3,
+        "mean_mm": check.mean_m * 1e3,
+        "covered": check.covered,
+    }
+}
+
 /// Prints the events, and the next action of a person who presses on a surface of the extent `hand`.
 pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
     for note in notes {
         match note {
-            Note::Opened(name) => remark!("readings from {name}"),
-            Note::Lost(why) => remark!("the source is lost: {why}; it is opened again once it is there"),
-            Note::NoReadings(words) => remark!("{words}"),
-            Note::ReadingsAgain => remark!("readings arrive again"),
+            Note::Opened(name) => alert!("readings from {name}"),
+            Note::Lost(why) => alert!("the source is lost: {why}; it is opened again once it is there"),
+            Note::NoReadings(words) => alert!("{words}"),
+            Note::ReadingsAgain => alert!("readings arrive again"),
             Note::Taken => {
                 let rows = calibration.journal().rows();
                 let off = last_deviation_percent(rows)
                     .map_or(String::new(), |off| format!(", {off:.2} % off the others of its place"));
                 let force = rows.last().and_then(|row| row.force_n);
                 let force = force.map_or(String::new(), |force_n| format!(" of {force_n:.3} N"));
-                remark!("taken: press {}{force}{off}", calibration.journal().presses());
+                alert!("taken: press {}{force}{off}", calibration.journal().presses());
             }
-            Note::RepeatedReadings => remark!("{REPEATED_READINGS}"),
+            Note::RepeatedReadings => alert!("{REPEATED_READINGS}"),
             Note::Replaced => {
-                remark!("the reading grew: press {} is taken anew", calibration.journal().presses());
+                alert!("the reading grew: press {} is taken anew", calibration.journal().presses());
             }
-            Note::AskedAgain(doubt) => remark!("not taken: {doubt}"),
-            Note::StillWaiting(words) => remark!("{words}"),
-            Note::Saturated(name) => remark!("channel {name} reads the end of its range"),
+            Note::AskedAgain(doubt) => alert!("not taken: {doubt}"),
+            Note::StillWaiting(words) => alert!("{words}"),
+            Note::Saturated(name) => alert!("channel {name} reads the end of its range"),
             Note::Ended | Note::Waits(_) | Note::Untouched | Note::Overload(_) => {}
         }
         if let (Some(extent), Note::Taken | Note::AskedAgain(_) | Note::Waits(_)) = (hand, note) {
@@ -174,12 +196,12 @@ pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
 pub fn ask_for(calibration: &Calibration, extent: Extent) {
     let guide = calibration.guide();
     match (guide.waiting(), guide.next_press()) {
-        (Waiting::Untouched, _) => remark!("leave the surface alone"),
+        (Waiting::Untouched, _) => alert!("leave the surface alone"),
         (Waiting::Press, Some((number, press))) => {
-            remark!("press at {} ({} of {})", place(press, extent), number + 1, guide.plan().len());
+            alert!("press at {} ({} of {})", place(press, extent), number + 1, guide.plan().len());
         }
-        (Waiting::Rest, _) => remark!("hold"),
-        (Waiting::Release, _) => remark!("let go"),
+        (Waiting::Rest, _) => alert!("hold"),
+        (Waiting::Release, _) => alert!("let go"),
         (Waiting::Press | Waiting::Nothing, _) => {}
     }
 }

@@ -8,10 +8,10 @@ use std::net::SocketAddr;
 /// Options of the outlets.
 #[derive(clap::Args)]
 pub struct Outlets {
-    /// Publish contacts and forces to ROS 2 through a Zenoh router, too: `tcp/host:7447?domain=0&name=palpate&frame=surface`
+    /// Publish contacts and forces to ROS 2 through a Zenoh router: `tcp/host:7447?domain=0&name=palpate&frame=surface`
     #[arg(long, value_name = "ROUTER")]
     ros: Option<RosUrl>,
-    /// Serve the session to Foxglove's app, too: 127.0.0.1:8765
+    /// Serve the session to Foxglove at this address, such as 127.0.0.1:8765
     #[arg(long, value_name = "ADDRESS:PORT")]
     foxglove: Option<SocketAddr>,
 }

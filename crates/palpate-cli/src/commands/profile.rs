@@ -5,7 +5,7 @@ use crate::input::RigOrLocator;
 use crate::lines::{Lines, Readings, Records};
 use crate::output::{self, Table};
 use crate::progress::Observer;
-use crate::target::{Inputs, Target};
+use crate::target::{Inputs, TargetFolder};
 use palpate_estimators::estimator::{
     CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, Status,
     patch_limits,
@@ -16,23 +16,36 @@ use palpate_mechanics::surface::{Extent, UniformLoad};
 use palpate_report::{ProfileReport, profile_report};
 use std::path::{Path, PathBuf};
 
-/// Tell how force is spread over the surface: total, centre of pressure and patches, with intervals and limits.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Estimate the load of the first readings of a file
+  head -4 touches.csv | palpate profile beam.toml -
+
+  # Write a report about the first reading
+  head -4 touches.csv | palpate profile beam.toml - --report load";
+
+/// Estimate a distributed load: its total force, centre of pressure and patches
+///
+/// Every estimate has its 95 % interval; every patch has the physical limit of its position.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The rig file, or a locator
+    /// Rig file or locator
+    #[arg(value_name = "RIG|LOCATOR")]
     subject: PathBuf,
-    /// The readings; `-` for stdin; without them the rig's [[load]] sections are simulated
+    /// CSV file of readings, `-` for stdin [default: simulate the rig's [[load]] sections]
     readings: Option<PathBuf>,
-    /// The readings have no header: a row is one value a channel, in the layout's order
+    /// Read a CSV without a header: one column for each channel, in the layout's order
     #[arg(long)]
     no_header: bool,
-    /// Seed of noise and faults of a simulated reading
+    /// Seed of the noise and imperfections of a simulated reading
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// A page about the first reading
-    #[arg(long, value_name = "PAGE.html")]
+    /// Write a report about the first reading into DIR: report.html and its figures
+    #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// Print one JSON object a line
+    /// Print one JSON object per reading
     #[arg(long)]
     json: bool,
 }
@@ -41,7 +54,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.subject;
     let inputs =
         Inputs::new([Some(path), arguments.readings.as_ref()].into_iter().flatten().map(PathBuf::as_path));
-    let report = arguments.report.as_ref().map(|report| Target::new(report, &inputs)).transpose()?;
+    let report = arguments.report.as_ref();
+    let report = report.map(|folder| TargetFolder::for_report(folder, &inputs)).transpose()?;
     let subject = RigOrLocator::read(path)?;
     let sensors = Observer::of_stages().watch(|watch| match &subject {
         RigOrLocator::Rig(rig) => LoadSensors::from_setup_watched(&rig.setup, watch),
@@ -76,7 +90,7 @@ struct Printer<'a> {
     arguments: &'a Arguments,
     subject: &'a RigOrLocator,
     profiler: &'a Profiler<'a>,
-    report: Option<&'a Target>,
+    report: Option<&'a TargetFolder>,
     /// The loads that were simulated.
     truth: &'a [UniformLoad],
     /// Readings that gave a profile.
@@ -120,7 +134,7 @@ impl Printer<'_> {
         readings.lines.finish("profile")
     }
 
-    /// Prints the profile of a reading, and writes the page about the first.
+    /// Prints the profile of a reading, and writes the report about the first.
     fn tell(&mut self, reading: &[f64], line: Option<u64>) -> Result<(), Failure> {
         let profile = self.profiler.profile(reading).map_err(Complaint::new)?;
         let extent = self.profiler.cells().extent;
@@ -136,10 +150,8 @@ impl Printer<'_> {
             return output::say(json);
         }
         print(&told)?;
-        match (self.told, self.report) {
-            (1, Some(report)) => output::say(format!("\nReport: {}", report.path().display())),
-            _ => Ok(()),
-        }
+        let folder = self.report.filter(|_| self.told == 1).map(TargetFolder::path);
+        output::say_report("\n", folder)
     }
 
     fn write_report(
@@ -148,7 +160,7 @@ impl Printer<'_> {
         profile: &LoadProfile,
         limits: Option<&[PatchLimit]>,
         line: Option<u64>,
-        target: &Target,
+        folder: &TargetFolder,
     ) -> Result<(), Failure> {
         let arguments = self.arguments;
         let source = match (&arguments.readings, line) {
@@ -166,10 +178,7 @@ impl Printer<'_> {
             truth: self.truth,
             source: &source,
         };
-        // The page holds its figures; the others are copies of them.
-        let files = profile_report(&report);
-        let page = files.iter().find(|file| file.name.ends_with(".html"));
-        page.map_or(Ok(()), |page| target.write(&page.bytes))
+        folder.write_report(profile_report(&report))
     }
 }
 

@@ -3,10 +3,10 @@
 use super::outlets::Outlets;
 use crate::failure::{Complaint, Failure};
 use crate::progress::{self, interrupted};
-use crate::remark::remark;
+use crate::remark::{alert, remark};
 use crate::session::SessionOptions;
 use crate::target::{Inputs, Target};
-use crate::{input, output, rules};
+use crate::{input, output, rules, stdout};
 use palpate_live::event::Event;
 use palpate_live::input::Input;
 use palpate_live::pipeline;
@@ -23,40 +23,46 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Record a board's readings, with their estimates and the locator, in an MCAP file.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Record a simulated board for two seconds
+  palpate record beam.json --from simulated:beam.toml --duration \"2 s\" -o session.mcap
+
+  # Record a board at a serial port until Ctrl-C
+  palpate record beam.json --from serial:///dev/ttyACM0 -o session.mcap";
+
+/// Record readings and estimates of a board in an MCAP file
+///
+/// The file also contains the locator, so that `palpate replay` needs no other file.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The locator
+    /// Locator
     locator: PathBuf,
-    /// The source of the readings
-    #[arg(long, value_name = "URL")]
+    /// Source of the readings: `serial:///dev/ttyACM0?baud=115200`, `tcp://host:port`, `udp://:port`, `mqtt://host/topic`,
+    /// `file:recording.mcap?speed=1`, `simulated:RIG.toml?rate=100`, or `-` for stdin
+    #[arg(long, value_name = "SOURCE")]
     from: SourceUrl,
-    /// The file, which must not be there yet
-    #[arg(long, value_name = "FILE.mcap")]
+    /// Write the recording to FILE.mcap, which must not exist
+    #[arg(short, long, value_name = "FILE.mcap")]
     out: PathBuf,
-    /// End after so long
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    seconds: Option<f64>,
+    /// Stop after this time, such as "10 s" [default: at Ctrl-C, or at the end of the source]
+    #[arg(long, value_name = "TIME", value_parser = input::time)]
+    duration: Option<f64>,
     #[command(flatten)]
     session: SessionOptions,
-    /// Print samples and events as lines of JSON, too
+    /// Print samples and events as lines of JSON
     #[arg(long)]
     json: bool,
-    /// Publish them to a broker, too: mqtt://host/topic
+    /// Publish samples and events to an MQTT broker: `mqtt://host/topic`
     #[arg(long, value_name = "URL")]
     mqtt: Option<MqttUrl>,
-    /// Publish the messages of a rule file there, and send its commands to the board
+    /// Apply a rule file: publish its messages to the broker, and send its commands to the board
     #[arg(long, value_name = "FILE.toml")]
     rules: Option<PathBuf>,
     #[command(flatten)]
     outlets: Outlets,
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(seconds),
-        _ => Err(format!("`{text}` must be a number of seconds greater than 0, and at most 1e9")),
-    }
 }
 
 /// Interval between two checks for a signal.
@@ -65,6 +71,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // Complains about an unusable path; the recorder itself makes the file, and overwrites no other.
     Target::new(&arguments.out, &Inputs::new([arguments.locator.as_path()]))?;
+    if arguments.json && stdout::was_closed() {
+        return Err(output::closed());
+    }
     arguments.session.check_source(&arguments.from)?;
     let locator = input::read_locator(&arguments.locator)?;
     let clock = HostClock::new();
@@ -117,7 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = recording.map_err(Complaint::new)?;
     recording.begin(&arguments.out).map_err(Complaint::new)?;
     sinks.push(Box::new(recording.clone()));
-    let stop = Stop::after(arguments.seconds, to)?;
+    let stop = Stop::after(arguments.duration, to)?;
     let fault = pipeline::run(&mut session, clock, &from, &mut sinks);
     drop((source, stop, sinks));
     progress::finish_after_signal();
@@ -125,7 +134,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some((url, lost)) = unpublished {
         match lost.load(Ordering::Relaxed) {
             0 => {}
-            lost => remark!("{} messages did not reach the broker {url}", format_count(lost)),
+            lost => alert!("{} messages did not reach the broker {url}", format_count(lost)),
         }
     }
     let unprinted = unprinted.as_ref().and_then(|unprinted| unprinted.get());
@@ -159,7 +168,7 @@ fn finish(
     }
     // A reader that has closed the pipe needs no more; the recording is complete without it.
     if let Some(error) = unprinted.filter(|error| error.kind() != std::io::ErrorKind::BrokenPipe) {
-        remark!("{summary}");
+        alert!("{summary}");
         return Err(output::unprinted(error));
     }
     if interrupted() {
@@ -210,9 +219,9 @@ impl Sink for Words {
         for record in batch.events() {
             match &record.event {
                 Event::SourceOpened { name } => remark!("reading {name}"),
-                Event::SourceLost { why } => remark!("the source is lost: {why}"),
-                Event::Trouble { text } => remark!("{text}"),
-                Event::Alarm { name, text } => remark!("alarm of rule `{name}`: {text}"),
+                Event::SourceLost { why } => alert!("the source is lost: {why}"),
+                Event::Trouble { text } => alert!("{text}"),
+                Event::Alarm { name, text } => alert!("alarm of rule `{name}`: {text}"),
                 Event::Channel { name, state } => remark!("channel {name} is {}", state_in_words(*state)),
                 _ => {}
             }

@@ -1,6 +1,7 @@
 //! `palpate recover`: an interrupted recording, rewritten in full.
 
 use crate::failure::{Complaint, Failure};
+use crate::json::object;
 use crate::output;
 use crate::remark::remark;
 use crate::target::{Inputs, Target};
@@ -8,20 +9,30 @@ use palpate_live::recording;
 use palpate_mechanics::units::format_count;
 use std::path::PathBuf;
 
-/// Rewrite a recording that was cut off, with its index and summary, so that every MCAP reader opens it.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Repair a recording
+  palpate recover session.mcap -o repaired.mcap";
+
+/// Repair an interrupted recording
 ///
-/// All messages of palpate that can be read are in the new file, with their times and numbers, and so is the locator.
+/// Copies all readable messages and the locator into a file with index and summary, which every MCAP reader opens.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The recording, whole, cut off or damaged
+    /// Recording: whole, truncated or damaged
     recording: PathBuf,
-    /// The new file
+    /// Write the repaired recording to FILE.mcap, which must not exist
     #[arg(short, long, value_name = "FILE.mcap")]
     out: PathBuf,
+    /// Print the result as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let Arguments { recording, out } = arguments;
+    let Arguments { recording, out, .. } = arguments;
     Target::new(out, &Inputs::new([recording.as_path()]))?;
     if out.exists() {
         let complaint = Complaint::new(format!("{} exists already", out.display()));
@@ -38,6 +49,20 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (readings, messages) = (format_count(recovery.readings), format_count(recovery.messages));
     let summary = format!("{}: {readings} readings, {messages} messages", out.display());
     let losses: Vec<String> = recovery.passed_over.loss().into_iter().chain(recovery.locator_fault).collect();
+    if arguments.json {
+        output::say_json(&object! {
+            "palpate": env!("CARGO_PKG_VERSION"),
+            "recording": out.display().to_string(),
+            "readings": recovery.readings,
+            "messages": recovery.messages,
+            "foreign_messages": recovery.passed_over.foreign,
+            "was_whole": recovery.was_whole,
+            "losses": &losses,
+        })?;
+        if losses.is_empty() {
+            return Ok(());
+        }
+    }
     if losses.is_empty() {
         return output::say(summary);
     }

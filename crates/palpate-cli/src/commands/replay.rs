@@ -19,23 +19,33 @@ use serde_json::{Map, Value};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Locate the readings of a recording again, by the locator that it holds or by another, filtered or followed.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Locate the readings again and compare
+  palpate replay session.mcap
+
+  # Track contacts in the recording
+  palpate replay session.mcap --track";
+
+/// Locate the readings of a recorded session again
 ///
-/// Without --locator, --low-pass and --track the tared readings are located again as they were in the session. With any of them the raw readings go
-/// through a session from its start.
+/// By default the tared readings are located as in the session, and differences are counted. With --locator, --low-pass or --track the raw
+/// readings pass through a session from its start.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The recording, whole or cut off
+    /// Recording, whole or truncated
     recording: PathBuf,
-    /// Locate by this locator, from the raw readings
+    /// Locate the raw readings by this locator [default: the locator in the recording]
     #[arg(long, value_name = "LOCATOR")]
     locator: Option<PathBuf>,
     #[command(flatten)]
     session: SessionOptions,
-    /// Print the best guess of readings that are `no_contact` or `outside_model`, too; their cells are empty otherwise
+    /// Print the estimate also where the status is `no_contact` or `outside_model`
     #[arg(long, conflicts_with = "json")]
     all: bool,
-    /// Print one JSON object a line instead of CSV; it has the best guess of every reading
+    /// Print one JSON object per reading, with the estimate whatever its status
     #[arg(long)]
     json: bool,
 }

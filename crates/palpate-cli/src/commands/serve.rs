@@ -6,7 +6,7 @@ use super::record::Words;
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RigOrLocator};
 use crate::progress::{self, Observer};
-use crate::remark::remark;
+use crate::remark::{alert, remark};
 use crate::rules;
 use crate::session::SessionOptions;
 use crate::target::{Inputs, Target};
@@ -29,68 +29,78 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// The bench of the demonstration: the founding paper's, with noise.
-const DEMO: &str = include_str!("../../../../examples/noisy-beam.toml");
+const DEMO: &str = include_str!("../../samples/noisy-beam.toml");
 /// The name of the demonstration's file.
 const DEMO_NAME: &str = "examples/noisy-beam.toml";
 /// Interval between two checks for Ctrl-C.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// Serve a dashboard: contacts, readings and events of a board, live in a browser.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Serve a simulated board, and open http://127.0.0.1:8377
+  palpate serve
+
+  # Serve a board at a serial port
+  palpate serve beam.json --from serial:///dev/ttyACM0";
+
+/// Serve a live dashboard for web browsers
 ///
-/// A rig is fitted first, to its simulation or to --data, or calibrated in the browser with --calibrate. With --from alone the page shows what the
-/// board sends, makes a rig for it and calibrates that. Without arguments a simulated board on the bench of the founding paper is shown.
+/// A rig is fitted first: to --data, to a simulated calibration, or with --calibrate to presses in the browser. With --from alone the page shows
+/// the readings of the board, writes a rig and calibrates it. Without arguments a simulated board is served.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The locator, or a rig to fit
+    /// Locator, or rig file to fit [default: the bench of the founding paper]
     #[arg(value_name = "LOCATOR|RIG.toml")]
     locator: Option<PathBuf>,
-    /// The source of readings: `serial:///dev/ttyACM0?baud=115200`, `tcp://host:port`, `udp://:port`, `mqtt://host/topic`,
-    /// `file:recording.mcap?speed=1`, `simulated:RIG.toml?rate=100`, or `-` for stdin; without one the page offers a simulated board
-    #[arg(long, value_name = "URL")]
+    /// Source of the readings [default: a simulated board]: `serial:///dev/ttyACM0?baud=115200`, `tcp://host:port`, `udp://:port`, `mqtt://host/topic`,
+    /// `file:recording.mcap?speed=1`, `simulated:RIG.toml?rate=100`, or `-` for stdin
+    #[arg(long, value_name = "SOURCE")]
     from: Option<SourceUrl>,
-    /// A recording to fit the rig to
+    /// Fit the rig to this recording [default: a simulated calibration]
     #[arg(long, value_name = "FILE.csv", requires = "locator")]
     data: Option<PathBuf>,
-    /// Calibrate the rig in the browser first, press by press
+    /// Calibrate the rig in the browser by guided presses
     #[arg(long, requires_all = ["locator", "from", "presses", "out"], conflicts_with = "data")]
     calibrate: bool,
-    /// The recording of the calibration's presses; one that is there already is gone on with
+    /// Write the presses of the calibration to FILE.csv; an existing file is continued
     #[arg(long, value_name = "FILE.csv", requires = "calibrate")]
     presses: Option<PathBuf>,
-    /// The locator that the calibration writes
+    /// Write the locator of the calibration to this file
     #[arg(short, long, value_name = "LOCATOR", requires = "calibrate")]
     out: Option<PathBuf>,
-    /// Force of every press of the calibration [default: the rig's, or unknown]
+    /// Force of every press of the calibration, such as "2 N" [default: that of the rig, or unknown]
     #[arg(long, value_name = "FORCE", value_parser = input::force, requires = "calibrate")]
     force: Option<f64>,
     #[command(flatten)]
     operator: OperatorOptions,
-    /// A machine that presses in the calibration: `gcode:serial:///dev/ttyUSB0?baud=115200` or `gcode:tcp://host:port`, of Marlin or GRBL firmware
+    /// Press by a machine with Marlin or GRBL firmware: `gcode:serial:///dev/ttyUSB0?baud=115200` or `gcode:tcp://host:port`
     #[arg(long, value_name = "MACHINE", requires = "calibrate")]
     stage: Option<StageUrl>,
-    /// A folder in which browsers may record the session
+    /// Let browsers record the session into DIR
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
     #[command(flatten)]
     session: SessionOptions,
-    /// Send the commands of a rule file to the board, and raise its alarms
+    /// Apply a rule file: send its commands to the board, and raise its alarms
     #[arg(long, value_name = "FILE.toml")]
     rules: Option<PathBuf>,
-    /// The address to listen at; any but loopback needs --token
+    /// Listen at this address; any but loopback needs --token
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8377")]
     listen: SocketAddr,
-    /// The token that requests must carry; `auto` makes one up
+    /// Require this token in requests; `auto` generates one [default: none]
     #[arg(long, value_name = "TOKEN")]
     token: Option<String>,
-    /// A name by which browsers may call this machine, beside its address; may be repeated
+    /// Accept this host name in requests, besides the address; may be repeated
     #[arg(long, value_name = "NAME")]
     host_name: Vec<String>,
     #[command(flatten)]
     outlets: Outlets,
-    /// Seed of fit and simulation
+    /// Seed of fits and simulations
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Run the clock of a calibration so many times as fast, for a simulated board and machine of the same --clock-speed
+    /// Speed up the clock of a calibration, as that of a simulated board and machine
     #[arg(long, value_name = "N", default_value_t = 1, hide = true, requires = "calibrate", value_parser = input::clock_speed())]
     clock_speed: u32,
 }
@@ -137,7 +147,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         begin(&live, arguments)?;
     }
     let query = token.map_or_else(String::new, |token| format!("?token={token}"));
-    remark!("palpate: open http://{}/{query} in a browser; Ctrl-C ends it", server.address());
+    alert!("palpate: open http://{}/{query} in a browser; Ctrl-C ends it", server.address());
     while !progress::interrupted() {
         std::thread::sleep(LOOK_EVERY);
     }

@@ -1,9 +1,9 @@
 //! `palpate simulated-board`: a board without hardware.
 
 use crate::failure::{Complaint, Failure};
-use crate::input;
 use crate::progress::interrupted;
-use crate::remark::remark;
+use crate::remark::{alert, remark};
+use crate::{input, output, stdout};
 use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation};
 use palpate_live::simulated_board::{
     BoardConfig, FaultConfig, Finger, FrameForm, Link, LinkUrl, LoadCell, SimulatedBoard,
@@ -15,84 +15,95 @@ use palpate_rig::Rig;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Send what the board of a rig would send, with its noise and with faults, as a serial port or over a network.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Print the frames of a board for one second
+  palpate simulated-board beam.toml --to - --duration \"1 s\"
+
+  # Simulate a board at a pseudo-terminal until Ctrl-C; its path is printed
+  palpate simulated-board beam.toml";
+
+/// Simulate the board of a rig at a serial port or over a network
 ///
-/// Lines from the other end move its finger: `finger X Y FORCE` in mm and N, `lift`, `reset`; `disconnect` pulls its cable for a second. Other lines are
-/// commands, which are shown on stderr and counted.
+/// The board sends readings with the rig's noise and with faults. It accepts the lines `finger X Y FORCE` in mm and N, `lift`, `reset`, and
+/// `disconnect` for one second. Other lines count as commands and are shown on stderr.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The rig
+    /// Rig file
     rig: PathBuf,
-    /// Plug of the board: pty, pty:PATH, tcp://:PORT, udp://HOST:PORT, mqtt://HOST/TOPIC, or - for stdout
+    /// Connection of the board: `pty`, `pty:PATH`, `tcp://:PORT`, `udp://HOST:PORT`, `mqtt://HOST/TOPIC`, or `-` for stdout
     #[arg(long, value_name = "LINK", default_value = "pty")]
     to: LinkUrl,
-    /// Readings a second
+    /// Readings per second
     #[arg(long, value_name = "FREQUENCY", default_value = "100 Hz", value_parser = input::frequency)]
     rate: f64,
     /// Seed of noise, faults and the random finger
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Share of frames that are left out
+    /// Share of frames that are lost, from 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = input::share)]
     drop: f64,
-    /// Share of frames of which a part is missing
+    /// Share of frames that are incomplete, from 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = input::share)]
     torn: f64,
-    /// Pull the cable for a second, every so often
+    /// Disconnect for one second at this interval, such as "30 s" [default: never]
     #[arg(long, value_name = "TIME", value_parser = input::time)]
     disconnect_every: Option<f64>,
-    /// Drift of each channel in a second, in its SI unit or raw; upward and downward channels in turn [default: that of the rig]
+    /// Drift of each channel per second, in its SI unit or raw, with alternating sign [default: that of the rig]
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
     drift: Option<f64>,
-    /// Random walk of each channel: its standard deviation after a second, in its SI unit or raw [default: that of the rig]
+    /// Standard deviation of each channel's random walk after one second, in its SI unit or raw [default: that of the rig]
     #[arg(long, value_name = "NUMBER")]
     walk: Option<f64>,
-    /// Share of a reading that follows the contact slowly [default: that of the rig]
+    /// Creep as a share of the reading, from 0 to 1 [default: that of the rig]
     #[arg(long, value_name = "SHARE", value_parser = input::share)]
     creep: Option<f64>,
-    /// Time constant of the creep [default: that of the rig, or 5 s]
+    /// Time constant of the creep, such as "5 s" [default: that of the rig, or 5 s]
     #[arg(long, value_name = "TIME", value_parser = input::time)]
     creep_time: Option<f64>,
-    /// Hysteresis of each channel: its width as a share of the channel's range under the finger [default: that of the rig]
+    /// Width of the hysteresis as a share of each channel's range, from 0 to 1 [default: that of the rig]
     #[arg(long, value_name = "SHARE", value_parser = input::share)]
     hysteresis: Option<f64>,
-    /// Share of the largest reading of a touch that remains after it [default: that of the rig]
+    /// Residue after a contact as a share of its largest reading, from 0 to 1 [default: that of the rig]
     #[arg(long, value_name = "SHARE", value_parser = input::share)]
     residue: Option<f64>,
-    /// Time constant in which the residue fades [default: that of the rig, or 20 s]
+    /// Time constant of the residue, such as "20 s" [default: that of the rig, or 20 s]
     #[arg(long, value_name = "TIME", value_parser = input::time)]
     residue_time: Option<f64>,
-    /// Step of the channels' converters, in their SI unit or raw [default: the resolution of the rig's sensors]
+    /// Step of the converters, in the channels' SI unit or raw [default: the resolution of the rig's sensors]
     #[arg(long, value_name = "NUMBER")]
     converter_step: Option<f64>,
-    /// Frames that repeat each reading after the first, as of a logger that is faster than its sensors [default: as the rig]
+    /// Number of repetitions of each reading, as by a logger that is faster than its sensors [default: that of the rig]
     #[arg(long, value_name = "N")]
-    repeats: Option<u32>,
-    /// A script of the finger: CSV of time in s, x and y in mm, force in N [default: a random finger]
+    repeated_readings: Option<u32>,
+    /// Move the finger by a CSV of time in s, x and y in mm, and force in N [default: a random finger]
     #[arg(long, value_name = "FILE.csv")]
     finger: Option<PathBuf>,
-    /// Plug of a machine that moves the finger by G-code, as the rig's [stage] says: pty, pty:PATH or tcp://:PORT
+    /// Connection of a machine that moves the finger by G-code on the rig's [stage]: `pty`, `pty:PATH` or `tcp://:PORT`
     #[arg(long, value_name = "LINK", conflicts_with = "finger")]
     stage: Option<LinkUrl>,
     /// Firmware of the machine
     #[arg(long, value_name = "FIRMWARE", default_value = "marlin", requires = "stage")]
     firmware: FirmwareName,
-    /// Behaviour of the machine, in parts separated by commas: `no-greeting`, `greeting=12s`, `delay=500ms`, `no-emergency-parser`, `paced`, `homing=90s`, `soft-limit-x=200mm`, and faults as in `unknown@G1 Z:3`, at the third line that begins with `G1 Z`
+    /// Behaviour of the machine, separated by commas: `no-greeting`, `greeting=12s`, `delay=500ms`, `no-emergency-parser`, `paced`, `homing=90s`,
+    /// `soft-limit-x=200mm`, and faults such as `unknown@G1 Z:3`, at the third line that begins with `G1 Z`
     #[arg(long, value_name = "PARTS", requires = "stage")]
     machine: Option<MachineConfig>,
-    /// Send the load cell of the rig's [stage] too, with noise of this standard deviation, as in `--load-cell "5 mN"`
+    /// Send the load cell of the rig's [stage] with this noise, such as "5 mN"
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     load_cell: Option<f64>,
-    /// Form of the frames: lines of text, or binary with number, board's time and checksum
+    /// Format of the frames: text lines, or binary with number, time and checksum
     #[arg(long, value_name = "FORM", default_value = "text")]
     frames: FrameName,
-    /// Millionths of the time by which the board's clock is fast, or slow where negative; text frames tell no time
+    /// Error of the board's clock in parts per million, positive if it is fast; binary frames only
     #[arg(long, value_name = "NUMBER", default_value_t = 0.0, allow_negative_numbers = true, value_parser = ppm)]
     clock_ppm: f64,
-    /// End after so long
+    /// Stop after this time, such as "10 s" [default: at Ctrl-C]
     #[arg(long, value_name = "TIME", value_parser = input::time)]
-    for_time: Option<f64>,
-    /// Run the clock of board and machine so many times as fast
+    duration: Option<f64>,
+    /// Speed up the clock of board and machine
     #[arg(long, value_name = "N", default_value_t = 1, hide = true, value_parser = input::clock_speed())]
     clock_speed: u32,
 }
@@ -124,6 +135,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(5);
 const AWAY: Duration = Duration::from_secs(1);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.to == LinkUrl::Stdout && stdout::was_closed() {
+        return Err(output::closed());
+    }
     let rig = input::read_rig(&arguments.rig)?;
     let mut finger = Finger::random(&rig, arguments.seed);
     if let Some(path) = &arguments.finger {
@@ -145,7 +159,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|error| Complaint::about(&arguments.rig, error))?;
     let machine = machine(arguments, &rig)?;
     let link = Link::open(&arguments.to).map_err(Complaint::new)?;
-    remark!("{}", link.name());
+    alert!("{}", link.name());
     Plugged { board, link, machine, away_until: None, commands: 0 }.run(arguments)
 }
 
@@ -168,7 +182,7 @@ impl Arguments {
                 line_per_s: amount(self.drift, drift.line_per_s),
                 walk_per_root_s: amount(self.walk, drift.walk_per_root_s),
             },
-            repeated_readings: self.repeats.unwrap_or(repeated_readings),
+            repeated_readings: self.repeated_readings.unwrap_or(repeated_readings),
             ..faults.imperfections
         };
         FaultConfig {
@@ -217,7 +231,7 @@ fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<PluggedMachine>, F
     let machine =
         SimulatedMachine::with_config(firmware, stage.clone(), extent, force_n.unwrap_or(1.0), config);
     let link = Link::open(url).map_err(Complaint::new)?;
-    remark!("a machine of {} firmware at {}", firmware.name(), link.name());
+    alert!("a machine of {} firmware at {}", firmware.name(), link.name());
     Ok(Some(PluggedMachine { machine, link, was_there: false, was_stopped: false }))
 }
 
@@ -272,7 +286,7 @@ impl Plugged<'_> {
         let mut unsent = 0_u64;
         loop {
             let now = clock.elapsed();
-            let is_over = arguments.for_time.is_some_and(|most| now.as_secs_f64() >= most);
+            let is_over = arguments.duration.is_some_and(|most| now.as_secs_f64() >= most);
             if interrupted() || is_over {
                 return self.finish(unsent);
             }
@@ -315,7 +329,7 @@ impl Plugged<'_> {
                 self.commands += 1;
                 remark!("command {}: {line}", self.commands);
             } else if let Err(problem) = self.board.finger_mut().obey(line) {
-                remark!("`{line}`: {problem}");
+                alert!("`{line}`: {problem}");
             }
         }
         Ok(())

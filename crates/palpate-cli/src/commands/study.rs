@@ -24,33 +24,46 @@ mod shards;
 
 use fits::{FitFiles, Tally};
 
-/// Run a set of experiments: arms by seeds; `paper` is the founding paper's study.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Replicate the founding paper with 2 fits of each arm instead of 100
+  palpate study paper --seeds 2 -o paper
+
+  # Continue with 3 fits of each arm
+  palpate study paper --seeds 3 -o paper --resume";
+
+/// Run a study: fit and evaluate every arm over several seeds
+///
+/// A study is a TOML file, or one of three built-in studies: `paper` replicates the founding paper, `dead-areas` measures the errors between
+/// sensors, and `elliott` replicates the chain of principal components and a network on a plate.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// A study file, `paper`, `dead-areas`: what lies between sensors, or `elliott`: components of a plate's readings and a network
+    /// Study file, or `paper`, `dead-areas` or `elliott`
     study: PathBuf,
-    /// Fits of each arm [default: what the study says]
+    /// Number of fits of each arm [default: that of the study]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     seeds: Option<u64>,
-    /// Threads that fit [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Folder for results and report [default: palpate-out/<study>]
-    #[arg(long, value_name = "DIR")]
+    /// Write results and report into DIR [default: palpate-out/<study>]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Run the K-th of N shares of the study alone, as a job of many; --merge joins them [default DIR: palpate-out/<study>/shard-K-of-N]
+    /// Run shard K of N, for jobs on several machines [default DIR: palpate-out/<study>/shard-K-of-N]
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// Join the shards in these folders into the results and the report of the whole study
+    /// Merge the shards in these folders into the results of the whole study
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "seeds", "threads", "resume"])]
     merge: Vec<PathBuf>,
-    /// Go on from an earlier run, stopped or finished: what is finished is kept
+    /// Continue an earlier run and keep its finished fits
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
-    /// Throw an earlier run away, finished or not
+    /// Delete an earlier run, finished or not
     #[arg(long)]
     overwrite: bool,
-    /// Print results.json instead of tables
+    /// Print the content of results.json instead of tables
     #[arg(long)]
     json: bool,
 }

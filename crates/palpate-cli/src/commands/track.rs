@@ -23,44 +23,54 @@ use serde_json::json;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-/// Follow a moving contact, or two: readings in time in (a CSV file, or stdin), the track out.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Track a contact in a file of readings, ten per second
+  palpate track beam.json touches.csv --rate \"10 Hz\"
+
+  # Smooth the recording, and write a report
+  palpate track beam.json touches.csv --rate \"10 Hz\" --smooth --report track";
+
+/// Track a moving contact, or two
 ///
-/// Two are followed on a line by a locator whose estimator has `contacts = 2`; on a plane, one. Time comes from a column `time_s`
-/// or from --rate. A terminal gets a line where a contact begins, changes by more than its interval, and ends; a file or a pipe gets a row of
-/// CSV a reading. Where the file has the true contacts, stderr gets the errors at the end.
+/// Filters a series of readings. On a line a locator with `contacts = 2` tracks two contacts; on a plane one contact is tracked. Times are those
+/// of the column `time_s`, or follow from --rate. A terminal gets a line at the beginning, at changes and at the end of each contact; a file or a
+/// pipe gets a row of CSV per reading. If the file contains the true contacts, the errors are printed on stderr at the end.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// An influence locator of a surface with a model
+    /// Influence locator of a surface with a model
     locator: PathBuf,
-    /// The readings; `-` or nothing for stdin
+    /// CSV file of readings, `-` for stdin [default: stdin]
     readings: Option<PathBuf>,
-    /// Readings a second, where no column `time_s` tells the time
+    /// Readings per second of a file without a column `time_s`, such as "100 Hz"
     #[arg(long, value_name = "FREQUENCY", value_parser = input::frequency)]
     rate: Option<f64>,
-    /// Go back over the whole recording: nothing is printed before its end
+    /// Smooth the whole recording; prints after its last reading
     #[arg(long)]
     smooth: bool,
-    /// The first natural frequency of a beam on two simple supports: reckon with its inertia, and 1 % of the critical damping
+    /// First natural frequency of a simply supported beam, such as "12 Hz", to model its inertia with 1 % of the critical damping [default: no inertia]
     #[arg(long, value_name = "FREQUENCY", value_parser = input::frequency)]
     frequency: Option<f64>,
-    /// A rig with [motion]: its beam's natural frequency and damping are taken, and a report shows the errors of its motion at other speeds
+    /// Take the natural frequency and damping of the rig's [motion], and add the errors at other speeds to the report
     #[arg(long, value_name = "RIG", conflicts_with = "frequency")]
     rig: Option<PathBuf>,
-    /// Seed of the simulations with other speeds
+    /// Seed of the simulations at other speeds
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
     tare: TareOption,
-    /// Print one JSON object a reading
+    /// Print one JSON object per reading
     #[arg(long)]
     json: bool,
-    /// Print one row of CSV a reading, also on a terminal
+    /// Print one row of CSV per reading, also on a terminal
     #[arg(long, conflicts_with = "json")]
     csv: bool,
-    /// Print the lines of a terminal, also into a file or a pipe
+    /// Print the lines of a terminal, also to a file or a pipe
     #[arg(long, conflicts_with_all = ["json", "csv"])]
     text: bool,
-    /// Folder for a report
+    /// Write a report into DIR: report.html and its figures
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
 }

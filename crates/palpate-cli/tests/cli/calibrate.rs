@@ -457,7 +457,7 @@ fn statements_of_the_operator_are_checked() {
         let words = complaint(&["calibrate", "rig.toml", &format!("--placement={wrong}")]);
         assert!(words.contains("--placement"), "{wrong}: {words}");
     }
-    let words = calibrating(&["--second-force", "2 N", "--force-is-known"]);
+    let words = calibrating(&["--second-force", "2 N", "--known-force"]);
     assert!(words.contains("cannot be used with"), "{words}");
     let words = complaint(&["serve", "rig.toml", "--placement", "2 mm"]);
     assert!(words.contains("--placement is for a calibration"), "{words}");

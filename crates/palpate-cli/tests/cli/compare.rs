@@ -17,7 +17,7 @@ fn with_estimator(folder: &Path, kind: &str) {
 fn every_estimator_is_held_against_the_limit() {
     // The paper's network takes its time; a short training will do.
     let folder = folder(Toml::parse(NOISY_BEAM).estimator("network").add("estimator.max_epochs", 5_000));
-    let arguments = ["compare", "rig.toml", "--json", "--out", "report", "--calibrations", "2"];
+    let arguments = ["compare", "rig.toml", "--json", "--report", "report", "--calibrations", "2"];
     let found: Value = serde_json::from_str(&said(&run(folder.path(), &arguments))).unwrap();
     let estimators = found["estimators"].as_array().unwrap();
     let mut names: Vec<&str> = estimators.iter().map(|row| row["name"].as_str().unwrap()).collect();
@@ -107,11 +107,11 @@ fn auto_takes_the_best_and_says_why() {
 fn auto_stops_when_its_time_is_used_up() {
     let folder = folder(Toml::parse(NOISY_BEAM).set("training.repeats", 2));
     with_estimator(folder.path(), "auto");
-    let late = run(folder.path(), &["fit", "other.toml", "-o", "locator.json", "--auto-seconds", "0"]);
+    let late = run(folder.path(), &["fit", "other.toml", "-o", "locator.json", "--time-limit", "1 us"]);
     let why = String::from_utf8(late.stderr.clone()).unwrap();
-    assert!(why.contains("no estimator was done within the 0 s that the choice may take"), "{why}");
+    assert!(why.contains("no estimator was done within the 0.000001 s that the choice may take"), "{why}");
     assert!(!late.status.success() && !folder.path().join("locator.json").exists(), "{why}");
-    let refused = run(folder.path(), &["fit", "other.toml", "-o", "locator.json", "--auto-seconds", "-1"]);
+    let refused = run(folder.path(), &["fit", "other.toml", "-o", "locator.json", "--time-limit", "-1 s"]);
     assert_eq!(refused.status.code(), Some(2));
 }
 
@@ -134,7 +134,7 @@ fn a_dead_channel_is_left_out_of_the_sums() {
     fs::write(folder.path().join("stuck.csv"), stuck.join("\n")).unwrap();
     let located = said(&run(folder.path(), &["locate", "locator.json", "stuck.csv", "--no-header"]));
     assert!(located.lines().skip(1).all(|line| line.ends_with("outside_model")), "{located}");
-    let arguments = ["locate", "locator.json", "stuck.csv", "--no-header", "--dead", "3"];
+    let arguments = ["locate", "locator.json", "stuck.csv", "--no-header", "--disable", "3"];
     let located = said(&run(folder.path(), &arguments));
     for (line, x_mm) in located.lines().skip(1).zip(positions_mm) {
         let cells: Vec<&str> = line.split(',').collect();
@@ -144,7 +144,7 @@ fn a_dead_channel_is_left_out_of_the_sums() {
         );
     }
     complained(
-        &run(folder.path(), &["locate", "locator.json", "stuck.csv", "--no-header", "--dead", "9"]),
+        &run(folder.path(), &["locate", "locator.json", "stuck.csv", "--no-header", "--disable", "9"]),
         2,
     );
 }
@@ -173,9 +173,9 @@ fn tables_stand_beside_the_reports() {
     let folder = folder(crate::support::examples::PAPER);
     let compare =
         ["compare", "rig.toml", "--only", "influence", "--only", "closed-form", "--calibrations", "2"];
-    said(&run(folder.path(), &[&compare[..], &["--out", "page"]].concat()));
+    said(&run(folder.path(), &[&compare[..], &["--report", "page"]].concat()));
     said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
-    said(&run(folder.path(), &["evaluate", "locator.json", "--out", "page2"]));
+    said(&run(folder.path(), &["evaluate", "locator.json", "--report", "page2"]));
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     let rows = |name: &str| -> Vec<Vec<String>> {
         read(name).lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect()

@@ -83,7 +83,8 @@ fn a_report_verifies_what_it_claims() {
         "from = \"20 mm\", to = \"380 mm\"",
         "from = \"30 mm\", to = \"370 mm\"",
     ));
-    let arguments = ["design", "sensors", "rig.toml", "--counts", "2..5", "--out", "deep/report", "--json"];
+    let arguments =
+        ["design", "sensors", "rig.toml", "--counts", "2..5", "--report", "deep/report", "--json"];
     let found: Value = serde_json::from_str(&said(&run(folder.path(), &arguments))).unwrap();
     for name in ["report.html", "figure-1.svg", "figure-2.svg", "figure-3.svg", "figure-4.svg"] {
         assert!(folder.path().join("deep/report").join(name).is_file(), "{name}");
@@ -122,7 +123,7 @@ fn a_plate_has_maps() {
         format!("{coarse}\n[design]\nsites = \"50 mm\"\ncontacts = {{ every = \"50 mm\" }}\ncount = 4\n");
     let folder = folder(rig);
     let told =
-        said(&run(folder.path(), &["design", "sensors", "rig.toml", "--out", "report", "--verify", "1"]));
+        said(&run(folder.path(), &["design", "sensors", "rig.toml", "--report", "report", "--verify", "1"]));
     assert!(told.contains("greedy-exchange: deflection (") && told.contains("Report:"), "{told}");
     for name in ["figure-1.svg", "figure-2.svg"] {
         assert!(folder.path().join("report").join(name).is_file(), "{name}");
@@ -154,7 +155,7 @@ fn what_cannot_be_designed_is_refused_in_words() {
     ];
     let complaint = |(what, rig, arguments): &(&str, &str, &[&str])| {
         let folder = folder(rig);
-        let arguments = [&["design", "sensors", "rig.toml", "--out", "report"], *arguments].concat();
+        let arguments = [&["design", "sensors", "rig.toml", "--report", "report"], *arguments].concat();
         let complaint = complained(&run(folder.path(), &arguments), 2);
         assert!(!folder.path().join("report").exists(), "{what}");
         format!("{what}:\n{complaint}")

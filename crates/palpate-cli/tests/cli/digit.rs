@@ -49,8 +49,10 @@ const TIP_MM: (f64, f64) = (74.64, -82.86);
 #[test]
 fn the_limit_and_its_report_know_the_bent_finger() {
     let folder = folder(DIGIT);
-    let found =
-        json(folder.path(), &["limit", "rig.toml", "--force", "4 N", "--every", "30 mm", "--out", "report"]);
+    let found = json(
+        folder.path(),
+        &["limit", "rig.toml", "--force", "4 N", "--every", "30 mm", "--report", "report"],
+    );
     let positions = found["positions"].as_array().unwrap();
     let at = |i: usize, key: &str| positions[i][key].as_f64().unwrap();
     assert_eq!(at(2, "x_mm").round(), 90.0);

@@ -49,7 +49,7 @@ fn record(name: &str, input: &[u8]) -> Output {
 }
 
 fn record_from(name: &str, url: &str) -> String {
-    let arguments = ["record", "locator.json", "--from", url, "--out", name, "--seconds", "0.3"];
+    let arguments = ["record", "locator.json", "--from", url, "--out", name, "--duration", "0.3 s"];
     complained(&run(BENCH.path(), &arguments), 3)
 }
 

@@ -91,7 +91,7 @@ force = "1000 N"
 #[test]
 fn over_a_support_an_unknown_force_is_not_told() {
     let folder = folder(LONG_BEAM);
-    let table = said(&run(folder.path(), &["limit", "rig.toml", "--force", "1000 N", "--out", "report"]));
+    let table = said(&run(folder.path(), &["limit", "rig.toml", "--force", "1000 N", "--report", "report"]));
     let row = table.lines().find(|line| line.starts_with("12000 mm")).unwrap();
     assert_eq!(row.matches("not told").count(), 2, "{table}");
     let words =
@@ -131,7 +131,7 @@ fn a_dead_sensor_is_left_out() {
 #[test]
 fn the_report_and_its_pictures_are_written() {
     let folder = folder(PAPER);
-    let told = said(&run(folder.path(), &["limit", "rig.toml", "--out", "deep/report"]));
+    let told = said(&run(folder.path(), &["limit", "rig.toml", "--report", "deep/report"]));
     assert!(told.contains("Report: deep/report/report.html"), "{told}");
     let written = |name: &str| folder.path().join("deep/report").join(name).is_file();
     for name in ["report.html", "figure-1.svg", "figure-2.svg"] {
@@ -158,7 +158,7 @@ fn benches_without_a_limit_are_refused_in_words() {
     ];
     let complaint = |(what, rig, arguments): &(&str, &str, &[&str])| {
         let folder = folder(rig);
-        let arguments = [&["limit", "rig.toml", "--out", "report"], *arguments].concat();
+        let arguments = [&["limit", "rig.toml", "--report", "report"], *arguments].concat();
         let complaint = complained(&run(folder.path(), &arguments), 2);
         assert!(!folder.path().join("report").exists(), "{what}");
         format!("{what}:\n{complaint}")
@@ -171,7 +171,7 @@ fn a_locator_of_a_measured_surface_has_a_limit_and_a_lightest_touch() {
     let (folder, mut board) = (folder(board::RIG), Board::new(3));
     fs::write(folder.path().join("presses.csv"), board.calibration(210)).unwrap();
     said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
-    let told = json(folder.path(), &["limit", "board.json", "--force", "3 N", "--out", "page"]);
+    let told = json(folder.path(), &["limit", "board.json", "--force", "3 N", "--report", "page"]);
     // Raw channels have no places: 42.86 mm is where even sensors would be.
     let page = fs::read_to_string(folder.path().join("page/report.html")).unwrap();
     assert!(page.contains("standard deviation") && !page.contains("42.86"));

@@ -43,7 +43,7 @@ fn tracked_and_filtered_sessions_are_recorded_and_located_again_to_the_last_bit(
         ("inertia.mcap", &["--track", "--frequency", "17 Hz"]),
         ("filtered.mcap", &["--low-pass", "20 Hz"]),
     ] {
-        let told = record(folder.path(), out, &[more, &["--seconds", "3"]].concat());
+        let told = record(folder.path(), out, &[more, &["--duration", "3 s"]].concat());
         let touched = told.iter().filter(|sample| sample["status"] == "located").count();
         assert!(told.len() > 500 && touched > 50, "{out}: {touched} of {}", told.len());
         let output = run(folder.path(), &["replay", out, "--json"]);
@@ -62,7 +62,7 @@ fn tracked_and_filtered_sessions_are_recorded_and_located_again_to_the_last_bit(
 fn a_contact_on_a_plane_has_its_covariance_tracked_or_not() {
     let folder = bench(PLATE);
     for (out, more) in [("single.mcap", &[][..]), ("tracked.mcap", &["--track"])] {
-        let told = record(folder.path(), out, &[more, &["--seconds", "3"]].concat());
+        let told = record(folder.path(), out, &[more, &["--duration", "3 s"]].concat());
         let located: Vec<&Value> = told.iter().filter(|sample| sample["status"] == "located").collect();
         assert!(located.len() > 50, "{} of {}", located.len(), told.len());
         for sample in located {
@@ -81,7 +81,7 @@ fn a_contact_on_a_plane_has_its_covariance_tracked_or_not() {
 #[test]
 fn a_recording_is_followed_afterwards_as_it_would_have_been() {
     let folder = bench(NOISY_BEAM);
-    let told = record(folder.path(), "single.mcap", &["--seconds", "3"]);
+    let told = record(folder.path(), "single.mcap", &["--duration", "3 s"]);
     for more in [&["--track"][..], &["--low-pass", "5 Hz"]] {
         let replayed =
             samples(&said(&run(folder.path(), &[&["replay", "single.mcap", "--json"], more].concat())));
@@ -190,7 +190,7 @@ fn sources_without_a_way_back_and_rules_without_a_broker_are_refused() {
     fs::write(folder.path().join("rules.toml"), RULES).unwrap();
     said(&run(
         folder.path(),
-        &["record", "locator.json", "--from", BOARD, "--out", "a.mcap", "--seconds", "0.3"],
+        &["record", "locator.json", "--from", BOARD, "--out", "a.mcap", "--duration", "0.3 s"],
     ));
     let record = ["record", "locator.json", "--out", "never.mcap", "--rules", "rules.toml", "--from"];
     for from in ["-", "udp://127.0.0.1:47123", "file:a.mcap", BOARD, "mqtt://127.0.0.1/a/+"] {

@@ -41,16 +41,16 @@ fn inputs_are_not_written_over() {
     kept(folder, &["fit", "rig.toml", "-o", "./rig.toml"], "rig.toml", why);
     kept(folder, &["simulate", "rig.toml", "-o", "rig.toml"], "rig.toml", why);
     kept(folder, &["simulate", "rig.toml", "--moving", "-o", "rig.toml"], "rig.toml", why);
-    kept(folder, &["profile", "load.toml", "--report", "load.toml"], "load.toml", why);
     kept(folder, &["init", "table.csv", "-o", "table.csv", "--overwrite"], "table.csv", why);
     kept(folder, &["design", "sensors", "rig.toml", "-o", "rig.toml"], "rig.toml", why);
     kept(folder, &["design", "positions", "positions.toml", "-o", "positions.toml"], "positions.toml", why);
     fs::copy(folder.join("presses.csv"), folder.join("errors.csv")).unwrap();
     for verb in ["evaluate", "compare"] {
-        kept(folder, &[verb, "rig.toml", "--data", "errors.csv", "--out", "."], "errors.csv", why);
+        kept(folder, &[verb, "rig.toml", "--data", "errors.csv", "--report", "."], "errors.csv", why);
     }
     fs::copy(folder.join("presses.csv"), folder.join("report.html")).unwrap();
     kept(folder, &["track", "locator.json", "report.html", "--report", "."], "report.html", why);
+    kept(folder, &["profile", "load.toml", "report.html", "--report", "."], "report.html", why);
 }
 
 #[test]
@@ -71,7 +71,9 @@ fn links_to_inputs_are_inputs() {
     // Where stdin comes from, and where stdout goes.
     let stdin = fs::File::open(folder.join("presses.csv")).unwrap();
     let out = fs::File::create(folder.join("told.txt")).unwrap();
-    let profile = ["profile", "rig.toml", "-", "--report", "hard.csv"];
+    fs::create_dir(folder.join("page")).unwrap();
+    fs::hard_link(folder.join("presses.csv"), folder.join("page/report.html")).unwrap();
+    let profile = ["profile", "rig.toml", "-", "--report", "page"];
     let output = palpate(folder).args(profile).stdin(stdin).output().unwrap();
     assert!(complained(&output, 2).contains("as stdin"));
     let output =
@@ -109,7 +111,7 @@ fn what_is_no_file_is_not_replaced() {
     assert!(fs::symlink_metadata(at("pipe")).unwrap().file_type().is_fifo());
     assert!(fs::symlink_metadata(at("null")).unwrap().file_type().is_symlink());
     let limit = |out: &str, why: &str| {
-        let complaint = complained(&run(folder.path(), &["limit", "rig.toml", "--out", out]), 2);
+        let complaint = complained(&run(folder.path(), &["limit", "rig.toml", "--report", out]), 2);
         assert!(complaint.contains(why), "{out}: {complaint}");
     };
     limit("out", "it is a folder");
@@ -169,16 +171,17 @@ fn finished_studies_are_kept() {
     }
     let rig = path.join("rig.toml");
     fs::write(&rig, NOISY_BEAM).unwrap();
-    let complaint = complained(&run(path, &["limit", "rig.toml", "--out", "out"]), 2);
-    assert!(complaint.contains("a study's results.json is there"), "{complaint}");
+    fs::write(path.join("load.toml"), LOAD_PROFILE).unwrap();
+    for arguments in [["limit", "rig.toml", "--report", "out"], ["profile", "load.toml", "--report", "out"]] {
+        let complaint = complained(&run(path, &arguments), 2);
+        assert!(complaint.contains("a study's results.json is there"), "{complaint}");
+    }
     assert_eq!((text(path, "out/networks.csv"), text(path, "out/results.json")), (networks.clone(), results));
 
     // Nor by a command that writes one file.
-    fs::write(path.join("load.toml"), LOAD_PROFILE).unwrap();
     for (arguments, name) in [
         (&["fit", "rig.toml", "-o", "out/results.json"][..], "results.json"),
         (&["simulate", "rig.toml", "-o", "out/networks.csv"], "networks.csv"),
-        (&["profile", "load.toml", "--report", "out/report.html"], "report.html"),
     ] {
         kept(path, arguments, &format!("out/{name}"), "it is a result of the study whose");
     }

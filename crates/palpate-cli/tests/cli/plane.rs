@@ -17,7 +17,7 @@ fn files(folder: &Path) -> Vec<String> {
 #[test]
 fn the_limit_of_the_plate_is_a_table_and_a_map() {
     let folder = folder(PLATE);
-    let words = said(&run(folder.path(), &["limit", "rig.toml", "--out", "report"]));
+    let words = said(&run(folder.path(), &["limit", "rig.toml", "--report", "report"]));
     insta::assert_snapshot!(words);
     let mut written = files(&folder.path().join("report"));
     written.retain(|name| !name.ends_with(".png"));
@@ -30,7 +30,7 @@ fn the_limit_of_the_plate_is_a_table_and_a_map() {
 fn every_estimator_runs_on_the_plate() {
     let folder = folder(PLATE);
     let all = ["influence", "gaussian-process", "neighbours", "centroid", "network-lm"];
-    let mut arguments = vec!["compare", "rig.toml", "--calibrations", "1", "--out", "report"];
+    let mut arguments = vec!["compare", "rig.toml", "--calibrations", "1", "--report", "report"];
     all.iter().for_each(|kind| arguments.extend(["--only", *kind]));
     let found = json(folder.path(), &arguments);
     assert_eq!(found["readings"], 400);
@@ -70,7 +70,7 @@ fn a_plate_is_simulated_fitted_located_and_evaluated() {
     let [x_mm, y_mm] = [first[1], first[2]].map(|cell| cell.parse::<f64>().unwrap());
     assert!((x_mm - 60.0).abs() < 5.0 && (y_mm - 60.0).abs() < 5.0 && first[11] == "located", "{first:?}");
 
-    let arguments = ["evaluate", "plate.locator", "--data", "presses.csv", "--out", "report"];
+    let arguments = ["evaluate", "plate.locator", "--data", "presses.csv", "--report", "report"];
     let words = said(&run(path, &arguments));
     assert!(words.contains("effective area: "), "{words}");
     assert!(files(&path.join("report")).contains(&"figure-1.svg".to_owned()));

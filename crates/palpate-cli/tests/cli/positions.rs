@@ -16,7 +16,7 @@ fn design(folder: &Path, arguments: &[&str]) -> std::process::Output {
 #[test]
 fn people_get_a_table_of_arrangements_a_rig_and_a_report() {
     let folder = folder(SENSOR_DESIGN);
-    let arguments = ["--count", "6", "-o", "pressed.toml", "--out", "page"];
+    let arguments = ["--count", "6", "-o", "pressed.toml", "--report", "page"];
     let output = design(folder.path(), &[&QUICK[..], &arguments].concat());
     let told = said(&output);
     let start = "rig.toml: 6 training positions, 5 presses each, for the `influence` estimator; 73 contacts, force unknown";

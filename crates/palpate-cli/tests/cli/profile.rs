@@ -17,7 +17,7 @@ fn number(value: &Value) -> f64 {
 fn the_example_tells_both_pads() {
     let folder = folder(LOAD_PROFILE);
     let json =
-        said(&run(folder.path(), &["profile", "rig.toml", "--json", "--seed", "1", "--report", "page.html"]));
+        said(&run(folder.path(), &["profile", "rig.toml", "--json", "--seed", "1", "--report", "page"]));
     let found: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(found["status"], "located");
     assert!((number(&found["total_n"]["value"]) / 4.0 - 1.0).abs() < 0.02, "{json}");
@@ -33,7 +33,7 @@ fn the_example_tells_both_pads() {
         assert!(number(&force["low"]) < 2.0 && number(&force["high"]) > 2.0, "{force}");
     }
     assert_eq!(found["profile"].as_array().unwrap().len(), 80);
-    let page = fs::read_to_string(folder.path().join("page.html")).unwrap();
+    let page = fs::read_to_string(folder.path().join("page/report.html")).unwrap();
     assert!(page.contains("figure-4") && page.contains("true load") && !page.contains("http://palpate"));
     assert!(
         page.contains("from rig.toml, simulated with seed 1."),
@@ -46,7 +46,7 @@ fn the_pressure_on_a_plate_is_a_map() {
     let folder = folder(PRESSURE_MAP);
     let told = said(&run(folder.path(), &["profile", "rig.toml"]));
     assert!(told.contains("across") && told.contains("centre y, mm"), "{told}");
-    let json = said(&run(folder.path(), &["profile", "rig.toml", "--json", "--report", "page.html"]));
+    let json = said(&run(folder.path(), &["profile", "rig.toml", "--json", "--report", "page"]));
     let found: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(found["status"], "located");
     assert!((number(&found["total_n"]["value"]) / 10.0 - 1.0).abs() < 0.02, "{}", found["total_n"]);
@@ -58,7 +58,7 @@ fn the_pressure_on_a_plate_is_a_map() {
             assert!(off_mm.abs() < 3.0 * number(&load[limit]), "{centre}: off by {off_mm} mm");
         }
     }
-    let page = fs::read_to_string(folder.path().join("page.html")).unwrap();
+    let page = fs::read_to_string(folder.path().join("page/report.html")).unwrap();
     assert!(page.contains("kPa") && page.contains("simulated") && page.contains("figure-4"));
 }
 

@@ -59,7 +59,7 @@ fn the_continuous_beam_is_located_at_the_limit() {
 
 #[test]
 fn the_limit_of_the_cantilever_is_that_of_its_clamp() {
-    let found = json(folder(CANTILEVER).path(), &["limit", "rig.toml", "--out", "report"]);
+    let found = json(folder(CANTILEVER).path(), &["limit", "rig.toml", "--report", "report"]);
     let median_mm = found["known_force"]["median_mm"].as_f64().unwrap();
     assert!((median_mm - 0.284).abs() < 1e-3, "{median_mm}");
     // A clamp that holds the beam alone takes up the whole force, wherever that acts.

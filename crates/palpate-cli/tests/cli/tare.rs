@@ -275,7 +275,7 @@ fn held_out_readings_are_judged_without_the_drift_of_the_recording() {
     assert!(refused.contains("--tare auto takes off the drift"), "{refused}");
     // `auto` judges likewise.
     file("auto.toml", &RIG.replace("\"influence\"", "\"auto\""));
-    let options = ["--data", "drift.csv", "--auto-seconds", "30", "-o", "auto.json"];
+    let options = ["--data", "drift.csv", "--time-limit", "30 s", "-o", "auto.json"];
     let fit = run(folder.path(), &[&["fit", "auto.toml"][..], &options].concat());
     let chosen = String::from_utf8(fit.stderr).unwrap();
     assert!(chosen.contains("it is taken off held-out readings\nchosen: influence force-"), "{chosen}");

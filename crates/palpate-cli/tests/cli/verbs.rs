@@ -96,7 +96,7 @@ fn the_water_recording_is_cross_validated_by_position() {
     let Some(data) = data::recording("tactile-fsi/1d-water-1.5mm.csv") else { return };
     let (folder, data) = (folder(FSI_WATER), data.display().to_string());
     let evaluated =
-        run(folder.path(), &["evaluate", "rig.toml", "--data", &data, "--json", "--out", "report"]);
+        run(folder.path(), &["evaluate", "rig.toml", "--data", &data, "--json", "--report", "report"]);
     let found: Value = serde_json::from_str(&said(&evaluated)).unwrap();
     assert_eq!(found["folds"], 5);
     assert_eq!(found["errors"][0]["count"], 779);

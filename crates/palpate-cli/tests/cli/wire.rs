@@ -65,8 +65,10 @@ fn sessions_are_served_to_foxglove_and_survive_a_router_that_is_not_there() {
 fn a_recording_beside_a_router_that_is_not_there_is_whole() {
     let folder = bench();
     let record = ["record", "locator.json", "--from", "simulated:rig.toml?rate=100", "--out", "press.mcap"];
-    let told =
-        said(&run(folder.path(), &[&record[..], &["--seconds", "1", "--ros", "tcp/127.0.0.1:1"]].concat()));
+    let told = said(&run(
+        folder.path(),
+        &[&record[..], &["--duration", "1 s", "--ros", "tcp/127.0.0.1:1"]].concat(),
+    ));
     assert!(told.contains("readings in"), "{told}");
 }
 

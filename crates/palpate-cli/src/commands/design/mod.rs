@@ -14,8 +14,18 @@ use palpate_rig::Rig;
 use std::path::Path;
 use toml_edit::{DocumentMut, TomlError, Value};
 
-/// Where to put the sensors, and where to press.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Design a layout of four sensors
+  palpate design sensors beam.toml --count 4
+
+  # Design six training positions with a short search
+  palpate design positions beam.toml --count 6 --trials 2 --calibrations 1 --verify 2";
+
+/// Design the sensor layout or the training positions of a rig
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
     #[command(subcommand)]
     what: What,

@@ -21,48 +21,58 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use toml_edit::{Array, DocumentMut, Item, Table as TomlTable, value};
 
-/// Where to press: training positions by rules and by search, scored by the location error after calibrating.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Design six training positions with a short search, and write the rig with them
+  palpate design positions beam.toml --count 6 --trials 2 --calibrations 1 --verify 2 -o six.toml
+
+  # Propose the next press of a recording
+  palpate design positions beam.toml --data presses.csv";
+
+/// Design training positions: choose positions that minimize the location error after the calibration
 ///
-/// Calibrations of the rig's estimator are simulated, with noise; contacts are those of the rig's [design], or come from all
-/// over. With --data, a recording begun: where to press next, what that gains, and when to stop.
+/// Compares rules and a search by simulated calibrations of the rig's estimator. Contacts are those of the rig's [design], or all over the surface.
+/// With --data, proposes the next press of an unfinished calibration, its expected gain, and when to stop.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The rig file
+    /// Rig file
     rig: PathBuf,
-    /// Training positions [default: the rig's, or 10]
+    /// Number of training positions [default: that of the rig, or 10]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
     count: Option<u16>,
-    /// Presses at each position [default: the rig's, or 1]
+    /// Number of presses at each position [default: that of the rig, or 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
     repeats: Option<u16>,
-    /// Arrangements that the search may try
+    /// Number of arrangements that the search evaluates
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     trials: u32,
-    /// Simulated calibrations of each, while searching
+    /// Number of simulated calibrations of each arrangement in the search
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     calibrations: u16,
-    /// Calibrations with fresh noise, which the figures are of
+    /// Verify each arrangement by N simulated calibrations with other noise
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     verify: u16,
-    /// A recording begun: say where to press next
+    /// Unfinished recording: propose its next press
     #[arg(long, value_name = "FILE.csv")]
     data: Option<PathBuf>,
-    /// The recording's contacts, where --data has the readings alone; row by row
+    /// Contacts of the recording, row by row, if --data contains readings only
     #[arg(long, value_name = "FILE.csv", requires = "data")]
     contacts: Option<PathBuf>,
-    /// With --data: stop once endlessly many presses would lower the error by less than this, in %
+    /// Propose to stop once any number of further presses lowers the error by less than this, in %
     #[arg(long, value_name = "PERCENT", default_value_t = 5.0, value_parser = percent, requires = "data")]
     stop_below: f64,
-    /// Seed of all simulations and fits
+    /// Seed of simulations and fits
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Write the rig with the best positions
-    #[arg(short, value_name = "RIG", conflicts_with = "data")]
-    output: Option<PathBuf>,
-    /// Folder for a report
-    #[arg(long, value_name = "DIR", conflicts_with = "data")]
+    /// Write the rig with the best positions to RIG
+    #[arg(short, long, value_name = "RIG", conflicts_with = "data")]
     out: Option<PathBuf>,
-    /// Print the findings as JSON
+    /// Write a report into DIR: report.html and its figures
+    #[arg(long, value_name = "DIR", conflicts_with = "data")]
+    report: Option<PathBuf>,
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
@@ -80,8 +90,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::parse_rig(&arguments.rig, &text)?;
     let files = RecordingFiles { data: arguments.data.clone(), contacts: arguments.contacts.clone() };
     let inputs = Inputs::new(files.paths().chain([arguments.rig.as_path()]));
-    let output = arguments.output.as_ref().map(|path| Target::new(path, &inputs)).transpose()?;
-    let out = arguments.out.as_ref().map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
+    let out = arguments.out.as_ref().map(|path| Target::new(path, &inputs)).transpose()?;
+    let report = arguments.report.as_ref();
+    let report = report.map(|folder| TargetFolder::for_report(folder, &inputs)).transpose()?;
     if let Some(recording) = files.read(&rig.setup)? {
         return advise(arguments, &rig, &recording);
     }
@@ -89,20 +100,20 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let problem = PositionProblem::new(&rig.setup, &what_to_design(arguments, &rig)).map_err(complain)?;
     let placed = Observer::of_stages().watch(|watch| problem.all(watch)).map_err(complain)?;
     let outcome = Outcome { rig: &arguments.rig, estimator: rig.estimator.kind(), problem: &problem, placed };
-    if let (Some(target), Some(best)) = (&output, best_placed(&outcome.placed)) {
+    if let (Some(target), Some(best)) = (&out, best_placed(&outcome.placed)) {
         let (_, written) = changed_rig(target.path(), &text, "positions", |rig| {
             place_presses(rig, &best.positions, problem.design().repeats, problem.extent());
         })?;
         target.write(written.as_bytes())?;
     }
-    if let Some(out) = &out {
-        write_report(&outcome, &rig, out)?;
+    if let Some(folder) = &report {
+        write_report(&outcome, &rig, folder)?;
     }
     if arguments.json {
         return output::say_json(&to_json(&outcome));
     }
     print(&outcome)?;
-    say_files(arguments.output.as_deref(), arguments.out.as_deref())
+    say_files(arguments.out.as_deref(), arguments.report.as_deref())
 }
 
 /// Design settings of the rig and the command line.
@@ -122,7 +133,7 @@ fn what_to_design(arguments: &Arguments, rig: &Rig) -> PositionDesign {
     }
 }
 
-fn write_report(outcome: &Outcome, rig: &Rig, out: &TargetFolder) -> Result<(), Failure> {
+fn write_report(outcome: &Outcome, rig: &Rig, folder: &TargetFolder) -> Result<(), Failure> {
     let report = PositionDesignReport {
         title: &format!("Training positions for {}", outcome.rig.display()),
         setup: &rig.setup,
@@ -130,7 +141,7 @@ fn write_report(outcome: &Outcome, rig: &Rig, out: &TargetFolder) -> Result<(), 
         problem: outcome.problem,
         placed: &outcome.placed,
     };
-    out.write_report(position_design_report(&report))
+    folder.write_report(position_design_report(&report))
 }
 
 fn percent(text: &str) -> Result<f64, String> {

@@ -28,45 +28,55 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table as TomlTable, Value, value};
 
-/// Where to put the sensors: layouts by several methods, scored by the location error that physics allows.
+/// Examples in the long help.
+const EXAMPLES: &str = "\
+Examples:
+  # Design a layout of four sensors, and write the rig with it
+  palpate design sensors beam.toml --count 4 -o four.toml
+
+  # Compute the limit of 2 to 4 sensors
+  palpate design sensors beam.toml --counts 2..4";
+
+/// Design a sensor layout: choose positions that minimize the physical limit of the location error
 ///
-/// What they are chosen from and what they must keep to says the rig's [design]; without one, as many sensors of the rig's own
-/// kinds are placed for contacts all over the surface.
+/// Compares several methods. Candidates and constraints are those of the rig's [design]; without it, the sensors of the rig are placed anew for
+/// contacts all over the surface.
 #[derive(clap::Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// The rig file
+    /// Rig file
     rig: PathBuf,
-    /// Sensors to place [default: the rig's]
+    /// Number of sensors [default: that of the rig]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..=1000))]
     count: Option<u16>,
-    /// Keep today's sensors, those of the rig, and place so many more
+    /// Keep the sensors of the rig and add N sensors
     #[arg(long, value_name = "N", conflicts_with = "count", value_parser = clap::value_parser!(u16).range(1..=1000))]
     add: Option<u16>,
-    /// How the limit falls with the number of sensors, as in `--counts 2..16`
+    /// Compute the limit for a range of numbers of sensors, such as 2..16
     #[arg(long, value_name = "FROM..TO", value_parser = counts)]
     counts: Option<RangeInclusive<usize>>,
-    /// The contact force [default: the rig's]
+    /// Contact force, such as "3 N" [default: that of the rig]
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     force: Option<f64>,
-    /// Design for contacts whose force is not known; so it is for a rig without a force
+    /// Assume an unknown force (default when the rig has none)
     #[arg(long)]
     unknown_force: bool,
-    /// Check the layouts by so many simulated calibrations each: fit, locate, measure [default: 3 with --out, else 0]
+    /// Verify each layout by N simulated calibrations [default: 3 with --report, otherwise 0]
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "5",
           value_parser = clap::value_parser!(u16).range(0..=10_000))]
     verify: Option<u16>,
-    /// Seed of the searches and simulations
+    /// Seed of searches and simulations
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Write the rig with the best layout
-    #[arg(short, value_name = "RIG")]
-    output: Option<PathBuf>,
-    /// Folder for a report
-    #[arg(long, value_name = "DIR")]
+    /// Write the rig with the best layout to RIG
+    #[arg(short, long, value_name = "RIG")]
     out: Option<PathBuf>,
+    /// Write a report into DIR: report.html and its figures
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
     #[command(flatten)]
     memory: MemoryOption,
-    /// Print the designs as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
@@ -92,8 +102,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let text = input::read_text(&arguments.rig)?;
     let rig = input::parse_rig(&arguments.rig, &text)?;
     let inputs = Inputs::new([arguments.rig.as_path()]);
-    let output = arguments.output.as_ref().map(|path| Target::new(path, &inputs)).transpose()?;
-    let out = arguments.out.as_ref().map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
+    let out = arguments.out.as_ref().map(|path| Target::new(path, &inputs)).transpose()?;
+    let report = arguments.report.as_ref();
+    let report = report.map(|folder| TargetFolder::for_report(folder, &inputs)).transpose()?;
     let (setup, design) = what_to_design(arguments, &rig)?;
     let complain = |error: DesignError| complaint(&error, &arguments.rig);
     let cost = SensorProblem::estimated_cost(&setup, &design).map_err(complain)?;
@@ -104,7 +115,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let problem = observer.watch(|watch| SensorProblem::new(&setup, &design, watch)).map_err(complain)?;
     let outcome = observer.watch(|watch| outcome(arguments, &rig, &problem, watch))?;
     drop(observer);
-    if let (Some(target), Some(best)) = (&output, best_design(&outcome.designed)) {
+    if let (Some(target), Some(best)) = (&out, best_design(&outcome.designed)) {
         let extent = setup.surface().extent();
         let (rig, written) = changed_rig(target.path(), &text, "layout", |rig| {
             place_sensors(rig, &best.layout, &design.kept, extent);
@@ -114,14 +125,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         target.write(written.as_bytes())?;
     }
-    if let Some(out) = &out {
-        write_report(&outcome, &setup, out)?;
+    if let Some(folder) = &report {
+        write_report(&outcome, &setup, folder)?;
     }
     if arguments.json {
         return output::say_json(&to_json(&outcome));
     }
     print(&outcome)?;
-    say_files(arguments.output.as_deref(), arguments.out.as_deref())
+    say_files(arguments.out.as_deref(), arguments.report.as_deref())
 }
 
 /// The rig's bench and design, with the options of the command line.
@@ -162,7 +173,7 @@ fn outcome<'a>(
         None => Vec::new(),
         Some(range) => problem.counts(range.clone(), arguments.seed, watch).map_err(complain)?,
     };
-    let calibrations = arguments.verify.unwrap_or(if arguments.out.is_some() { 3 } else { 0 });
+    let calibrations = arguments.verify.unwrap_or(if arguments.report.is_some() { 3 } else { 0 });
     let mut verified = Vec::new();
     if calibrations > 0 {
         for designed in to_verify(&designed) {
@@ -185,7 +196,7 @@ fn outcome<'a>(
     Ok(Outcome { rig: &arguments.rig, problem, designed, verified, counts, seed: arguments.seed })
 }
 
-fn write_report(outcome: &Outcome, setup: &Setup, out: &TargetFolder) -> Result<(), Failure> {
+fn write_report(outcome: &Outcome, setup: &Setup, folder: &TargetFolder) -> Result<(), Failure> {
     let report = SensorDesignReport {
         title: &format!("Sensors for {}", outcome.rig.display()),
         setup,
@@ -195,7 +206,7 @@ fn write_report(outcome: &Outcome, setup: &Setup, out: &TargetFolder) -> Result<
         counts: &outcome.counts,
         seed: outcome.seed,
     };
-    out.write_report(sensor_design_report(&report))
+    folder.write_report(sensor_design_report(&report))
 }
 
 fn complaint(error: &DesignError, rig: &Path) -> Failure {

@@ -6,4 +6,6 @@ pub mod board;
 pub mod browser;
 pub mod command;
 pub mod examples;
+#[cfg(unix)]
+pub mod shell;
 pub mod toml;
