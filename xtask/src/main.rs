@@ -9,6 +9,7 @@ mod needs;
 mod python;
 mod rig_keys;
 mod run;
+mod rust;
 mod skipped;
 mod test;
 mod tidy;

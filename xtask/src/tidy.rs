@@ -9,9 +9,7 @@ mod crates;
 mod links;
 mod places;
 mod project;
-mod rust_text;
 mod unfinished;
-mod used_paths;
 
 use std::path::Path;
 
