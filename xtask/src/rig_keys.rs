@@ -1,7 +1,7 @@
 //! `cargo xtask rig-keys`: docs/rig-keys.md from the types that rig and study files are read into.
 //!
 //! A key is a field of a struct in crates/palpate-rig, a word is a variant of an enum there or in a crate that it uses; what the page says
-//! of them is their doc comments. The source is read line by line, as rustfmt leaves it.
+//! of them is their doc comments.
 
 mod page;
 mod source;

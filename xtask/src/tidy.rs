@@ -5,14 +5,13 @@
 mod binary;
 mod changelog;
 mod circles;
+mod copies;
 mod crates;
 mod links;
 mod places;
 mod project;
-mod rust_text;
 mod samples;
 mod unfinished;
-mod used_paths;
 
 use std::path::Path;
 
@@ -37,9 +36,10 @@ impl Finding {
 
 type Rule = fn(&Project) -> Vec<Finding>;
 
-const RULES: [(&str, Rule); 8] = [
+const RULES: [(&str, Rule); 9] = [
     ("crates depend one way", crates::findings),
     ("no import circle between sibling files", circles::findings),
+    ("copies equal their originals", copies::findings),
     ("documents name what exists", links::findings),
     ("no machine's paths or hosts", places::findings),
     ("nothing unfinished", unfinished::findings),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use super::source::{Field, Item, Shape, Types, attribute};
+use super::source::{Field, Item, Shape, Types};
 
 const HEAD: &str = "# Keys of rigs and studies
 
@@ -96,7 +96,7 @@ impl<'a> Page<'a> {
         let _ = write!(self.text, "\n{} {path}\n\n{}", "#".repeat(level), item.docs);
         let words: Vec<String> = variants.iter().map(|variant| format!("`{}`", item.word(variant))).collect();
         let without =
-            item.attribute("rename").and_then(|by| by.split_once(" or ").map(|(_, word)| word.to_owned()));
+            item.serde.text("rename").and_then(|by| by.split_once(" or ").map(|(_, word)| word.to_owned()));
         let without = without.map_or(String::new(), |word| format!("; the default is `{word}`"));
         let _ = writeln!(self.text, " Its `kind` is one of {}{without}.", words.join(", "));
         for variant in variants {
@@ -138,13 +138,12 @@ impl<'a> Page<'a> {
     /// Default of a key without one in its comment.
     fn default(&self, field: &Field, file: &Path) -> String {
         let fields_of = |item: &&Item| matches!(&item.shape, Shape::Struct(fields) if fields.iter().any(|own| std::ptr::eq(own, field)));
-        let all_default =
-            self.types.all().find(fields_of).is_some_and(|item| item.serde.contains("(default,"));
+        let all_default = self.types.all().find(fields_of).is_some_and(|item| item.serde.has("default"));
         let is_optional = field.type_text.starts_with("Option<");
-        match attribute(&field.serde, "default") {
+        match field.serde.text("default") {
             Some(function) if function == "yes" => "`true`".to_owned(),
             _ if is_optional => "–".to_owned(),
-            _ if !field.serde.contains("default") && !all_default => "required".to_owned(),
+            _ if !field.serde.has("default") && !all_default => "required".to_owned(),
             _ if field.type_text == "bool" => "`false`".to_owned(),
             _ => match self.item(file, &field.type_text).map(|item| (item, &item.shape)) {
                 Some((item, Shape::Enum(variants))) => {
@@ -198,7 +197,7 @@ impl<'a> Page<'a> {
     }
 
     fn named(&self, item: &Item) -> String {
-        match (&item.shape, item.attribute("expecting")) {
+        match (&item.shape, item.serde.text("expecting")) {
             (_, Some(expecting)) => expecting.strip_prefix("a ").unwrap_or(&expecting).to_owned(),
             (Shape::Enum(variants), None) if !is_by(item, "kind") => {
                 let words: Vec<String> =
@@ -249,11 +248,11 @@ impl<'a> Page<'a> {
 
 /// The name of a key.
 pub fn key(field: &Field) -> String {
-    attribute(&field.serde, "rename").unwrap_or_else(|| field.name.clone())
+    field.serde.text("rename").unwrap_or_else(|| field.name.clone())
 }
 
 fn is_by(item: &Item, what: &str) -> bool {
-    item.attribute("rename").is_some_and(|name| name.starts_with(&format!("by {what}")))
+    item.serde.text("rename").is_some_and(|name| name.starts_with(&format!("by {what}")))
 }
 
 fn quantity(dimension: &str) -> &str {

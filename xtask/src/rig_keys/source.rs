@@ -1,20 +1,25 @@
-//! Structs and enums with their doc comments and serde attributes, from source as rustfmt leaves it.
+//! Structs and enums with their doc comments and serde attributes.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use syn::ext::IdentExt;
+use syn::punctuated::Punctuated;
+use syn::spanned::Spanned;
+use syn::{Attribute, Expr, Fields, ImplItem, Lit, Meta, MetaList, Token, parenthesized, token};
+
+use crate::rust::{self, UsedPath, Uses};
 
 /// A struct or an enum that is read from a file.
 #[derive(Clone, Debug)]
 pub struct Item {
     pub name: String,
-    /// The file that defines it, and whose `use` lines say what its types are.
+    /// The file that defines it. Its `use` declarations determine the types of the fields.
     pub file: PathBuf,
     pub docs: String,
-    /// The text within `#[serde(…)]`.
-    pub serde: String,
+    pub serde: Serde,
     pub shape: Shape,
 }
 
@@ -29,7 +34,7 @@ pub enum Shape {
 pub struct Field {
     pub name: String,
     pub docs: String,
-    pub serde: String,
+    pub serde: Serde,
     pub type_text: String,
 }
 
@@ -45,6 +50,42 @@ pub struct Variant {
     pub holds: Option<String>,
 }
 
+/// Arguments of `#[serde(…)]`, with their texts: `rename = "by kind"`, or `default` without one.
+#[derive(Clone, Debug, Default)]
+pub struct Serde(BTreeMap<String, Option<String>>);
+
+impl Serde {
+    fn of(attributes: &[Attribute]) -> Result<Self> {
+        let mut arguments = BTreeMap::new();
+        for list in lists(attributes, "serde") {
+            list.parse_nested_meta(|argument| {
+                let key = argument.path.get_ident().map(ToString::to_string).unwrap_or_default();
+                let mut text = None;
+                if argument.input.peek(Token![=]) {
+                    text = Some(argument.value()?.parse::<syn::LitStr>()?.value());
+                } else if argument.input.peek(token::Paren) {
+                    let inner;
+                    parenthesized!(inner in argument.input);
+                    inner.parse::<proc_macro2::TokenStream>()?;
+                }
+                arguments.insert(key, text);
+                Ok(())
+            })?;
+        }
+        Ok(Self(arguments))
+    }
+
+    /// Whether an argument is there, with a text or without.
+    pub fn has(&self, key: &str) -> bool {
+        self.0.contains_key(key)
+    }
+
+    /// Text of an argument.
+    pub fn text(&self, key: &str) -> Option<String> {
+        self.0.get(key).cloned().flatten()
+    }
+}
+
 impl Item {
     /// The fields, or those of the variants.
     #[cfg(test)]
@@ -56,14 +97,9 @@ impl Item {
         }
     }
 
-    /// A text among its serde attributes: `rename = "by kind"`.
-    pub fn attribute(&self, key: &str) -> Option<String> {
-        attribute(&self.serde, key)
-    }
-
     /// A variant's word in files.
     pub fn word(&self, variant: &Variant) -> String {
-        let style = self.attribute("rename_all").unwrap_or_default();
+        let style = self.serde.text("rename_all").unwrap_or_default();
         let dash = if style == "kebab-case" { "-" } else { "" };
         let mut word = String::new();
         for c in variant.name.chars() {
@@ -76,26 +112,19 @@ impl Item {
     }
 }
 
-/// The text of `key = "…"` in an attribute.
-pub fn attribute(serde: &str, key: &str) -> Option<String> {
-    let start = serde.find(&format!("{key} = \""))? + key.len() + 4;
-    let mut text = String::new();
-    let mut characters = serde[start..].chars();
-    while let Some(c) = characters.next() {
-        match c {
-            '"' => return Some(text),
-            '\\' => text.extend(characters.next()),
-            c => text.push(c),
-        }
-    }
-    None
-}
-
 /// The types of palpate-rig, and those of the crates that it uses.
 pub struct Types {
     items: Vec<Item>,
-    /// The text of every file that has been read.
-    texts: BTreeMap<PathBuf, String>,
+    files: BTreeMap<PathBuf, Source>,
+}
+
+/// A file that has been read.
+struct Source {
+    paths: Vec<UsedPath>,
+    /// Constants, with the texts of their values.
+    constants: BTreeMap<String, String>,
+    /// Bounds of quantities, with the texts of their words.
+    bounds: BTreeMap<String, String>,
 }
 
 /// The crates with enums that are words in files.
@@ -108,12 +137,13 @@ impl Types {
         for name in CRATES {
             collect(&root.join("crates").join(name).join("src"), &mut files)?;
         }
-        let mut types = Self { items: Vec::new(), texts: BTreeMap::new() };
-        for file in files {
-            let text =
-                fs::read_to_string(&file).with_context(|| format!("cannot read {}", file.display()))?;
-            types.items.extend(items(&file, &text));
-            types.texts.insert(file, text);
+        let mut types = Self { items: Vec::new(), files: BTreeMap::new() };
+        for path in files {
+            let cannot_read = || format!("cannot read {}", path.display());
+            let text = fs::read_to_string(&path).with_context(cannot_read)?;
+            let file = rust::parse(&text).with_context(cannot_read)?;
+            types.items.extend(items(&path, &file).with_context(cannot_read)?);
+            types.files.insert(path, Source::of(&file));
         }
         Ok(types)
     }
@@ -134,11 +164,12 @@ impl Types {
         let named = || self.items.iter().filter(|item| item.name == name);
         let own = named().find(|item| item.file == file);
         let imported = || {
-            let text = self.texts.get(file)?;
             // `use palpate_mechanics::…` or, within the crate, `use crate::…`.
-            let folder = imported_from(text, name)?.replace('_', "-");
+            let paths = &self.files.get(file)?.paths;
+            let path = &paths.iter().find(|path| path.imported.as_deref() == Some(name))?.segments;
+            let folder = path.first()?.replace('_', "-");
             let folder = if folder == "crate" { "palpate-rig".to_owned() } else { folder };
-            let module = import_path(text, name)?;
+            let module = path.get(1)?;
             let mut within =
                 named().filter(|item| item.file.components().any(|part| part.as_os_str() == folder.as_str()));
             let path = |item: &&Item| item.file.to_string_lossy().contains(&format!("/{module}"));
@@ -151,24 +182,46 @@ impl Types {
 
     /// The number that a constant of a file is, such as `MOST`.
     pub fn constant(&self, file: &Path, name: &str) -> Option<String> {
-        let text = self.texts.get(file)?;
-        let line = text.lines().find(|line| line.contains(&format!("const {name}:")))?;
-        Some(line.split_once('=')?.1.trim().trim_end_matches(';').replace('_', ""))
+        Some(self.files.get(file)?.constants.get(name)?.replace('_', ""))
     }
 
-    /// The words of a bound, from the table of them.
+    /// The words of a bound: a text, or a constant with one.
     pub fn bound(&self, name: &str) -> Option<String> {
-        let declared = |text: &&String| text.contains(&format!("impl Bound for {name}"));
-        let text = self.texts.values().find(declared)?;
-        let rest = &text[text.find(&format!("impl Bound for {name}"))?..];
-        let (value, _) = rest.split_once("WORDS: &'static str = ")?.1.split_once(';')?;
-        let constant = value.rsplit("::").next()?;
-        let declaration = format!("const {constant}: &'static str =");
-        let words = match value.strip_prefix('"') {
-            Some(words) => words,
-            None => self.texts.values().find_map(|text| text.split_once(&declaration))?.1.split_once('"')?.1,
+        let words = self.files.values().find_map(|file| file.bounds.get(name))?;
+        let constant = words.rsplit("::").next()?;
+        let text = if words.starts_with('"') {
+            words
+        } else {
+            self.files.values().find_map(|file| file.constants.get(constant))?
         };
-        words.split_once('"').or(Some((words, ""))).map(|(words, _)| words.to_owned())
+        Some(text.trim_matches('"').to_owned())
+    }
+}
+
+impl Source {
+    fn of(file: &syn::File) -> Self {
+        let mut constants = BTreeMap::new();
+        let mut bounds = BTreeMap::new();
+        for item in &file.items {
+            match item {
+                syn::Item::Const(constant) => {
+                    constants.insert(constant.ident.to_string(), source_text(&constant.expr));
+                }
+                syn::Item::Impl(block) => {
+                    for item in &block.items {
+                        if let ImplItem::Const(constant) = item {
+                            let text = source_text(&constant.expr);
+                            if constant.ident == "WORDS" {
+                                bounds.insert(source_text(&block.self_ty), text.clone());
+                            }
+                            constants.insert(constant.ident.to_string(), text);
+                        }
+                    }
+                }
+                _ => {}
+            }
+        }
+        Self { paths: Uses::of(file).paths, constants, bounds }
     }
 }
 
@@ -186,139 +239,158 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// The statements `use …;` of a file, each in one line.
-fn uses(text: &str) -> Vec<String> {
-    let starts = text.match_indices("\nuse ").map(|(at, _)| at + 5);
-    let statement = |at: usize| Some(text[at..].split_once(';')?.0.split_whitespace().collect::<String>());
-    starts.filter_map(statement).collect()
-}
-
-fn use_of(text: &str, name: &str) -> Option<String> {
-    let ends = |statement: &String| {
-        let words = statement.split(|c: char| !c.is_alphanumeric() && c != '_');
-        words.into_iter().any(|word| word == name)
-    };
-    uses(text).into_iter().find(ends)
-}
-
-/// The crate that `name` is imported from.
-fn imported_from(text: &str, name: &str) -> Option<String> {
-    use_of(text, name)?.split("::").next().map(str::to_owned)
-}
-
-/// The module within the crate that `name` is imported from.
-fn import_path(text: &str, name: &str) -> Option<String> {
-    use_of(text, name)?.split("::").nth(1).map(|module| module.trim_matches(['{', '}']).to_owned())
-}
-
 /// The structs and enums of a file that derive `Deserialize`.
-fn items(file: &Path, text: &str) -> Vec<Item> {
+fn items(path: &Path, file: &syn::File) -> Result<Vec<Item>> {
     let mut found = Vec::new();
-    let mut lines = text.lines().peekable();
-    let mut header = Header::default();
-    while let Some(line) = lines.next() {
-        if header.take(line, &mut lines) {
-            continue;
-        }
-        let declared = std::mem::take(&mut header);
-        let line = line.trim_start_matches("pub(crate) ").trim_start_matches("pub ");
-        let Some((kind, rest)) = line.split_once(' ') else { continue };
-        if !declared.attributes.contains("Deserialize") || !matches!(kind, "struct" | "enum") {
-            continue;
-        }
-        let name = rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or_default();
-        let shape = match kind {
-            _ if !line.ends_with('{') => Shape::Tuple,
-            "struct" => Shape::Struct(fields(&mut lines, "}")),
-            _ => Shape::Enum(variants(&mut lines)),
-        };
-        let (docs, serde) = (declared.docs.join(" "), declared.attributes);
-        found.push(Item { name: name.to_owned(), file: file.to_owned(), docs, serde, shape });
-    }
-    found
-}
-
-/// Doc comments and attributes above an item.
-#[derive(Default)]
-struct Header {
-    docs: Vec<String>,
-    attributes: String,
-}
-
-impl Header {
-    /// Takes a line that belongs to the header, with those that it goes on in.
-    fn take<'a>(&mut self, line: &str, rest: &mut impl Iterator<Item = &'a str>) -> bool {
-        let line = line.trim();
-        if let Some(doc) = line.strip_prefix("///") {
-            self.docs.push(doc.trim().to_owned());
-            return true;
-        }
-        if !line.starts_with("#[") {
-            return line.starts_with("//");
-        }
-        self.attributes += line;
-        if !line.ends_with(']') {
-            for line in rest.by_ref() {
-                self.attributes += line.trim();
-                self.attributes.push(' ');
-                if line.trim_end().ends_with(")]") {
-                    break;
-                }
+    for item in &file.items {
+        let (name, attributes, shape) = match item {
+            syn::Item::Struct(item) => {
+                let shape = match &item.fields {
+                    Fields::Named(named) => Shape::Struct(fields(&named.named)?),
+                    Fields::Unnamed(_) | Fields::Unit => Shape::Tuple,
+                };
+                (&item.ident, &item.attrs, shape)
             }
-        }
-        true
-    }
-}
-
-/// The fields up to a line that is `end`.
-fn fields<'a>(lines: &mut impl Iterator<Item = &'a str>, end: &str) -> Vec<Field> {
-    let mut found = Vec::new();
-    let mut header = Header::default();
-    while let Some(line) = lines.next() {
-        if line.trim_start() == end {
-            break;
-        }
-        if header.take(line, lines) {
-            continue;
-        }
-        let Header { docs, attributes } = std::mem::take(&mut header);
-        let declared = line.trim().trim_start_matches("pub(crate) ").trim_start_matches("pub ");
-        if let Some((name, type_text)) = declared.trim_end_matches(',').split_once(": ") {
-            let (name, docs) = (name.to_owned(), docs.join(" "));
-            found.push(Field { name, docs, serde: attributes, type_text: type_text.to_owned() });
-        }
-    }
-    found
-}
-
-fn variants<'a>(lines: &mut impl Iterator<Item = &'a str>) -> Vec<Variant> {
-    let mut found = Vec::new();
-    let mut header = Header::default();
-    while let Some(line) = lines.next() {
-        if line == "}" {
-            break;
-        }
-        if header.take(line, lines) {
-            continue;
-        }
-        let Header { docs, attributes } = std::mem::take(&mut header);
-        let line = line.trim();
-        let name: String = line.chars().take_while(|c| c.is_alphanumeric()).collect();
-        if name.is_empty() {
-            continue;
-        }
-        let rest = line[name.len()..].trim();
-        let fields = match rest {
-            "{" => fields(lines, "},"),
-            _ => {
-                let inline = rest.strip_prefix("{ ").and_then(|rest| rest.strip_suffix(" },"));
-                let inline: Vec<String> = inline.map(|inline| format!("{inline},")).into_iter().collect();
-                fields(&mut inline.iter().map(String::as_str), "},")
+            syn::Item::Enum(item) => {
+                let variants = item.variants.iter().map(variant).collect::<Result<_>>()?;
+                (&item.ident, &item.attrs, Shape::Enum(variants))
             }
+            _ => continue,
         };
-        let holds = rest.strip_prefix('(').and_then(|rest| rest.strip_suffix("),")).map(str::to_owned);
-        let is_default = attributes.contains("#[default]");
-        found.push(Variant { name, docs: docs.join(" "), is_default, fields, holds });
+        if derives_deserialize(attributes) {
+            found.push(Item {
+                name: name.unraw().to_string(),
+                file: path.to_owned(),
+                docs: docs(attributes),
+                serde: Serde::of(attributes)?,
+                shape,
+            });
+        }
     }
-    found
+    Ok(found)
+}
+
+fn derives_deserialize(attributes: &[Attribute]) -> bool {
+    lists(attributes, "derive").iter().any(|list| {
+        let mut derives = false;
+        let all = list.parse_nested_meta(|derived| {
+            derives |= derived.path.segments.last().is_some_and(|last| last.ident == "Deserialize");
+            Ok(())
+        });
+        all.is_ok() && derives
+    })
+}
+
+/// The attributes `name(…)`, also within `cfg_attr`.
+fn lists(attributes: &[Attribute], name: &str) -> Vec<MetaList> {
+    let conditional = |attribute: &Attribute| {
+        let metas = attribute.parse_args_with(Punctuated::<Meta, Token![,]>::parse_terminated);
+        metas.into_iter().flatten().skip(1).collect()
+    };
+    let metas = attributes.iter().flat_map(|attribute| match attribute.path().is_ident("cfg_attr") {
+        true => conditional(attribute),
+        false => vec![attribute.meta.clone()],
+    });
+    let list = |meta| match meta {
+        Meta::List(list) if list.path.is_ident(name) => Some(list),
+        _ => None,
+    };
+    metas.filter_map(list).collect()
+}
+
+fn fields<'a>(fields: impl IntoIterator<Item = &'a syn::Field>) -> Result<Vec<Field>> {
+    let field = |field: &syn::Field| {
+        let name = field.ident.as_ref().map(|ident| ident.unraw().to_string()).unwrap_or_default();
+        let (docs, serde) = (docs(&field.attrs), Serde::of(&field.attrs)?);
+        Ok(Field { name, docs, serde, type_text: source_text(&field.ty) })
+    };
+    fields.into_iter().map(field).collect()
+}
+
+fn variant(variant: &syn::Variant) -> Result<Variant> {
+    let (own, holds) = match &variant.fields {
+        Fields::Named(named) => (fields(&named.named)?, None),
+        Fields::Unnamed(unnamed) => {
+            let mut types = unnamed.unnamed.iter().map(|field| source_text(&field.ty));
+            (Vec::new(), types.next().filter(|_| types.next().is_none()))
+        }
+        Fields::Unit => (Vec::new(), None),
+    };
+    Ok(Variant {
+        name: variant.ident.to_string(),
+        docs: docs(&variant.attrs),
+        is_default: variant.attrs.iter().any(|attribute| attribute.path().is_ident("default")),
+        fields: own,
+        holds,
+    })
+}
+
+/// The doc comment, its lines joined.
+fn docs(attributes: &[Attribute]) -> String {
+    let line = |attribute: &Attribute| match &attribute.meta {
+        Meta::NameValue(doc) if doc.path.is_ident("doc") => match &doc.value {
+            Expr::Lit(literal) => match &literal.lit {
+                Lit::Str(text) => Some(text.value().trim().to_owned()),
+                _ => None,
+            },
+            _ => None,
+        },
+        _ => None,
+    };
+    attributes.iter().filter_map(line).collect::<Vec<_>>().join(" ")
+}
+
+/// The source of a type or an expression, in one line.
+fn source_text(node: &impl Spanned) -> String {
+    let text = node.span().source_text().unwrap_or_default();
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn items_of(text: &str) -> Vec<Item> {
+        items(Path::new("a.rs"), &rust::parse(text).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn structs_have_their_docs_types_and_serde_arguments() {
+        let items = items_of(
+            "/// One\n/// two.\n#[derive(Debug, serde::Deserialize)]\n#[serde(default, rename = \"by \\\"kind\\\"\")]\n\
+             pub(crate) struct A {\n/// A key.\n#[serde(default = \"yes\")] pub r#type: Option<\n At<Vec<B>>>,\n}\n\
+             #[derive(Debug)] struct B { c: u8 }",
+        );
+        let [a] = items.as_slice() else { panic!("{items:?}") };
+        assert_eq!((a.name.as_str(), a.docs.as_str()), ("A", "One two."));
+        assert!(a.serde.has("default") && a.serde.text("default").is_none());
+        assert_eq!(a.serde.text("rename").as_deref(), Some("by \"kind\""));
+        let [field] = a.fields()[..] else { panic!("{a:?}") };
+        assert_eq!((field.name.as_str(), field.docs.as_str()), ("type", "A key."));
+        assert_eq!(field.type_text, "Option< At<Vec<B>>>");
+        assert_eq!(field.serde.text("default").as_deref(), Some("yes"));
+    }
+
+    #[test]
+    fn conditional_attributes_count() {
+        let items = items_of(
+            "#[cfg_attr(feature = \"serde\", derive(serde::Deserialize), serde(rename_all = \"kebab-case\"))]\n\
+             enum A { OneWord }",
+        );
+        assert_eq!(items[0].serde.text("rename_all").as_deref(), Some("kebab-case"));
+    }
+
+    #[test]
+    fn enums_have_words_defaults_and_contents() {
+        let items = items_of(
+            "#[derive(Deserialize)]\n#[serde(rename_all = \"kebab-case\", bound(deserialize = \"T: A\"))]\n\
+             enum A { #[default] OneWord, /// Held.\nHolds(B), Two(B, C), Own { d: u8 } }",
+        );
+        let Shape::Enum(variants) = &items[0].shape else { panic!("{items:?}") };
+        let words: Vec<String> = variants.iter().map(|variant| items[0].word(variant)).collect();
+        assert_eq!(words, ["one-word", "holds", "two", "own"]);
+        assert!(variants[0].is_default && !variants[1].is_default);
+        assert_eq!((variants[1].docs.as_str(), variants[1].holds.as_deref()), ("Held.", Some("B")));
+        assert_eq!((variants[2].holds.as_deref(), variants[3].fields.len()), (None, 1));
+    }
 }

@@ -8,8 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use super::Finding;
 use super::project::{File, Project};
-use super::rust_text::RustText;
-use super::used_paths::{UsedPath, declared_modules, used_paths};
+use crate::rust::{self, UsedPath, Uses};
 
 /// A module's path from the crate's root, which is empty.
 type Name = Vec<String>;
@@ -36,7 +35,13 @@ type Siblings<'a> = BTreeMap<String, BTreeMap<String, Vec<Import<'a>>>>;
 pub fn findings(project: &Project) -> Vec<Finding> {
     let mut found = Vec::new();
     for root in project.crates.iter().flat_map(|krate| &krate.roots) {
-        let modules = modules(project, root);
+        let modules = match modules(project, root) {
+            Ok(modules) => modules,
+            Err(unreadable) => {
+                found.push(unreadable);
+                continue;
+            }
+        };
         let source = root.rsplit_once('/').map_or("", |(folder, _)| folder);
         for siblings in by_level(&modules).values() {
             found.extend(circles(siblings).iter().map(|circle| finding(source, siblings, circle)));
@@ -45,23 +50,25 @@ pub fn findings(project: &Project) -> Vec<Finding> {
     found
 }
 
-/// Follows `mod` declarations from the root file of a crate.
-fn modules<'a>(project: &'a Project, root: &str) -> Modules<'a> {
+/// Follows `mod` declarations from the root file of a crate; an error for a file that is not Rust.
+fn modules<'a>(project: &'a Project, root: &str) -> Result<Modules<'a>, Finding> {
     let mut modules = Modules::new();
     let folder = root.rsplit_once('/').map_or("", |(folder, _)| folder);
     let mut open = Vec::from_iter(project.file(root).map(|file| (Name::new(), folder.to_owned(), file)));
     while let Some((name, folder, file)) = open.pop() {
-        let code = RustText::parse(&file.text()).code_without_tests();
-        for child in declared_modules(&code) {
+        let parsed = rust::parse(&file.text())
+            .map_err(|error| Finding::new(&file.path, 1, format!("cannot read this file: {error}")))?;
+        let Uses { paths, modules: declared } = Uses::of(&parsed);
+        for child in declared {
             let inside = format!("{folder}/{child}");
             let files = [format!("{inside}.rs"), format!("{inside}/mod.rs")];
             if let Some(file) = files.iter().find_map(|path| project.file(path)) {
                 open.push(([name.as_slice(), &[child]].concat(), inside, file));
             }
         }
-        modules.insert(name, Module { file, uses: used_paths(&code) });
+        modules.insert(name, Module { file, uses: paths });
     }
-    modules
+    Ok(modules)
 }
 
 /// Every import between siblings, by the module that both are children of.

@@ -4,7 +4,7 @@ use super::Finding;
 use super::project::{File, Project};
 
 /// Documents that must be there.
-const REQUIRED: [&str; 2] = ["README.md", "ARCHITECTURE.md"];
+const REQUIRED: [&str; 4] = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md"];
 
 /// Folders with TOML files that the documents name.
 const RUNNABLE: [&str; 2] = ["studies/", "examples/"];
@@ -103,6 +103,8 @@ mod tests {
         let files = [
             ("README.md", ""),
             ("ARCHITECTURE.md", ""),
+            ("CONTRIBUTING.md", ""),
+            ("SECURITY.md", ""),
             ("examples/paper.toml", ""),
             ("docs/book/start.md", ""),
         ];
@@ -116,7 +118,11 @@ mod tests {
 
     #[test]
     fn a_missing_document_is_found() {
-        let found = findings(&Project::from_files(&[("README.md", "")]));
+        let found = findings(&Project::from_files(&[
+            ("README.md", ""),
+            ("CONTRIBUTING.md", ""),
+            ("SECURITY.md", ""),
+        ]));
         assert_eq!(found, [Finding::new("ARCHITECTURE.md", 1, "this document is missing: write it")]);
     }
 

@@ -55,6 +55,7 @@ pub struct Arguments {
     /// `file:recording.mcap?speed=1`, `simulated:RIG.toml?rate=100`, or `-` for stdin
     #[arg(long, value_name = "SOURCE")]
     from: SourceUrl,
+    #[cfg(feature = "gcode")]
     /// Press by a machine with Marlin or GRBL firmware: `gcode:serial:///dev/ttyUSB0?baud=115200` or `gcode:tcp://host:port`
     #[arg(long, value_name = "MACHINE")]
     stage: Option<StageUrl>,
@@ -67,11 +68,13 @@ pub struct Arguments {
     /// Force of every press, such as "2 N" [default: that of the rig, or unknown]
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     force: Option<f64>,
+    #[cfg(feature = "gcode")]
     /// Move the machine over every position without a press, and write no file
     #[arg(long, requires = "stage")]
     dry_run: bool,
     #[command(flatten)]
     operator: OperatorOptions,
+    #[cfg(feature = "gcode")]
     /// Jog the machine by keys before the presses, and find the height of contact
     #[arg(long, requires = "stage", conflicts_with = "dry_run")]
     jog: bool,
@@ -92,6 +95,37 @@ pub struct Arguments {
     clock_speed: u32,
 }
 
+#[cfg(feature = "gcode")]
+impl Arguments {
+    fn machine(&self) -> Option<&StageUrl> {
+        self.stage.as_ref()
+    }
+
+    fn is_dry_run(&self) -> bool {
+        self.dry_run
+    }
+
+    fn jogs(&self) -> bool {
+        self.jog
+    }
+}
+
+/// A command without machines.
+#[cfg(not(feature = "gcode"))]
+impl Arguments {
+    fn machine(&self) -> Option<&StageUrl> {
+        None
+    }
+
+    fn is_dry_run(&self) -> bool {
+        false
+    }
+
+    fn jogs(&self) -> bool {
+        false
+    }
+}
+
 /// Statements of the person who presses.
 #[derive(clap::Args)]
 pub struct OperatorOptions {
@@ -99,7 +133,8 @@ pub struct OperatorOptions {
     #[arg(long, value_name = "LENGTH", value_parser = input::length)]
     placement: Option<f64>,
     /// Press every other position also with a second weight, such as "4 N" [default: asked for if one weight is too few]
-    #[arg(long, value_name = "FORCE", value_parser = input::force, conflicts_with_all = ["known_force", "stage"])]
+    #[arg(long, value_name = "FORCE", value_parser = input::force, conflicts_with = "known_force")]
+    #[cfg_attr(feature = "gcode", arg(conflicts_with = "stage"))]
     second_force: Option<f64>,
     /// Assume that contacts in use have the force of the presses
     #[arg(long)]
@@ -135,10 +170,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = Target::new(&arguments.out, &inputs)?;
     Target::new(&arguments.presses, &inputs)?;
     let rig = input::read_rig(&arguments.rig)?;
-    let machine = arguments.stage.as_ref();
+    let machine = arguments.machine();
     let mut stage = stage(&arguments.rig, &rig, machine, arguments.force)?;
     let clock = HostClock::with_speed(arguments.clock_speed);
-    if let (true, Some(stage)) = (arguments.dry_run, &stage) {
+    if let (true, Some(stage)) = (arguments.is_dry_run(), &stage) {
         return dry_run(arguments, &rig, stage.clone(), clock);
     }
     let depths = DepthKnowledge::for_stage(stage.as_ref());
@@ -156,7 +191,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let is_by_hand = stage.is_none() && !to_come(&known, &before)?.is_empty();
     let keys = (arguments.from != SourceUrl::Stdin).then(keys);
-    if let (true, Some(set_up)) = (arguments.jog, &mut stage) {
+    if let (true, Some(set_up)) = (arguments.jogs(), &mut stage) {
         let bench = Bench { arguments, rig: &rig, keys: keys.as_ref(), clock };
         if !bench.set_up(set_up)? {
             return Ok(());
@@ -286,7 +321,7 @@ impl Bench<'_> {
     /// Jogs and touch-offs by the keys; the stage gets the height that is found. False where the operator ends it.
     fn set_up(&self, stage: &mut Stage) -> Result<bool, Failure> {
         let Self { arguments, rig, clock, .. } = self;
-        let (Some(url), Some(keys)) = (&arguments.stage, self.keys) else {
+        let (Some(url), Some(keys)) = (arguments.machine(), self.keys) else {
             let complaint =
                 Complaint::new("--jog needs the keyboard, and --from - takes the readings from it");
             return Err(complaint.help("give the readings by another source").into());
@@ -432,7 +467,7 @@ fn machine(
     stage: Option<Stage>,
     clock: HostClock,
 ) -> Result<Option<Machine>, Failure> {
-    let (Some(url), Some(stage)) = (&arguments.stage, stage) else { return Ok(None) };
+    let (Some(url), Some(stage)) = (arguments.machine(), stage) else { return Ok(None) };
     let limit_n = stage.force_limit_n;
     let thread = open_stage(url, stage, clock)?;
     Ok(Some(Machine::new(thread, limit_n, clock.elapsed())))
@@ -461,7 +496,7 @@ fn open_stage(url: &StageUrl, stage: Stage, clock: HostClock) -> Result<StageThr
 
 /// Homes, and travels to every position at the height of travel.
 fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage, clock: HostClock) -> Result<(), Failure> {
-    let Some(url) = &arguments.stage else { return Ok(()) };
+    let Some(url) = arguments.machine() else { return Ok(()) };
     let weights = arguments.operator.statements().weights(arguments.force);
     let plan = calibration::plan(rig, weights, &stage.depths_m, &[])
         .map_err(|error| Complaint::about(&arguments.rig, error))?;

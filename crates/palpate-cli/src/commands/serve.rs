@@ -75,6 +75,7 @@ pub struct Arguments {
     force: Option<f64>,
     #[command(flatten)]
     operator: OperatorOptions,
+    #[cfg(feature = "gcode")]
     /// Press by a machine with Marlin or GRBL firmware: `gcode:serial:///dev/ttyUSB0?baud=115200` or `gcode:tcp://host:port`
     #[arg(long, value_name = "MACHINE", requires = "calibrate")]
     stage: Option<StageUrl>,
@@ -103,6 +104,19 @@ pub struct Arguments {
     /// Speed up the clock of a calibration, as that of a simulated board and machine
     #[arg(long, value_name = "N", default_value_t = 1, hide = true, requires = "calibrate", value_parser = input::clock_speed())]
     clock_speed: u32,
+}
+
+impl Arguments {
+    #[cfg(feature = "gcode")]
+    fn machine(&self) -> Option<&StageUrl> {
+        self.stage.as_ref()
+    }
+
+    /// A command without machines.
+    #[cfg(not(feature = "gcode"))]
+    fn machine(&self) -> Option<&StageUrl> {
+        None
+    }
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -313,7 +327,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     Target::new(presses, &inputs)?;
     let rig = input::read_rig(path)?;
     // A calibration that is impossible is refused here, where the place in the file can be shown.
-    let stage = stage(path, &rig, arguments.stage.as_ref(), arguments.force)?;
+    let stage = stage(path, &rig, arguments.machine(), arguments.force)?;
     let depths = DepthKnowledge::for_stage(stage.as_ref());
     let (before, in_file_m) = pressed_before(path, &rig, presses, depths)?;
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
@@ -335,7 +349,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
         out: out.clone(),
         comment,
         force_n: arguments.force,
-        machine: arguments.stage.clone(),
+        machine: arguments.machine().cloned(),
         before,
         statements,
         seed: arguments.seed,
