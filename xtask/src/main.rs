@@ -1,6 +1,7 @@
-//! The project's chores: `cargo xtask test | validate | wire | web | wheel | tidy | rig-keys | bench | fuzz`.
+//! The project's chores: `cargo xtask test | validate | wire | web | wheel | docs | cli-reference | rig-keys | tidy | bench | fuzz`.
 #![forbid(unsafe_code)]
 
+mod cli_reference;
 mod counts;
 mod dashboard;
 mod features;
@@ -9,6 +10,7 @@ mod needs;
 mod python;
 mod rig_keys;
 mod run;
+mod site;
 mod skipped;
 mod test;
 mod tidy;
@@ -48,7 +50,11 @@ enum Chore {
     Web,
     /// Build the wheel of the Python package, and run its tests on it with the oldest and the newest of what it supports
     Wheel,
-    /// Write docs/rig-keys.md from the types that rig and study files are read into
+    /// Build the documentation site into target/site; dead links and anchors are errors
+    Docs,
+    /// Write docs/reference/commands.md from the help of every command
+    CliReference,
+    /// Write docs/reference/rig-keys.md from the types that rig and study files are read into
     RigKeys,
     /// Check the rules that a program can check: dependencies, import circles, links
     Tidy,
@@ -85,6 +91,8 @@ fn main() -> ExitCode {
         Chore::Wire => wire::run(&root),
         Chore::Web => dashboard::build(&root),
         Chore::Wheel => python::wheel(&root),
+        Chore::Docs => site::build(&root),
+        Chore::CliReference => cli_reference::run(&root),
         Chore::RigKeys => rig_keys::run(&root),
         Chore::Tidy => tidy::run(&root),
         Chore::Bench { for_cargo, for_benches } => {

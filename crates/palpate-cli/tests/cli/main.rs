@@ -25,6 +25,7 @@ mod profile;
 mod readme;
 mod recording_check;
 mod recordings;
+mod reference;
 mod report_page;
 mod shards;
 mod signals;
