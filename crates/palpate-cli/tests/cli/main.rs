@@ -35,6 +35,7 @@ mod support;
 mod supported_beams;
 mod tare;
 mod track;
+mod tutorials;
 mod unread_sources;
 mod verbs;
 #[cfg(all(feature = "foxglove", feature = "ros"))]
