@@ -46,10 +46,35 @@ def docstrings(source: str) -> dict[str, str]:
     return {name: text for name, text in found.items() if text}
 
 
+def default(value: Any) -> Any:
+    """Default of a field that `needed()` or `key()` declares: none, and the one that it names or `None`."""
+    text = str(value)
+    if text.startswith("needed("):
+        return None
+    if text.startswith("key("):
+        match = re.search(r"default=(.*?)[,)]", text)
+        return match[1] if match else "None"
+    return value
+
+
+def show_defaults(section: griffe.Class) -> None:
+    """Replaces the declarations of fields by their defaults."""
+    for member in section.members.values():
+        if isinstance(member, griffe.Attribute):
+            member.value = default(member.value)
+        elif isinstance(member, griffe.Function) and member.name == "__init__":
+            for parameter in member.parameters:
+                parameter.default = default(parameter.default)
+
+
 class RustDocstrings(griffe.Extension):
     """Adds the docstrings to the objects of the stubs."""
 
     def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
+        for module in filter(lambda member: isinstance(member, griffe.Module), pkg.members.values()):
+            for member in module.members.values():
+                if isinstance(member, griffe.Class):
+                    show_defaults(member)
         extension = pkg.members.get("_palpate")
         if not isinstance(extension, griffe.Module):
             return
