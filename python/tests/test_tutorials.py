@@ -1,4 +1,4 @@
-"""The Python of docs/tutorials, run as it stands: the blocks of a page are one program."""
+"""The Python of docs/tutorials, run as it stands: the blocks of a page are one program. And the names of the reference."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import palpate
 import pytest
 from conftest import PROJECT
 
@@ -23,3 +24,9 @@ def test_the_python_of_a_tutorial_runs(page: Path):
     code = "\n".join(BLOCK.findall(page.read_text(encoding="utf-8")))
     done = subprocess.run([sys.executable, "-c", code], cwd=PROJECT, capture_output=True, encoding="utf-8", timeout=300)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_python_reference_has_every_public_name():
+    page = (PROJECT / "docs/reference/python.md").read_text(encoding="utf-8")
+    names = re.findall(r"^::: palpate\.(\w+)$", page, re.MULTILINE)
+    assert sorted([*names, "__version__"]) == sorted(palpate.__all__)

@@ -88,11 +88,14 @@ fn first_contact_ends_with_an_error_below_a_millimetre() {
 #[test]
 fn own_board_is_calibrated_by_a_rig_of_the_tutorial() {
     let outputs = run_tutorial("your-own-board.md");
-    let [_, fitted, inspected, located, evaluated] = outputs.as_slice() else { panic!("{}", outputs.len()) };
+    let [_, fitted, inspected, limit, located, evaluated] = outputs.as_slice() else {
+        panic!("{}", outputs.len())
+    };
     assert!(fitted.contains("force-linear") && fitted.contains("places held out"), "{fitted}");
-    assert!(inspected.contains("s12"), "{inspected}");
-    assert!(located.lines().filter(|line| line.ends_with(",located")).count() >= 40, "{located}");
-    assert!(figure(evaluated, "whole surface", 2) < 5.0, "{evaluated}");
+    assert!(inspected.contains("gauge_6"), "{inspected}");
+    assert!(limit.contains("mean error at the limit"), "{limit}");
+    assert!(located.lines().filter(|line| line.ends_with(",located")).count() >= 55, "{located}");
+    assert!(figure(evaluated, "whole surface", 2) < 1.0, "{evaluated}");
 }
 
 #[test]
