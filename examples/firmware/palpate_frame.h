@@ -4,7 +4,7 @@
  *   size_t size = palpate_frame(frame, sequence++, micros(), values, 8);
  *   uart_write(frame, size);
  *
- * The layout is in docs/live-sources.md. `values` are in the units of the recordings that the locator learnt from, in the order of its channels.
+ * The layout is in docs/reference/sources.md. `values` are in the units of the recordings that the locator learnt from, in the order of its channels.
  * `float` must be IEEE 754 single precision, as it is on every usual microcontroller.
  */
 #ifndef PALPATE_FRAME_H

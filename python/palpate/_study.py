@@ -43,7 +43,7 @@ class Study:
     Parameters
     ----------
     study : str or path
-        "paper" for the founding paper's study, or the path of a study file (docs/studies.md).
+        "paper" for the founding paper's study, or the path of a study file (docs/reference/study-files.md).
 
     Attributes
     ----------
@@ -229,7 +229,7 @@ class StudyResults(Result):
     limit_error_percent : ndarray of float64
         Mean error of an estimator at the limit, where sensors have noise.
     epochs, error_percent, max_error_percent, effective_length_percent, error_over_limit, coverage_percent : ndarray of float64
-        Figures over the seeds, as ``results.json`` names them (docs/studies.md).
+        Figures over the seeds, as ``results.json`` names them (docs/reference/study-files.md).
     by_position : list of dict
         Of each arm "x", the judged positions in metres, and "error", of the shape (positions, 3), in metres.
     results_json, networks_csv, evaluations_csv : str

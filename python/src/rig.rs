@@ -15,7 +15,7 @@ use crate::work;
 
 /// A rig: surface, sensors, contact, training positions and estimator of one TOML file.
 ///
-/// `Rig.load` reads a file, `Rig(text)` its text; docs/rig-keys.md has every key.
+/// `Rig.load` reads a file, `Rig(text)` its text; docs/reference/rig-keys.md has every key.
 #[pyclass(frozen, module = "palpate")]
 pub struct Rig {
     pub inner: rig::Rig,

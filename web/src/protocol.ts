@@ -1,4 +1,4 @@
-// Records of `palpate serve`, as docs/live-dashboard.md and the server's own documentation have them.
+// Records of `palpate serve`, as docs/reference/server.md and the server's own documentation have them.
 
 /** Position, force and their uncertainty. What was not estimated is left out. */
 export interface ContactRecord {

@@ -1,7 +1,8 @@
-//! The project's chores: `cargo xtask test | validate | features | wire | web | wheel | tidy | rig-keys | man | bench | fuzz`.
+//! The project's chores: `cargo xtask test | validate | features | wire | web | wheel | docs | cli-reference | rig-keys | man | tidy | bench | fuzz`.
 #![forbid(unsafe_code)]
 
 mod bench;
+mod cli_reference;
 mod counts;
 mod dashboard;
 mod features;
@@ -11,6 +12,7 @@ mod python;
 mod rig_keys;
 mod run;
 mod rust;
+mod site;
 mod skipped;
 mod test;
 mod tidy;
@@ -52,7 +54,11 @@ enum Chore {
     Web,
     /// Build the wheel of the Python package, and run its tests on it with the oldest and the newest of what it supports
     Wheel,
-    /// Write docs/rig-keys.md from the types that rig and study files are read into
+    /// Build the documentation site into target/site; dead links and anchors are errors
+    Docs,
+    /// Write docs/reference/commands.md from the help of every command
+    CliReference,
+    /// Write docs/reference/rig-keys.md from the types that rig and study files are read into
     RigKeys,
     /// Write the manual pages of the command into target/man
     Man,
@@ -85,6 +91,8 @@ fn main() -> ExitCode {
         Chore::Wire => wire::run(&root),
         Chore::Web => dashboard::build(&root),
         Chore::Wheel => python::wheel(&root),
+        Chore::Docs => site::build(&root),
+        Chore::CliReference => cli_reference::run(&root),
         Chore::RigKeys => rig_keys::run(&root),
         Chore::Man => {
             let mut man = Command::new("cargo");

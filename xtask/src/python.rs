@@ -27,10 +27,15 @@ pub type Making = JoinHandle<Result<Environment>>;
 
 /// Makes the environment of the tests, `target/xtask/python`, where it is not there, in a thread of its own; `None` without Python.
 pub fn make_environment(root: &Path) -> Option<Making> {
+    begin_environment(root, "target/xtask/python", REQUIREMENTS)
+}
+
+/// Makes the environment in `folder` with a file of requirements, where it is not there, in a thread of its own; `None` without Python.
+pub fn begin_environment(root: &Path, folder: &'static str, requirements: &'static str) -> Option<Making> {
     let root = root.to_path_buf();
-    PYTHON.is_there(&root).then(|| {
-        thread::spawn(move || Environment::at(&root, "target/xtask/python", "python3", &[REQUIREMENTS]))
-    })
+    PYTHON
+        .is_there(&root)
+        .then(|| thread::spawn(move || Environment::at(&root, folder, "python3", &[requirements])))
 }
 
 /// Runs the tests of the package in an environment of their own; what `tested` tells cargo to build holds the package.
@@ -147,7 +152,7 @@ impl Environment {
     }
 
     /// A program of the environment.
-    fn run(&self, program: &str) -> Command {
+    pub fn run(&self, program: &str) -> Command {
         let programs = self.folder.join(if cfg!(windows) { "Scripts" } else { "bin" });
         let mut command = Command::new(programs.join(program));
         let path = std::env::var_os("PATH").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! `cargo xtask rig-keys`: docs/rig-keys.md from the types that rig and study files are read into.
+//! `cargo xtask rig-keys`: docs/reference/rig-keys.md from the types that rig and study files are read into.
 //!
 //! A key is a field of a struct in crates/palpate-rig, a word is a variant of an enum there or in a crate that it uses; what the page says
 //! of them is their doc comments.
@@ -11,7 +11,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
-const PAGE: &str = "docs/rig-keys.md";
+const PAGE: &str = "docs/reference/rig-keys.md";
 
 /// Writes the page.
 pub fn run(root: &Path) -> Result<bool> {

@@ -2,7 +2,7 @@
 //! adds a line to a file that the environment names, and this reads it.
 
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -36,6 +36,13 @@ impl Skipped {
         fs::create_dir_all(root.join("target/xtask")).context("cannot make the folder target/xtask")?;
         fs::write(&file, "").with_context(|| format!("cannot empty {}", file.display()))?;
         Ok(Self { file })
+    }
+
+    /// Adds the line of a step that is skipped.
+    pub fn add(&self, line: &str) -> Result<()> {
+        let file = fs::File::options().append(true).open(&self.file);
+        file.and_then(|mut file| writeln!(file, "{line}"))
+            .with_context(|| format!("cannot write {}", self.file.display()))
     }
 
     /// Lines that the tests wrote, one each, in order of name.

@@ -13,6 +13,7 @@ use crate::features;
 use crate::needs::{self, NEXTEST, Without};
 use crate::python;
 use crate::run;
+use crate::site;
 use crate::skipped::{self, STRICT, Skipped, Skips};
 use crate::tidy;
 
@@ -37,6 +38,7 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     let prerequisites = step("prerequisites", || prerequisites(root, skips, &mut missing))?;
     // Python's environment and the dashboard are made while the compiler waits for one crate or another; the server contains the dashboard.
     let environment = python::make_environment(root);
+    let site = site::make_environment(root);
     let dashboard = dashboard::begin_build(root);
     let mut steps = vec![
         prerequisites,
@@ -62,6 +64,7 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
             let mut docs = cargo(root, &[&["doc", "--no-deps"], &everything[..]].concat());
             Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
         })?,
+        step("site", || Ok((site::test(root, skips, &skipped, site)?, None)))?,
         step("Python tests", || python::test(root, skips, environment, &tested))?,
         step("dashboard", || dashboard::end_tests(testing, skips))?,
         step("tidy", || Ok((tidy::run(root)?, None)))?,

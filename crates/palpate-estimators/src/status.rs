@@ -5,7 +5,7 @@
 //!   Noise alone fails the first condition at half the rate. The cost of a contact is that of the extended Bayesian information criterion
 //!   at a rate of 0.2 %. The probability Φ(−√cost) that noise exceeds the cost along one contact's reading is proportional to the rate; this
 //!   gives the cost at other rates. A cost is not a quantile: noise fails the second condition at a rate that depends on the numbers of
-//!   channels and places. It is 0.3 to 1 times the set rate on the benches of docs/at-the-limit.md. Force-linear surfaces without a model
+//!   channels and places. It is 0.3 to 1 times the set rate on the benches of docs/validation/tables/at-the-limit.md. Force-linear surfaces without a model
 //!   have `NoiseBounds` instead, which noise fails at the rate itself.
 //! - `outside_model`: a contact of the model exceeds the χ² of the best contact less often than [`OUTSIDE_MODEL_RATE`], or the contact
 //!   seems distributed. A point contact seems distributed less often than [`SPREAD_RATE`]. The residual of a distributed contact lies along

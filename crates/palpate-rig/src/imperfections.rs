@@ -13,7 +13,7 @@ use crate::values::{
 };
 use crate::values::{Positive, Quantity, Ratio, ShareOrQuantity, TailFreedom, Time};
 
-/// Imperfections of a real bench in simulated recordings and boards; see docs/imperfections.md. An empty section adds only untouched
+/// Imperfections of a real bench in simulated recordings and boards; see docs/explanation/imperfections.md. An empty section adds only untouched
 /// rows and times.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -66,7 +66,7 @@ impl Stage {
     }
 }
 
-/// The machine that presses the surface; see docs/live.md.
+/// The machine that presses the surface; see docs/how-to/press-with-a-machine.md.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StageKeys {

@@ -1,5 +1,5 @@
 //! `cargo bench -p palpate --bench statuses`: what every estimator says of readings that it should not believe, and of those that it should, as the
-//! table of docs/statuses.md: noise alone, a second contact, a channel that is stuck, channels in another order, absurd values; and how often its
+//! table of docs/validation/tables/statuses.md: noise alone, a second contact, a channel that is stuck, channels in another order, absurd values; and how often its
 //! 95 % intervals contain contacts of half to twice the force of the presses. Five calibrations of each bench share the readings of a figure; `PALPATE_CASES` is
 //! their number, 2,000 unless said otherwise. `-- beam` takes the benches whose names begin so.
 

@@ -10,7 +10,7 @@ use super::source::{Field, Item, Shape, Types};
 
 const HEAD: &str = "# Keys of rigs and studies
 
-A rig is a TOML file that describes a bench; a study is a set of experiments over rigs (docs/studies.md). This page lists every key with its
+A rig is a TOML file that describes a bench; a study is a set of experiments over rigs ([study files](study-files.md)). This page lists every key with its
 values. Quantities are texts with units: `\"400 mm\"`, `\"3 N\"`, `\"200 GPa\"`, `\"5 um\"`. Shares are
 numbers or percentages, `0.05` or `\"5 %\"`. An unknown key is an error with its place in the file.
 
@@ -27,7 +27,24 @@ pub fn page(root: &Path) -> Result<String> {
     let mut page = Page { types: &types, text: HEAD.to_owned(), explained: BTreeMap::new() };
     page.sections("The rig", find("sections.rs", "RigFile")?);
     page.sections("The study", find("study.rs", "StudyFile")?);
-    Ok(page.text.trim_end().to_owned() + "\n")
+    Ok(linked(page.text.trim_end()) + "\n")
+}
+
+/// Makes links of paths from the project's root to other manuals, by which doc comments name them.
+fn linked(text: &str) -> String {
+    let mut pieces = text.split("docs/");
+    let mut linked = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        let in_path = |character: char| character.is_ascii_lowercase() || "-/".contains(character);
+        match piece.split_once(".md").filter(|(path, _)| path.chars().all(in_path)) {
+            Some((path, rest)) => {
+                let name = path.rsplit('/').next().unwrap_or(path).replace('-', " ");
+                let _ = write!(linked, "[{name}](../{path}.md){rest}");
+            }
+            None => linked.extend(["docs/", piece]),
+        }
+    }
+    linked
 }
 
 struct Page<'a> {
@@ -293,4 +310,16 @@ fn lower(sentence: &str) -> String {
     let mut characters = sentence.chars();
     let first = characters.next().map(|first| first.to_lowercase().to_string()).unwrap_or_default();
     first + characters.as_str()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_of_manuals_become_links() {
+        let text = "See docs/how-to/stream-to-mqtt.md, docs/images/A.png.";
+        let expected = "See [stream to mqtt](../how-to/stream-to-mqtt.md), docs/images/A.png.";
+        assert_eq!(linked(text), expected);
+    }
 }

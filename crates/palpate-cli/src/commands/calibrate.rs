@@ -238,7 +238,9 @@ pub fn stage(
     }
     let Some(stage) = &rig.stage else {
         let complaint = Complaint::about(path, "--stage needs the rig's section [stage]");
-        return Err(complaint.help("docs/live.md says how: origin, touch and depths at least").into());
+        return Err(complaint
+            .help("docs/how-to/press-with-a-machine.md says how: origin, touch and depths at least")
+            .into());
     };
     if force_n.is_some() && (stage.load_cell.is_some() || stage.depths_m.len() > 1) {
         let why = if stage.load_cell.is_some() {

@@ -1,4 +1,4 @@
-//! Names in the JSON of every verb are those of the table in docs/command-line.md.
+//! Names in the JSON of every verb are those of the table in docs/reference/command-line.md.
 
 use crate::support::command::{complained, run, said};
 use crate::support::examples::NOISY_BEAM;
@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-const MANUAL: &str = include_str!("../../../../docs/command-line.md");
+const MANUAL: &str = include_str!("../../../../docs/reference/command-line.md");
 /// Names whose content has names of its own: of statuses, or of the parameters of a locator.
 const WITH_OWN_NAMES: [&str; 3] = ["statuses_percent", "learnt", "training"];
 

@@ -29,6 +29,7 @@ mod quiet;
 mod readme;
 mod recording_check;
 mod recordings;
+mod reference;
 mod report_page;
 mod sample_benches;
 mod shards;
@@ -39,6 +40,7 @@ mod support;
 mod supported_beams;
 mod tare;
 mod track;
+mod tutorials;
 mod unread_sources;
 mod verbs;
 #[cfg(all(feature = "foxglove", feature = "ros"))]

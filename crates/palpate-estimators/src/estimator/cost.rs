@@ -1,7 +1,7 @@
 //! The cost of a fit, estimated before it starts: memory and time by the sizes of the matrices and tables of each method.
 //!
 //! Times are for one core with other work; on an idle core they are up to four times too long. `cargo bench -p palpate --bench cost` measures them,
-//! and docs/measured.md has the results.
+//! and docs/validation/tables/cost.md has the results.
 
 use super::auto::compared_rows;
 use super::{CHOICE_FOLDS, Estimator, is_learnt};

@@ -67,7 +67,7 @@ pub struct Imperfections {
     /// Rows that repeat each reading after the first, as of a logger that is faster than its sensors.
     pub repeated_readings: u32,
     /// Width over which a soft layer spreads a contact, in metres, at least 0 and less than the shortest side of the surface; see
-    /// docs/imperfections.md. About the diameter 2·√(d·R) of Hertz's contact (Johnson, *Contact Mechanics*, 1985, ch. 4) plus the thickness of
+    /// docs/explanation/imperfections.md. About the diameter 2·√(d·R) of Hertz's contact (Johnson, *Contact Mechanics*, 1985, ch. 4) plus the thickness of
     /// the layer.
     pub touch_width_m: f64,
     /// Share s by which a deviation as large as the channel's range R falls short of a linear one, at least 0 and below 1:

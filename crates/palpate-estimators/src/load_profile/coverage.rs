@@ -82,7 +82,7 @@ fn held(readings: usize, two: bool, (from_m, to_m): (f64, f64), rng: &mut Xoshir
     held
 }
 
-/// The tables of docs/load-profiles.md for 2,000 readings: PALPATE_READINGS=2000.
+/// The tables of docs/validation/tables/load-profiles.md for 2,000 readings: PALPATE_READINGS=2000.
 #[test]
 fn patches_are_held_wherever_they_lie() {
     let readings = fixtures::readings(30);
@@ -119,7 +119,7 @@ fn patches_are_held_wherever_they_lie() {
 }
 
 /// No other load has the force of one over the whole beam, so that its interval ends where centre and width are determined as well.
-/// docs/load-profiles.md has the shares of 400 readings: PALPATE_READINGS=400.
+/// docs/validation/tables/load-profiles.md has the shares of 400 readings: PALPATE_READINGS=400.
 #[test]
 fn the_force_of_a_load_over_the_whole_beam_is_held() {
     let readings = fixtures::readings(40);

@@ -96,7 +96,7 @@ fn tally(strain: bool, readings: usize) -> Tally {
     tally
 }
 
-/// docs/load-profiles.md has these for 200 readings: PALPATE_READINGS=200. Few readings are far off, and four of them are among the first forty, so a
+/// docs/validation/tables/load-profiles.md has these for 200 readings: PALPATE_READINGS=200. Few readings are far off, and four of them are among the first forty, so a
 /// share needs a hundred readings.
 fn readings() -> usize {
     fixtures::readings(100)
@@ -334,7 +334,7 @@ fn covered_by_distance(readings: usize) -> Vec<[f64; 3]> {
 
 const DISTANCES_M: [(f64, f64); 5] = [(0.01, 0.015), (0.015, 0.02), (0.02, 0.04), (0.04, 0.1), (0.1, 0.2)];
 
-/// The table of docs/load-profiles.md for 2,000 readings: PALPATE_READINGS=5000.
+/// The table of docs/validation/tables/load-profiles.md for 2,000 readings: PALPATE_READINGS=5000.
 #[test]
 fn totals_are_held_wherever_the_load_lies() {
     let readings = 2 * readings() / 5;

@@ -17,7 +17,7 @@ use std::ops::RangeInclusive;
 /// Distances from the left end, in millimetres.
 const PLACES_MM: [f64; 11] = [0.5, 1.0, 2.0, 4.0, 7.0, 10.0, 15.0, 22.0, 25.0, 40.0, 100.0];
 
-/// Readings at each place; docs/at-the-limit.md has the tables of 4,000: PALPATE_READINGS=4000.
+/// Readings at each place; docs/validation/tables/at-the-limit.md has the tables of 4,000: PALPATE_READINGS=4000.
 const READINGS: usize = 1800;
 
 /// The paper's beam, pressed with its known force.

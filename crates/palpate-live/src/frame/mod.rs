@@ -97,7 +97,7 @@ impl BadFrame {
             Self::TooLong => "end every reading with a line feed, and check the baud rate".to_owned(),
             Self::Encoding => "check the baud rate, or that the board sends text".to_owned(),
             Self::Checksum | Self::Malformed => {
-                "check the wiring, and the frame against docs/live-sources.md".to_owned()
+                "check the wiring, and the frame against docs/reference/sources.md".to_owned()
             }
         }
     }

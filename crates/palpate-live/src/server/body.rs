@@ -82,7 +82,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
         let bytes = whole_body(request, state).await?;
         let refused = |error: String| {
-            Refusal::new(StatusCode::BAD_REQUEST, error, "docs/live-server.md says what the body is")
+            Refusal::new(StatusCode::BAD_REQUEST, error, "docs/reference/server.md says what the body is")
         };
         let body = serde_json::from_slice(&bytes).map_err(|error| refused(error.to_string()))?;
         // serde would read a list of the values as the struct.

@@ -332,7 +332,7 @@ fn refusal(error: &LiveError) -> Refusal {
         LiveError::AlarmFile { .. } => {
             (StatusCode::INTERNAL_SERVER_ERROR, "see that the folder takes files; the alarms are as before")
         }
-        LiveError::Rule(_) => (StatusCode::BAD_REQUEST, "docs/live-recording.md says what a rule has"),
+        LiveError::Rule(_) => (StatusCode::BAD_REQUEST, "docs/how-to/react-by-rules.md says what a rule has"),
         LiveError::Session(_) => (StatusCode::CONFLICT, "start `palpate serve` without --track"),
         LiveError::Thread(_) => (StatusCode::INTERNAL_SERVER_ERROR, "start palpate again"),
         LiveError::NoFolder => (StatusCode::CONFLICT, "start `palpate serve` with --record FOLDER"),
@@ -447,13 +447,13 @@ async fn blocking<T: Send + 'static>(
 }
 
 async fn unknown() -> Refusal {
-    Refusal::new(StatusCode::NOT_FOUND, "there is no such request", "docs/live-server.md lists them")
+    Refusal::new(StatusCode::NOT_FOUND, "there is no such request", "docs/reference/server.md lists them")
 }
 
 /// A path that is there, asked by a method that it has not; those that it has are in the header `Allow`.
 async fn other_method(method: Method) -> Refusal {
     let error = format!("{method} is no method of this request");
-    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, error, "docs/live-server.md says GET or POST")
+    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, error, "docs/reference/server.md says GET or POST")
 }
 
 /// The name of a recording in a path.

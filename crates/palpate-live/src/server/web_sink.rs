@@ -166,7 +166,7 @@ const HEAD_BYTES: usize = 8;
 /// Bytes of a sample before its reading.
 const SAMPLE_BYTES: usize = 48;
 
-/// The samples of a batch as a packet, described in docs/live-server.md; empty without samples.
+/// The samples of a batch as a packet, described in docs/reference/server.md; empty without samples.
 fn packet(batch: &Batch, channels: &[Channel]) -> Vec<u8> {
     let count = batch.samples().count();
     if count == 0 {

@@ -21,6 +21,7 @@ mod presses;
 mod prior;
 mod residuals;
 mod saturation;
+mod saturation_fit;
 mod scan;
 mod seen;
 mod shared_errors;
@@ -46,6 +47,7 @@ use palpate_numerics::mean;
 pub(crate) use presses::FEW;
 use presses::{Presses, Repeats, shares};
 use prior::Prior;
+use saturation_fit::Linearization;
 
 /// Distinct positions without which a reading cannot be a function of anything.
 const LEAST_POSITIONS: usize = 2;
@@ -65,13 +67,22 @@ pub(crate) const fn most_nodes(extent: Extent) -> usize {
 /// they have no forces or all the same one, and unless the structure is force-linear by demand, where they speak against it.
 pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLinearLocator>, MeasuredError> {
     if structure == Structure::ForceSaturating {
-        return saturation::fit(task);
+        return fit_saturating(task);
     }
     let Some(locator) = fit_condensed(task, structure, MOST_PRESSES)? else { return Ok(None) };
     Ok(Some(match left_out::factor(task, structure, locator.presses())? {
         Some(factor) => locator.with_likelihood_divided_by(factor, task.recording),
         None => locator,
     }))
+}
+
+/// [`fit`] for readings that saturate, by linearized readings.
+fn fit_saturating(task: FitTask) -> Result<Option<ForceLinearLocator>, MeasuredError> {
+    let Some(Linearization { recording, saturation, channels }) = Linearization::new(task)? else {
+        return Ok(None);
+    };
+    let locator = fit(FitTask { recording: &recording, ..task }, Structure::ForceLinear)?;
+    Ok(locator.map(|locator| locator.with_saturation(saturation, &channels)))
 }
 
 /// True of presses with forces, of which two differ.

@@ -408,7 +408,7 @@ impl Comparison {
     }
 }
 
-/// Benches of a comparison; docs/measured.md has the figures of 100: PALPATE_BENCHES=100.
+/// Benches of a comparison; docs/explanation/measured.md has the figures of 100: PALPATE_BENCHES=100.
 fn benches(usual: u64) -> u64 {
     std::env::var("PALPATE_BENCHES").ok().and_then(|count| count.parse().ok()).unwrap_or(usual)
 }

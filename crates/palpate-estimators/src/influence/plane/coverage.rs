@@ -16,7 +16,7 @@ use super::PlaneLocator;
 const PRESSES_N: f64 = 5.0;
 const CONTACTS_N: [f64; 3] = [2.0, 5.0, 20.0];
 const SIDE_M: f64 = 0.3;
-/// Calibrations, and readings of each at every distance; docs/at-the-limit.md has the table of 100: PALPATE_READINGS=100.
+/// Calibrations, and readings of each at every distance; docs/validation/tables/at-the-limit.md has the table of 100: PALPATE_READINGS=100.
 const CALIBRATIONS: u64 = 20;
 const READINGS: usize = 50;
 

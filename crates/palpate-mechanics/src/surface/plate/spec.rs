@@ -85,7 +85,7 @@ pub enum PointSupportKind {
 
 impl PlateSpec {
     /// Default number of elements along the longer side: the error of deflections is then about 10⁻⁴ of the
-    /// largest deflection (docs/plates.md).
+    /// largest deflection (docs/explanation/plates.md).
     pub const DEFAULT_ELEMENTS: usize = 128;
 
     /// Flexural rigidity D = E·t³/(12·(1 − ν²)), in N·m.

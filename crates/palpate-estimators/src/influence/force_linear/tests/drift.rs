@@ -189,7 +189,7 @@ fn condensed_under_drift(presses: usize, course: Course, places: usize) -> [[f64
 
 #[test]
 fn many_presses_under_drift_are_condensed_with_hardly_a_loss() {
-    // docs/measured.md has the figures of 400 presses.
+    // docs/explanation/measured.md has the figures of 400 presses.
     let presses = if benches(0) == 0 { 280 } else { 400 };
     let mut sums = [[0.0; 2]; 2];
     for course in Course::ALL {

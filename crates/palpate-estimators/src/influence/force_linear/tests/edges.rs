@@ -10,7 +10,7 @@ const TIMES: usize = 3;
 const CONTACTS_N: [f64; 2] = [5.0, 2.0];
 /// Distances from the left edge, in millimetres; 60 mm or more from the others.
 const PLACES_MM: [f64; 8] = [3.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0, 150.0];
-/// Readings at each place; docs/measured.md has the tables of 400: PALPATE_READINGS=400.
+/// Readings at each place; docs/explanation/measured.md has the tables of 400: PALPATE_READINGS=400.
 const READINGS: usize = 40;
 /// Readings at each place by one plate.
 const OF_A_PLATE: usize = 20;

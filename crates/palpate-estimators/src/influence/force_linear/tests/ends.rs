@@ -8,7 +8,7 @@ use palpate_numerics::binomial_tail;
 const BEAM_M: f64 = 0.4;
 /// Distances from the left end, in millimetres.
 const PLACES_MM: [f64; 9] = [1.0, 3.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0, 200.0];
-/// Readings at each place; docs/measured.md has the tables of 400: PALPATE_READINGS=400.
+/// Readings at each place; docs/explanation/measured.md has the tables of 400: PALPATE_READINGS=400.
 const READINGS: usize = 100;
 /// Readings at each place by one beam.
 const OF_A_BEAM: usize = 10;

@@ -30,7 +30,7 @@ fn scattered_presses_are_weighed_by_their_scatter() {
         Wrong { force: 0.0, position_m: 1e-3 },
         Wrong { force: 0.03, position_m: 1e-3 },
     ];
-    // The most presses take the most time, and tell scatter the best; docs/measured.md has all three.
+    // The most presses take the most time, and tell scatter the best; docs/explanation/measured.md has all three.
     let sizes: &[(usize, usize)] =
         if benches(0) == 0 { &[(25, 9), (60, 15)] } else { &[(25, 9), (60, 15), (120, 30)] };
     for (presses, places) in sizes.iter().copied() {

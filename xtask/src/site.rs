@@ -1,0 +1,54 @@
+//! The documentation site: docs/ and the docstrings of the Python package, by MkDocs, into target/site.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use crate::needs::PYTHON;
+use crate::python::{self, Environment, Making};
+use crate::run;
+use crate::skipped::{Skipped, Skips};
+
+/// Exact versions of MkDocs, its theme and its plugins.
+const REQUIREMENTS: &str = "docs/requirements.txt";
+
+/// Makes the environment of MkDocs, `target/xtask/docs`, where it is not there, in a thread of its own; `None` without Python.
+pub fn make_environment(root: &Path) -> Option<Making> {
+    python::begin_environment(root, "target/xtask/docs", REQUIREMENTS)
+}
+
+/// Builds the site; false without Python, or with a dead link, a dead anchor or a page that the navigation lacks.
+pub fn build(root: &Path) -> Result<bool> {
+    let Some(environment) = make_environment(root) else {
+        println!("{}", PYTHON.describe());
+        return Ok(false);
+    };
+    built(root, &run::joined(environment)?)
+}
+
+/// Builds the site as a test, which is skipped without Python or its package index.
+pub fn test(root: &Path, skips: Skips, skipped: &Skipped, environment: Option<Making>) -> Result<bool> {
+    let Some(environment) = environment else {
+        println!("{}", PYTHON.describe());
+        return Ok(skips == Skips::Pass);
+    };
+    match run::joined(environment) {
+        Ok(environment) => built(root, &environment),
+        Err(error) if skips == Skips::Pass => {
+            skipped.add(&format!("skipped: the documentation site: {error:#}"))?;
+            Ok(true)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn built(root: &Path, environment: &Environment) -> Result<bool> {
+    let mut mkdocs = environment.run("mkdocs");
+    // The theme advertises its successor, which ARCHITECTURE.md weighs.
+    mkdocs.args(["build", "--strict", "--quiet"]).env("NO_MKDOCS_2_WARNING", "1").current_dir(root);
+    let succeeded = run::shown(&mut mkdocs)?;
+    if succeeded {
+        println!("{}", root.join("target/site/index.html").display());
+    }
+    Ok(succeeded)
+}
