@@ -43,7 +43,7 @@ const RULES: [(&str, Rule); 7] = [
     ("no machine's paths or hosts", places::findings),
     ("nothing unfinished", unfinished::findings),
     ("text files only", binary::findings),
-    ("the changelog knows the version", changelog::findings),
+    ("the changelog has the version", changelog::findings),
 ];
 
 /// Checks every rule and prints what breaks one; true when none is broken.
