@@ -126,7 +126,7 @@ def test_files_that_cannot_be_read(tmp_path, beam, locator):
     refused(lambda: pp.Locator.from_json(json.dumps(future)), "format version 2; this palpate reads version 1")
     refused(lambda: pp.Locator.from_json("[1, 2"), "not a locator file")
     refused(lambda: pp.Rig('[surface]\nkind = "bem"'), "did you mean `beam`?")
-    refused(lambda: locator.save(tmp_path), "is no file", pp.PalpateError)
+    refused(lambda: locator.save(tmp_path), "is not a file", pp.PalpateError)
     refused(lambda: locator.save(tmp_path / "no" / "where.json"), "No such file", FileNotFoundError)
     assert [path.name for path in tmp_path.iterdir()] == ["bad.csv"]
 

@@ -94,7 +94,10 @@ fn a_machine_calibrates_to_the_limit_unattended() {
     std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
     let bench = Bench::start(folder.path(), "marlin");
     let words = said(&bench.calibrate(folder.path(), &[]).output().unwrap());
-    assert!(words.contains("fitted to 54 presses") && words.contains("held out (5 folds)"), "{words}");
+    assert!(
+        words.contains("fitted to 54 presses") && words.contains("error at held-out positions (5 folds)"),
+        "{words}"
+    );
     assert_eq!(presses(folder.path()), 54);
     let json = std::fs::read_to_string(folder.path().join("locator.json")).unwrap();
     let locator = Locator::from_json(&json).unwrap();

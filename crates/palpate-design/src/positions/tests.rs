@@ -344,7 +344,7 @@ fn presses_that_do_not_tell_places_apart_are_refused() {
     let (setup, near) = begun(&[0.2, 0.201, 0.202, 0.203], 3);
     let error = refused(&setup, &near);
     assert!(matches!(error, PositionError::SmallPart { axis: 'x', .. }), "{error}");
-    assert!(error.to_string().contains("over 3.0 mm of 400.0 mm"), "{error}");
+    assert!(error.to_string().contains("cover 3.0 mm of 400.0 mm"), "{error}");
     // Noise alone, in three draws.
     for seed in 0..3 {
         let positions: Vec<Position> = TEN_M.map(Position::along).to_vec();
