@@ -64,14 +64,14 @@ def _floats(value: Any, name: str) -> npt.NDArray[np.float64]:
     if array.dtype.kind not in "fiu":
         if array.dtype.kind == "O":
             raise PalpateError(
-                f"`{name}` holds objects (dtype object){_such_as(array)}; it must hold numbers: rows of one length, without texts"
+                f"`{name}` contains objects (dtype object){_such_as(array)}; it must contain numbers: rows of one length, without texts"
             )
-        raise PalpateError(f"`{name}` has the dtype {array.dtype}; it must hold real numbers")
+        raise PalpateError(f"`{name}` has the dtype {array.dtype}; it must contain real numbers")
     return np.ascontiguousarray(array, dtype=np.float64) if array.ndim else array.astype(np.float64)
 
 
 def _such_as(array: npt.NDArray[Any]) -> str:
-    """The first object of an array that is no number, with its index; the first of all where every one is a number."""
+    """The first object of an array that is not a number, with its index; the first of all where every one is a number."""
     found = list(np.ndenumerate(array))
     odd = next((each for each in found if not isinstance(each[1], (int, float, np.number))), found[0] if found else None)
     return "" if odd is None else f", such as {odd[1]!r} at {odd[0]}"

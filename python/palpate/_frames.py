@@ -15,7 +15,7 @@ _UNITS = {"deflection": "m", "slope": "rad", "strain": "m/m", "reaction": "N", "
 
 
 def recording(recording: Recording) -> pd.DataFrame:
-    """A recording, in SI units, which the names of the columns say."""
+    """A recording in SI units, with the units in the names of the columns."""
     import pandas as pd
 
     setup = recording.setup

@@ -1,4 +1,4 @@
-"""Influence functions: what sensors read per newton, as presses told it."""
+"""Influence functions: readings per newton as functions of position, learnt from presses."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def inspect(
         elif path.suffix.lower() in _TABLES:
             if bench is None:
                 lines = _palpate.inspect_table(str(path), path.read_bytes())
-                return Inspection([*lines, "`bench` says of which bench it is a recording"])
+                return Inspection([*lines, "`bench` names the bench of the recording"])
             setup = bench.setup if isinstance(bench, Rig) else bench
             what = setup.read_csv(path)
         else:

@@ -73,17 +73,17 @@ class Limit(Result):
 
     @property
     def sd(self) -> Floats:
-        """Least standard deviation of the position in metres, by what the bench knows of the force: of the shape (positions)."""
+        """Least standard deviation of the position in metres, for the bench's knowledge of the force: of the shape (positions)."""
         return self.known_force if self.force_known else self.unknown_force
 
     @property
     def covariance(self) -> Floats:
-        """Least covariance of x and y in m², by what the bench knows of the force: of the shape (positions, 2, 2)."""
+        """Least covariance of x and y in m², for the bench's knowledge of the force: of the shape (positions, 2, 2)."""
         return self.known_force_covariance if self.force_known else self.unknown_force_covariance
 
     @property
     def not_told(self) -> float:
-        """Share of the positions that the readings do not tell, by what the bench knows of the force."""
+        """Share of the positions that are unidentifiable, for the bench's knowledge of the force."""
         return float(np.isnan(self.sd).mean())
 
     def effective_length(self, tolerance: Quantity = "2 mm") -> float:
@@ -110,9 +110,9 @@ class Limit(Result):
         summary = self.summary["known_force" if self.force_known else "unknown_force"]
         known = "known" if self.force_known else "unknown"
         if summary is None:
-            return f"<Limit: {len(self)} positions, {self.force:g} N, force {known}: no position is told>"
+            return f"<Limit: {len(self)} positions, {self.force:g} N, force {known}: no position is identifiable>"
         figures = f"median {1e3 * summary['median']:.4g} mm, largest {1e3 * summary['largest']:.4g} mm"
-        without = f", {100 * self.not_told:.1f} % not told" if self.not_told else ""
+        without = f", {100 * self.not_told:.1f} % unidentifiable" if self.not_told else ""
         return f"<Limit: {len(self)} positions, {self.force:g} N, force {known}: {figures}{without}>"
 
     def _notes(self) -> list[str]:

@@ -49,11 +49,11 @@ class LoadProfile(Result):
     total, total_sd : float
         Whole force in newtons, and its standard deviation.
     total_95 : tuple of float
-        Ends of its 95 % interval, whatever the shape of the load.
+        Ends of its 95 % interval, for any shape of the load.
     margin : float
         Distance from the edges, in metres, within which a load is not told from a harder one at the edge.
     seen_95 : tuple of float
-        Ends of the interval of the whole force where nothing lies within that distance.
+        Ends of the interval of the whole force if no load lies within that distance.
     centre : dict or None
         Centre of pressure: "x", "x_sd", "x_95", and on a plane "y", "y_sd", "y_95", in metres; None without load.
     resolution : float or None

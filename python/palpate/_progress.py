@@ -20,7 +20,7 @@ class Shown(Protocol):
 
 
 def show(wanted: Progress) -> Shown | None:
-    """What shows the progress as it is wanted; `None` where nobody sees it."""
+    """The requested display of progress; `None` without a terminal or notebook."""
     if wanted is None:
         wanted = _in_notebook() or sys.stderr is not None and sys.stderr.isatty()
     if callable(wanted):

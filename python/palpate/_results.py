@@ -60,7 +60,7 @@ class Result:
         return pd.DataFrame(dict(self._columns()))
 
     def to_csv(self, path: PathLike) -> None:
-        """Write the rows as CSV, with units in the names of the columns; the first line, a comment, says what they are of.
+        """Write the rows as CSV, with units in the names of the columns; the first line, a comment, names their source.
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ def structured(values: Mapping[str, Any], rows: int | None = None) -> np.ndarray
 
 
 def write_csv(path: PathLike, title: str, columns: Mapping[str, Any]) -> None:
-    """Write columns as CSV; the first line, a comment, says what they are of."""
+    """Write columns as CSV; the first line, a comment, names their source."""
     text = io.StringIO()
     text.write(f"# palpate {__version__}, {' '.join(title.split())}\n")
     writer = csv.writer(text, lineterminator="\n")

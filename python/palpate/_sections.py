@@ -40,7 +40,7 @@ class Section:
         return unit
 
     def _keys(self) -> dict[str, str]:
-        """The section's keys, each with its value in TOML; those that are not said are left out."""
+        """The section's keys, each with its value in TOML; keys without a value are omitted."""
         keys = {} if self._kind is None else {"kind": json.dumps(self._kind)}
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
@@ -49,14 +49,14 @@ class Section:
         return keys
 
     def _toml(self, heading: str) -> str:
-        """The section as TOML below its heading, ``[surface]`` say."""
+        """The section as TOML below its heading, for example ``[surface]``."""
         lines = [heading, *(f"{name} = {value}" for name, value in self._keys().items())]
         return "\n".join(lines) + "\n"
 
 
 @dataclasses.dataclass(frozen=True)
 class Range(Section):
-    """A section whose `start` and `end` are called `from` and `to` in a rig; `from` is a word of Python itself."""
+    """A section with `start` and `end` for the rig's `from` and `to`; `from` is a keyword of Python."""
 
     def _keys(self) -> dict[str, str]:
         renamed = {"start": "from", "end": "to"}

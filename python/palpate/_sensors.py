@@ -196,7 +196,7 @@ def setup_toml(
     force_range: Sequence[Quantity] | None,
     columns: Columns | Mapping[str, Any] | None,
 ) -> str:
-    """The sections of a rig that say what a setup is."""
+    """The sections of a rig that define a setup."""
     if not isinstance(surface, Section) or surface._kind is None:
         raise TypeError(f"the surface is of the type {type(surface).__name__}; it must be a Beam, Plate, Digit or Measured")
     text = surface._toml("[surface]")

@@ -272,7 +272,7 @@ class StudyResults(Result):
         return frame if weights else frame.drop(columns="weights")
 
     def to_dict(self) -> dict[str, Any]:
-        """All figures, and of the founding paper's study "published" figures and "claims": what ``results.json`` holds."""
+        """All figures, and of the founding paper's study "published" figures and "claims": the contents of ``results.json``."""
         values: dict[str, Any] = json.loads(self.results_json)
         return values
 
@@ -410,14 +410,14 @@ class _Tables:
         self._lock = threading.Lock()
         if self.folder is None:
             if resume or overwrite:
-                raise PalpateError("`folder` is None; `resume` and `overwrite` say what becomes of an earlier run in a folder")
+                raise PalpateError("`folder` is None; `resume` and `overwrite` determine what happens to an earlier run in a folder")
             return
         if resume and overwrite:
             raise PalpateError("`resume` and `overwrite` are both True; one of them may be")
         found = next((name for name in (_RESULTS, _SHARD, _NETWORKS, _EVALUATIONS) if (self.folder / name).exists()), None)
         if found is not None and not (resume or overwrite):
             raise PalpateError(
-                f"{self.folder / found} is of an earlier run; resume=True goes on from what is finished, overwrite=True throws it away"
+                f"{self.folder / found} is of an earlier run; resume=True continues from what is finished, overwrite=True throws it away"
             )
         if resume:
             (networks, evaluations), cut_off, without_evaluation = prepared.whole(_read_tables(self.folder))
@@ -501,5 +501,5 @@ def _write_tables(folder: Path, texts: tuple[str, str]) -> None:
 def _read_facts(folder: Path) -> str:
     path = folder / _SHARD
     if not path.exists():
-        raise PalpateError(f"{folder}: there is no {_SHARD}; `palpate study FILE --shard K/N --out {folder} --resume` writes it")
+        raise PalpateError(f"{folder}: {_SHARD} is missing; `palpate study FILE --shard K/N --out {folder} --resume` writes it")
     return path.read_text(encoding="utf-8")

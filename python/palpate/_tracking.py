@@ -205,22 +205,22 @@ class Track(Result):
 
     @property
     def x(self) -> Floats:
-        """Position of the contact along the surface in metres, NaN while nothing touches: of the shape (readings)."""
+        """Position of the contact along the surface in metres, NaN without a contact: of the shape (readings)."""
         return self.first.x
 
     @property
     def y(self) -> Floats | None:
-        """Its position across a plane, in metres; None on a line."""
+        """Position of the contact across a plane, in metres; None on a line."""
         return self.first.y
 
     @property
     def speed(self) -> Floats:
-        """Its speed along the surface, in m/s: of the shape (readings)."""
+        """Speed of the contact along the surface, in m/s: of the shape (readings)."""
         return self.first.speed
 
     @property
     def force(self) -> Floats:
-        """Its force in newtons: of the shape (readings)."""
+        """Force of the contact in newtons: of the shape (readings)."""
         return self.first.force
 
     @property
@@ -296,22 +296,22 @@ class TrackState:
 
     @property
     def x(self) -> float | None:
-        """Position of the first contact along the surface in metres; None while nothing touches."""
+        """Position of the first contact along the surface in metres; None without a contact."""
         return self.contacts[0].x if self.contacts else None
 
     @property
     def y(self) -> float | None:
-        """Its position across a plane, in metres; None on a line."""
+        """Position of the contact across a plane, in metres; None on a line."""
         return self.contacts[0].y if self.contacts else None
 
     @property
     def speed(self) -> float | None:
-        """Its speed along the surface, in m/s."""
+        """Speed of the contact along the surface, in m/s."""
         return self.contacts[0].speed if self.contacts else None
 
     @property
     def force(self) -> float | None:
-        """Its force in newtons."""
+        """Force of the contact in newtons."""
         return self.contacts[0].force if self.contacts else None
 
     @property
@@ -321,7 +321,7 @@ class TrackState:
 
     def __repr__(self) -> str:
         if not self.contacts:
-            return f"<TrackState: {self.time:.4g} s, nothing touches>"
+            return f"<TrackState: {self.time:.4g} s, no contact>"
         return f"<TrackState: {self.time:.4g} s, {' and '.join(map(_in_words, self.contacts))}>"
 
 

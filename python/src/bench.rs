@@ -593,7 +593,7 @@ impl Setup {
         let forces_n = self.row_forces(force, count)?;
         let each = forces_n
             .into_iter()
-            .map(|force_n| force_n.ok_or_else(|| refused("`force` is needed: the setup does not know it")));
+            .map(|force_n| force_n.ok_or_else(|| refused("`force` is needed: the setup has no known force")));
         each.map(|force_n| {
             let force_n = force_n?;
             if force_n > 0.0 && force_n.is_finite() {

@@ -144,7 +144,7 @@ pub fn compare<'py>(
             (trials?, "simulation".to_owned(), how)
         }
         (None, None) => {
-            return Err(refused("nothing to compare on: give a recording, or `training` to simulate it"));
+            return Err(refused("a comparison needs data: give a recording, or `training` to simulate it"));
         }
     };
     let rows = trials.first().map_or(0, |trial| trial.training.rows.len());

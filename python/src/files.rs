@@ -15,7 +15,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> PyResult<()> {
     let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let mut name = target.file_name().map(ToOwned::to_owned).unwrap_or_default();
     if target.exists() && !target.is_file() {
-        return Err(refused(format!("{} is no file; nothing was written", path.display())));
+        return Err(refused(format!("{} is not a file; no output was written", path.display())));
     }
     name.push(format!(".{}.part", std::process::id()));
     let temporary = target.with_file_name(name);

@@ -45,7 +45,7 @@ pub fn limit<'py>(
     };
     let extent = setup.surface().extent();
     let at = match (at, every) {
-        (Some(_), Some(_)) => return Err(refused("`at` and `every` both say where; leave one of them out")),
+        (Some(_), Some(_)) => return Err(refused("`at` and `every` exclude each other; give one of them")),
         (Some(at), None) => {
             let at = positions(&at)?;
             OffSurface::check("position", &at, extent).map_err(refused)?;
@@ -62,7 +62,7 @@ pub fn limit<'py>(
     let rate = match false_alarm_rate {
         Some(_) if matches!(&subject, Subject::Locator(locator) if locator.force_linear().is_some()) => {
             return Err(refused(
-                "a locator of a measured surface has a false-alarm rate of its own; leave `false_alarm_rate` out",
+                "a locator of a measured surface has its own false-alarm rate; omit `false_alarm_rate`",
             ));
         }
         Some(rate) => FalseAlarmRate::new(share(&rate, "false_alarm_rate")?).map_err(refused)?,

@@ -49,7 +49,7 @@ pub fn load_profile<'py>(
         let of_truth = patch_limits(profiler.sensors(), &truth);
         let rows = values.chunks_exact(channels).enumerate();
         let each = rows.map(|(i, reading)| {
-            watch.counted("telling loads", "readings", i, values.len() / channels)?;
+            watch.counted("estimating loads", "readings", i, values.len() / channels)?;
             let profile = profiler.profile(reading).map_err(|error| Refused::Reading(i, error))?;
             let extent = profiler.cells().extent;
             let patches: Vec<UniformLoad> =
@@ -92,7 +92,7 @@ pub fn simulate_loads<'py>(
         (None, _) => Vec::new(),
     };
     if loads.is_empty() {
-        return Err(refused("there is no load to simulate; give at least one `UniformLoad`"));
+        return Err(refused("a simulation needs a load; give at least one `UniformLoad`"));
     }
     if repeats == 0 {
         return Err(refused("`repeats` is 0; it must be at least 1"));

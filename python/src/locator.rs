@@ -156,7 +156,7 @@ impl Locator {
             Some(recording) => {
                 let digests = &recording.inner.provenance.digests;
                 if !digests.is_empty() && *digests == self.inner.provenance.recording.digests {
-                    let message = c"the locator was fitted to this very recording; at positions that it has not seen it is worse: cross_validate tells how much";
+                    let message = c"the locator was fitted to this recording; errors at other positions are larger: cross_validate estimates them";
                     PyErr::warn(py, &py.get_type::<PyUserWarning>(), message, 1)?;
                 }
                 match tare {
@@ -394,7 +394,7 @@ impl Locator {
         let name = path.display().to_string();
         let text = String::from_utf8(bytes).map_err(|error| {
             let at = error.utf8_error().valid_up_to();
-            refused(format!("{name} is not UTF-8 text: byte {} is no character", at + 1))
+            refused(format!("{name} is not UTF-8 text: byte {} is invalid", at + 1))
         })?;
         let locator = py.detach(|| estimator::Locator::from_json(&text));
         Ok(Self::new(locator.map_err(|error| of_locator(&error, &name, &text))?, None))

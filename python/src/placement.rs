@@ -64,7 +64,7 @@ pub fn place_sensors<'py>(
     }
     match (count, add) {
         (Some(_), Some(_)) => {
-            return Err(refused("`count` and `add` both say how many; leave one of them out"));
+            return Err(refused("`count` and `add` exclude each other; give one of them"));
         }
         (Some(count), None) => design.count = count,
         (None, Some(count)) => design = design.adding(count, own.layout()).map_err(refused)?,
@@ -74,7 +74,7 @@ pub fn place_sensors<'py>(
         && (from < 1 || to > MOST_COUNT || from > to)
     {
         return Err(refused(format!(
-            "`counts` is {from} to {to}; it must go from at least 1 to at most {MOST_COUNT}, the lesser first"
+            "`counts` is {from} to {to}; it must be a range from 1 to {MOST_COUNT}, the smaller number first"
         )));
     }
     let method = method.map(named).transpose()?;

@@ -15,7 +15,7 @@ use crate::errors::refused;
 pub fn bent_line(surface: &SurfaceSpec, contact: Contact, points: usize) -> PyResult<Vec<[f64; 2]>> {
     let model = surface.model().ok_or_else(|| refused("a measured surface has no model"))?;
     if let Extent::Plane { .. } = model.extent() {
-        return Err(refused("a plane has no bent line; `response` tells what its sensors read"));
+        return Err(refused("a plane has no bent line; `response` gives the readings of its sensors"));
     }
     if points < 2 {
         return Err(refused(format!("`points` is {points}; it must be at least 2")));

@@ -120,7 +120,7 @@ pub fn tared_recording(
         (None, Ok(first)) if first >= recording.rows.len() => {
             let rows = recording.rows.len();
             return Err(refused(format!(
-                "`tare` is {first}; the recording has {rows} rows, of which the first {first} are to be the untouched ones: give fewer"
+                "`tare` is {first}; the recording has {rows} rows; the first {first} must be untouched: give a smaller number"
             )));
         }
         (None, Ok(first)) => {
@@ -151,7 +151,7 @@ fn check_tells_untouched(locator: &Locator, remedy: &str) -> PyResult<()> {
     match locator.false_alarm_rate() {
         Some(_) => Ok(()),
         None => Err(refused(format!(
-            "a locator of kind `{}` does not tell untouched readings from contacts: {remedy}",
+            "a locator of kind `{}` cannot distinguish untouched readings from contacts: {remedy}",
             locator.kind()
         ))),
     }

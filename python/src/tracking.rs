@@ -60,11 +60,11 @@ pub fn simulate_moving<'py>(
         }
         (Err(_), None) => (Arc::clone(&bench.cast::<Setup>()?.get().0), None, None),
     };
-    let moving = moving.ok_or_else(|| refused("how the contact moves is not said: give a `motion`"))?;
+    let moving = moving.ok_or_else(|| refused("the motion of the contact is missing: give a `motion`"))?;
     let known_n = force_n.or(press_n).or(setup.force_n());
     let pressed = (*setup).clone().with_force(known_n).map_err(refused)?;
     let timed = work::run_quietly_with(py, |watch| simulate(&pressed, &moving, seed, watch))?;
-    let timed = timed.map_err(|error| refused(format!("{error}; `force` says it, as in \"3 N\"")))?;
+    let timed = timed.map_err(|error| refused(format!("{error}; set `force`, as in \"3 N\"")))?;
     let fields = Fields::new(py);
     let TimedRecording { mut recording, times_s, second } = timed;
     for (row, time_s) in recording.rows.iter_mut().zip(&times_s) {

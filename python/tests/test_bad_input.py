@@ -32,9 +32,9 @@ def refused(call, words, kind=pp.PalpateError):
         (np.zeros(()), "0 dimensions"),
         (np.full((2, 8), np.nan), "readings[0]: channel 1 reads NaN; it must be a finite number"),
         (np.where(np.arange(24).reshape(3, 8) == 20, np.inf, 0.0), "readings[2]: channel 5 reads inf"),
-        (np.array([["a"] * 8]), "has the dtype <U1; it must hold real numbers"),
-        (np.array([[None] * 8]), "holds objects (dtype object), such as None"),
-        (np.zeros((2, 8), dtype=complex), "has the dtype complex128; it must hold real numbers"),
+        (np.array([["a"] * 8]), "has the dtype <U1; it must contain real numbers"),
+        (np.array([[None] * 8]), "contains objects (dtype object), such as None"),
+        (np.zeros((2, 8), dtype=complex), "has the dtype complex128; it must contain real numbers"),
         (np.ma.masked_array(np.zeros((2, 8)), mask=np.eye(2, 8)), "is masked at (0, 0)"),
         (np.zeros((0, 8)), "readings of the shape (0, 8) have 0 rows; there must be at least 1"),
         (np.zeros((0, 7)), "readings of the shape (0, 7) have 7 channels; it must be (8,) or (readings, 8)"),
@@ -97,7 +97,7 @@ def test_frames_and_columns_that_cannot_be(beam, presses, locator):
     texts, gaps = frame.astype({"deflection_3 [m]": object}), frame.copy()
     texts.loc[1, "deflection_3 [m]"] = "x"
     gaps.loc[2, "deflection_1 [m]"] = np.nan
-    words = "`readings` holds objects (dtype object), such as 'x' at (1, 2)"
+    words = "`readings` contains objects (dtype object), such as 'x' at (1, 2)"
     for taken in (beam.read_frame, locator.locate):
         refused(lambda: taken(texts), words)
     refused(lambda: beam.read_frame(gaps), "row 2: channel 1 reads NaN")
@@ -108,7 +108,7 @@ def test_frames_and_columns_that_cannot_be(beam, presses, locator):
     masked = np.ma.masked_array([0.1, 0.2], mask=[False, True])
     refused(lambda: beam.recording(np.ma.masked_array(zeros, mask=np.eye(2, 8)), [0.1, 0.2]), "`readings` is masked at (0, 0)")
     refused(lambda: beam.recording(zeros, masked), "`x` is masked at (1,)")
-    refused(lambda: beam.recording(zeros, np.array([0.1, None])), "`x` holds objects (dtype object), such as None at (1,)")
+    refused(lambda: beam.recording(zeros, np.array([0.1, None])), "`x` contains objects (dtype object), such as None at (1,)")
     refused(lambda: beam.recording(zeros, [0.1, np.nan]), "row 1: position 1 is at NaN mm")
     refused(lambda: beam.recording(zeros, [0.1, 0.2], force="3 M"), "`force`: unknown unit `M`; a force is one of uN, mN, N, kN")
     refused(lambda: locator.tare(presses.readings, untouched=np.zeros((0, 8))), "`untouched` has 0 readings")
@@ -126,7 +126,7 @@ def test_files_that_cannot_be_read(tmp_path, beam, locator):
     refused(lambda: pp.Locator.from_json(json.dumps(future)), "format version 2; this palpate reads version 1")
     refused(lambda: pp.Locator.from_json("[1, 2"), "not a locator file")
     refused(lambda: pp.Rig('[surface]\nkind = "bem"'), "did you mean `beam`?")
-    refused(lambda: locator.save(tmp_path), "is no file", pp.PalpateError)
+    refused(lambda: locator.save(tmp_path), "is not a file", pp.PalpateError)
     refused(lambda: locator.save(tmp_path / "no" / "where.json"), "No such file", FileNotFoundError)
     assert [path.name for path in tmp_path.iterdir()] == ["bad.csv"]
 

@@ -179,7 +179,7 @@ def test_designs_are_kept_and_shown(beam, tmp_path):
 def test_what_cannot_be_designed_is_refused_in_words(beam, presses):
     with pytest.raises(pp.PalpateError, match="the limit depends on the contact force"):
         pp.place_sensors(beam)
-    with pytest.raises(pp.PalpateError, match="both say how many"):
+    with pytest.raises(pp.PalpateError, match="exclude each other"):
         pp.place_sensors(beam, force=3, count=2, add=2)
     with pytest.raises(pp.PalpateError, match="`method` is \"exact\"; it must be one of even, "):
         pp.place_sensors(beam, force=3, method="exact")
@@ -195,5 +195,5 @@ def test_what_cannot_be_designed_is_refused_in_words(beam, presses):
         pp.place_training(beam.with_force(3), estimator=pp.Auto())
     with pytest.raises(pp.PalpateError, match="the gain in % that is worth a press"):
         pp.next_press(presses, stop_below=0)
-    with pytest.raises(pp.PalpateError, match="at least 4 tell how smooth|distinct positions"):
+    with pytest.raises(pp.PalpateError, match="distinct positions; at least 4 are needed"):
         pp.next_press(presses[presses.x < 0.03])

@@ -169,7 +169,7 @@ def test_an_executor_that_breaks_leaves_what_is_finished(long_study, long_whole,
     kept = (tmp_path / "networks.csv").read_text().count("\n") - 2
     assert 4 <= kept < 3 * SEEDS
     assert not (tmp_path / "results.json").exists()
-    with pytest.raises(pp.PalpateError, match="networks.csv is of an earlier run; resume=True goes on"):
+    with pytest.raises(pp.PalpateError, match="networks.csv is of an earlier run; resume=True continues"):
         long_study.run(SEEDS, folder=tmp_path)
     same(long_study.run(SEEDS, folder=tmp_path, resume=True), long_whole)
 
@@ -278,7 +278,7 @@ def test_shards_of_the_command_are_joined(study, whole, command, tmp_path):
     with pytest.raises(pp.PalpateError, match="shard 1/3 is there twice"):
         study.merge([*folders, folders[0]])
     (folders[0] / "shard.json").unlink()
-    with pytest.raises(pp.PalpateError, match=r"there is no shard.json; `palpate study FILE --shard"):
+    with pytest.raises(pp.PalpateError, match=r"shard.json is missing; `palpate study FILE --shard"):
         study.merge(folders)
 
 
@@ -306,7 +306,7 @@ def test_bad_input_is_refused(study, whole, tmp_path):
         study.run(0)
     with pytest.raises(TypeError, match="`threads` is of the type str; it must be an int"):
         study.run(threads="two")
-    with pytest.raises(pp.PalpateError, match="`folder` is None; `resume` and `overwrite` say"):
+    with pytest.raises(pp.PalpateError, match="`folder` is None; `resume` and `overwrite` determine"):
         study.run(resume=True)
     with pytest.raises(pp.PalpateError, match="`resume` and `overwrite` are both True"):
         study.run(folder=tmp_path, resume=True, overwrite=True)

@@ -136,7 +136,7 @@ def test_readings_are_followed_one_by_one_as_all_at_once(beam_rig, examples, pla
     assert_same_states(swinging.track(moving, frequency="17.17 Hz", damping=0.02), states)
     for count in range(1, 100):
         lifted = tracker.follow(moving.time[-1] + 0.005 * count, np.zeros(8))
-    assert lifted.x is None and lifted.x_95 is None and lifted.touching < 0.5 and repr(lifted).endswith("nothing touches>")
+    assert lifted.x is None and lifted.x_95 is None and lifted.touching < 0.5 and repr(lifted).endswith("no contact>")
 
     two = pp.Rig((examples / "two-moving-loads.toml").read_text().replace('rate = "1 kHz"', 'rate = "50 Hz"'))
     moving, locator = pp.simulate_moving(two, seed=2), two.estimator.fit(two.simulate(seed=1))
@@ -159,7 +159,7 @@ def test_a_reading_that_is_refused_is_as_if_it_had_not_been(locator, presses):
     one, other = locator.tracker(), locator.tracker()
     assert one.follow(0.0, reading) == other.follow(0.0, reading)
     for time, wrong, words in [
-        (0.0, reading, "the reading is of 0 s; it must be later than the one before, of 0 s"),
+        (0.0, reading, "the reading is of 0 s; it must be later than the previous one, of 0 s"),
         (np.nan, reading, "`time` is NaN; it must be finite"),
         ("1 N", reading, "`time`: "),
         (1.0, reading[:7], r"readings of the shape \(7,\) have 7 channels"),
@@ -197,7 +197,7 @@ def test_what_cannot_be_followed_is_refused_in_words(beam, presses, locator, pla
         pp.simulate_moving(beam, motion, rate=100)
     with pytest.raises(pp.FileError, match="has no `rate`"):
         pp.simulate_moving(beam, motion, density=7850)
-    with pytest.raises(pp.PalpateError, match='`force` says it, as in "3 N"'):
+    with pytest.raises(pp.PalpateError, match='set `force`, as in "3 N"'):
         pp.simulate_moving(beam, motion, rate=100, density=7850)
     with pytest.raises(pp.FileError, match="`to` is 450 mm; it must be on the surface"):
         pp.simulate_moving(beam, pp.Motion(0.05, "450 mm", 0.5), rate=100, density=7850, force=3)

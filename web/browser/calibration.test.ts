@@ -90,7 +90,7 @@ describe.skipIf(!hasChromium())("calibration", () => {
     await page.context().close();
   });
 
-  test("goes from nothing to a live dot by clicks", async () => {
+  test("goes from an empty page to a live dot by clicks", async () => {
     const bench = await Bench.start("noisy-beam.toml", SIX_TWICE);
     const server = await started(bench);
     const { page, faults } = await open(browser, server.url);
@@ -122,7 +122,7 @@ describe.skipIf(!hasChromium())("calibration", () => {
     await picture(page, "calibration-presses");
     expect(readFileSync(bench.path("presses.csv"), "utf8")).toMatch(/^# .*; placement 1.5 mm\n/);
     await page.locator("#calibration-finish").click();
-    expect(await says(page, "calibration-step", /^Fitted to 12 presses: error at positions held out [\d.]+ mm/)).toContain("median");
+    expect(await says(page, "calibration-step", /^Fitted to 12 presses: error at held-out positions [\d.]+ mm/)).toContain("median");
     expect(existsSync(bench.path("locator.json"))).toBe(true);
     await dotUnder(page, bench, 123);
     await picture(page, "calibration-done");

@@ -130,7 +130,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       await picture(page, "light");
     });
 
-    test("says large that the board is simulated, until a person has seen it", async () => {
+    test("shows large that the board is simulated, until a person confirms it", async () => {
       expect(await page.locator("#simulated h2").textContent()).toBe("This board is simulated");
       expect(await page.locator("#simulated h2").evaluate((title) => Number.parseFloat(getComputedStyle(title).fontSize))).toBeGreaterThan(24);
       await page.locator("#simulated-close").click();
@@ -248,7 +248,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       }
     });
 
-    test("says that nothing touches, and shows no dot then", async () => {
+    test("shows no contact and no dot without a contact", async () => {
       await page.waitForFunction(() => {
         const status = document.getElementById("status")?.textContent;
         return status === "No contact" && document.getElementById("position")?.textContent === "—";
@@ -283,7 +283,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       expect(await page.locator("#events").textContent()).toContain("Tared");
     });
 
-    test("keys do nothing while somebody types, nor where they are switched off", async () => {
+    test("keys are ignored during typing and where they are switched off", async () => {
       await page.keyboard.press("m");
       await page.keyboard.type("mrt ?");
       expect(await page.locator("#mark-text").inputValue()).toBe("mrt ?");
@@ -332,7 +332,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       await page.unrouteAll();
     });
 
-    test("says that the connection is lost, and is live again after the server has been started anew", async () => {
+    test("shows that the connection is lost, and is live again after a restart of the server", async () => {
       const port = server.port;
       await server.stop();
       await says(page, "connection", /^Connection lost$/);
@@ -344,7 +344,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       await says(page, "status", /^Located$/);
     });
 
-    test("had no error, and fetched nothing from elsewhere", async () => {
+    test("had no error, and fetched only from its server", async () => {
       expect(faults).toEqual([]);
       await page.context().close();
     });

@@ -32,12 +32,12 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
   afterEach(endAll);
   afterAll(() => browser?.close());
 
-  test("goes from nothing to a live dot by clicks, and stops at once in the middle", async () => {
+  test("goes from an empty page to a live dot by clicks, and stops at once in the middle", async () => {
     const bench = await MachineBench.start("fsi-like.toml", [["repeats = 3", "repeats = 1"]]);
     const server = await started(bench);
     const { page, faults } = await open(browser, server.url);
     await says(page, "calibration-step", /^Ready to calibrate$/);
-    expect(await says(page, "machine-moves", /presses 18 times, down to z 21 and 20 mm/)).toContain("It looks for its end stops first");
+    expect(await says(page, "machine-moves", /presses 18 times, down to z 21 and 20 mm/)).toContain("It searches for its end stops first");
     expect(await page.locator("#machine-stop").isVisible()).toBe(false);
     await picture(page, "machine-ready");
     await page.locator("#calibration-dry-run").click();
@@ -71,7 +71,7 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await says(page, "calibration-step", /^All presses are taken$/);
     expect(presses(bench)).toBe(18);
     await page.locator("#calibration-finish").click();
-    await says(page, "calibration-step", /^Fitted to 18 presses: error at positions held out [\d.]+ mm/);
+    await says(page, "calibration-step", /^Fitted to 18 presses: error at held-out positions [\d.]+ mm/);
     expect(existsSync(bench.path("locator.json"))).toBe(true);
     await page.locator("#calibration-check").click();
     await says(page, "calibration-checked-words", /\(median\).* of 5 within their 95 % intervals/);
@@ -109,7 +109,7 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     expect(presses(bench)).toBe(pressed);
     expect(pressed).toBeLessThan(36);
     const { page, faults } = await open(browser, server.url, phone);
-    await says(page, "calibration-problem", /nobody has watched the machine for 5 s: its finger was lifted/);
+    await says(page, "calibration-problem", /no page has been open for 5 s: the machine lifted its finger/);
     await page.keyboard.press("b");
     await says(page, "calibration-step", /^All presses are taken$/, 90_000);
     expect(presses(bench)).toBe(36);
@@ -118,14 +118,14 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     expect(faults).toEqual([]);
   });
 
-  test("says in plain words that there is no machine", async () => {
+  test("explains that the machine is missing", async () => {
     const bench = await MachineBench.start("fsi-like.toml", []);
     bench.stage = "gcode:tcp://127.0.0.1:1";
     const server = await started(bench);
     const { page } = await open(browser, server.url);
     await says(page, "calibration-step", /^Ready to calibrate$/);
     await page.locator("#calibration-begin").click();
-    expect(await says(page, "calibration-problem", /the line to the machine is broken/)).toContain("see that it is on");
+    expect(await says(page, "calibration-problem", /the line to the machine is broken/)).toContain("check that it is on");
     await says(page, "calibration-step", /^Ready to calibrate$/);
   });
 });

@@ -127,7 +127,7 @@ export class Page {
     }
     announce(told);
     if (told.some((event) => ["source_opened", "source_lost", "source_ended", "tared"].includes(event.event))) void this.ask();
-    if (told.some((event) => event.event === "tared")) this.notice("Tared: the baseline was taken anew.");
+    if (told.some((event) => event.event === "tared")) this.notice("Tared: the baseline was measured again.");
   }
 
   /** Asks what session it is; new views for another one. */
@@ -174,10 +174,10 @@ export class Page {
     need("simulate").hidden = need("welcome-simulated").hidden = !session.has_simulated;
     const tare = need<HTMLButtonElement>("tare");
     tare.disabled = !session.tare.available;
-    tare.title = session.tare.available ? "Take the baseline anew; nothing may touch" : (session.tare.why ?? "This locator cannot be tared");
+    tare.title = session.tare.available ? "Measure the baseline again; the surface must be untouched" : (session.tare.why ?? "This locator cannot be tared");
     const record = need<HTMLButtonElement>("record");
     record.disabled = session.recording === null;
-    record.title = session.recording === null ? "palpate serve … --record DIR says where recordings go" : `Recordings go to ${session.recording.folder}`;
+    record.title = session.recording === null ? "Set the folder of recordings with palpate serve … --record DIR" : `Recordings go to ${session.recording.folder}`;
     const name = session.recording?.name ?? null;
     record.setAttribute("aria-pressed", String(name !== null));
     const words = name === null ? "Record" : "Stop recording";
@@ -217,7 +217,7 @@ export class Page {
     if (!expected || this.silent_s() < SILENT_S) return "";
     if (this.live.state?.source == null) {
       const waits = (this.live.state?.counters.readings ?? 0) === 0;
-      return waits ? "The source is not there yet; it is opened as soon as it is." : "The source is away and looked for again: what is shown is not live.";
+      return waits ? "The source is not there yet; it is opened as soon as it is." : "The source is disconnected, and palpate tries to reconnect: the values shown are not live.";
     }
     // A word for the cause that is most frequent, which does not change with every frame.
     const bad = Object.entries(this.live.state?.counters.bad_frames ?? {}).sort(([, one], [, other]) => other - one);
@@ -402,7 +402,7 @@ export class Page {
       setText(need("surface-legend"), "■ sensors · ○ places to press · ● places that were pressed · the arrow or the cross shows the next one");
       return;
     }
-    const parts = ["■ sensors", plane ? "● contact, with the ellipse that holds 95 %" : "● contact, with its 95 % interval", "◌ other places that the reading fits"];
+    const parts = ["■ sensors", plane ? "● contact, with its 95 % ellipse" : "● contact, with its 95 % interval", "◌ other places that the reading fits"];
     const times = views.line.exaggeration;
     if (!plane && times !== null) parts.push(`deflection as measured, ${formatTimes(times)} × exaggerated, a spline between the sensors`);
     setText(need("surface-legend"), parts.join(" · "));

@@ -24,7 +24,7 @@ export function statusWords(estimate: EstimateRecord): { word: string; why: stri
       return { word: "Located", why: "One contact explains the reading." };
     }
     case "no_contact":
-      return { word: "No contact", why: "Nothing touches: the reading is noise." };
+      return { word: "No contact", why: "The reading does not exceed its noise." };
     case "ambiguous": {
       const others = estimate.modes?.length ?? 0;
       const places = others === 1 ? "another place explains" : `${others} other places explain`;
@@ -33,7 +33,7 @@ export function statusWords(estimate: EstimateRecord): { word: string; why: stri
     case "outside_model":
       return {
         word: "Outside model",
-        why: "No single contact explains the reading within the noise: a second contact, a patch, a damaged or exchanged channel, or drift. If nothing touches, tare.",
+        why: "No single contact explains the reading within the noise: a second contact, a patch, a damaged or exchanged channel, or drift. If the surface is untouched, tare.",
       };
     case "outside_surface":
       return { word: "Outside surface", why: "The position is beyond the surface's edge, which no contact can have." };
@@ -48,7 +48,7 @@ const BAD_FRAMES: Record<string, string> = {
   too_long: "longer than any frame",
   channels: "another number of values than channels",
   missing_channel: "a channel is missing",
-  not_a_number: "a value is no number",
+  not_a_number: "a value is not a number",
   encoding: "not text",
   checksum: "the checksum is wrong",
   malformed: "not a frame",
@@ -96,7 +96,7 @@ export function eventWords(event: EventRecord): string {
     case "channel":
       return `Channel ${event.name}: ${channelWords(event.state)}`;
     case "tared":
-      return "Tared: the baseline was taken anew";
+      return "Tared: the baseline was measured again";
     case "trouble":
       return `Trouble: ${event.text}`;
     case "alarm":

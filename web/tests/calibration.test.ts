@@ -81,21 +81,21 @@ describe("words of a calibration", () => {
       found_touch_mm: null,
       moves,
     };
-    expect(stepWords({ ...PRESSING, machine })).toBe("The machine looks for its end stops");
+    expect(stepWords({ ...PRESSING, machine })).toBe("The machine searches for its end stops");
     const down: MachineRecord = { ...machine, motion: "down", x_mm: 40, depth_mm: 2 };
     expect(stepWords({ ...PRESSING, machine: down })).toBe("Pressing at 40.0 mm, 2 mm deep");
     expect(stepWords({ ...PRESSING, machine: { ...machine, motion: null } })).toBe("Greeting the machine…");
     expect(stepWords({ ...PRESSING, phase: "checking", machine: down })).toBe("Pressing at 40.0 mm, 2 mm deep");
-    expect(stepWords({ ...PRESSING, phase: "setting_up", machine })).toBe("The machine looks for its end stops");
+    expect(stepWords({ ...PRESSING, phase: "setting_up", machine })).toBe("The machine searches for its end stops");
     expect(stepWords({ ...PRESSING, phase: "setting_up", machine: { ...machine, motion: "up" } })).toBe("Jog the machine, or find the touch");
     expect(atWords([60.1, -2, 27])).toBe("x 60.1, y −2, z 27 mm");
     expect(foundWords(21.97)).toContain('touch = "21.97 mm"');
   });
 
-  test("end with the error at positions held out", () => {
+  test("end with the error at held-out positions", () => {
     const outcome = { locator: "a.json", presses: 12, folds: 5, median_mm: 0.0412, mean_mm: 0.06, gain_percent: 4, stop_percent: 5, remarks: [] };
     const words = stepWords({ ...PRESSING, phase: "done", outcome });
-    expect(words).toBe("Fitted to 12 presses: error at positions held out 0.041 mm (median), 0.060 mm (mean)");
+    expect(words).toBe("Fitted to 12 presses: error at held-out positions 0.041 mm (median), 0.060 mm (mean)");
     expect(stepWords({ ...PRESSING, phase: "done", outcome: { ...outcome, median_mm: null } })).toBe("Fitted to 12 presses.");
   });
 });

@@ -85,7 +85,7 @@ describe("form of a rig", () => {
     expect(words({ valid: true })).toBeNull();
     expect(words({ valueMissing: true }, { disabled: true })).toBeNull();
     expect(words({ valueMissing: true })).toBe("This is needed.");
-    expect(words({ badInput: true })).toBe("This is no number.");
+    expect(words({ badInput: true })).toBe("This is not a number.");
     expect(words({ rangeUnderflow: true })).toBe("This must be greater than 0.");
     expect(words({ rangeUnderflow: true }, { min: "2" })).toBe("This must be at least 2.");
     expect(words({ rangeOverflow: true })).toBe("This must be at most 100.");

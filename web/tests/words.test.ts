@@ -95,7 +95,7 @@ describe("words", () => {
     words.forEach((said) => expect(said).not.toMatch(/undefined|_/));
     expect(words[3]).toBe("Gap of 2.0 s, 7 frames lost");
     expect(words[4]).toBe("Clock set back by 3.0 s");
-    expect(badFrameWords("not_a_number")).toBe("a value is no number");
+    expect(badFrameWords("not_a_number")).toBe("a value is not a number");
     expect(badFrameWords("something_new")).toBe("something new");
   });
 });

@@ -202,5 +202,5 @@ fn only_wheel(folder: &Path) -> Result<PathBuf> {
     let mut wheels = files.filter_map(|file| file.ok().map(|file| file.path()));
     wheels
         .find(|path| path.extension().is_some_and(|extension| extension == "whl"))
-        .context("there is no wheel")
+        .context("the wheel is missing")
 }

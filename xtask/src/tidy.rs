@@ -44,7 +44,7 @@ const RULES: [(&str, Rule); 9] = [
     ("no machine's paths or hosts", places::findings),
     ("nothing unfinished", unfinished::findings),
     ("text files only", binary::findings),
-    ("the changelog knows the version", changelog::findings),
+    ("the changelog has the version", changelog::findings),
     ("samples are the examples", samples::findings),
 ];
 

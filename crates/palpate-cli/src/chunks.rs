@@ -76,7 +76,7 @@ impl Chunks {
             let begins: &[u8] = if bytes.is_empty() { &chunk } else { &bytes };
             let is_utf16 = begins.starts_with(b"\xff\xfe") || begins.starts_with(b"\xfe\xff");
             if let Some(at) = chunk.iter().position(|byte| *byte == 0).filter(|_| !is_utf16) {
-                let complaint = format!("{} is no text: byte {} is 0", self.name, bytes.len() + at + 1);
+                let complaint = format!("{} is not text: byte {} is 0", self.name, bytes.len() + at + 1);
                 return Err(Complaint::new(complaint).help("save it as UTF-8").into());
             }
             bytes.extend(chunk);

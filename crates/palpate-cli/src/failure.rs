@@ -30,7 +30,7 @@ pub enum Failure {
 impl Failure {
     /// A signal before any output.
     pub fn stopped() -> Self {
-        Self::Interrupted("stopped; nothing was written".to_owned())
+        Self::Interrupted("stopped; no output was written".to_owned())
     }
 
     /// Failure of long work that ended early: it was stopped, or its input is bad.

@@ -17,8 +17,7 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
     let bytes = read_bytes(path)?;
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
-        Complaint::new(format!("{} is not UTF-8 text: byte {} is no character", path.display(), at + 1))
-            .into()
+        Complaint::new(format!("{} is not UTF-8 text: byte {} is invalid", path.display(), at + 1)).into()
     })
 }
 

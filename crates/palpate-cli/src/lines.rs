@@ -144,7 +144,7 @@ impl Lines {
     pub fn finish(&self, answer: &str) -> Result<(), Failure> {
         match self.lost {
             0 if self.parsed == 0 => {
-                Err(Failure::DataLost(format!("{} holds a header and no reading", self.name())))
+                Err(Failure::DataLost(format!("{} contains a header and no reading", self.name())))
             }
             0 => Ok(()),
             lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no {answer}", self.count))),

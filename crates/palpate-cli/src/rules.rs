@@ -24,18 +24,18 @@ pub fn refuse_untold_forces(rules: &Rules, path: &Path, locator: &Locator) -> Re
     }
     let Some(rule) = rules.first_of_force() else { return Ok(()) };
     let problem = format!(
-        "rule `{}` asks for a `force`, and the locator, of kind `{}`, tells none: it would never act",
+        "rule `{}` requires a `force`, but a locator of kind `{}` estimates none: the rule would never act",
         rule.name,
         locator.kind()
     );
     let complaint = Complaint::about(path, problem);
-    Err(complaint.help("leave `force` out, or fit an estimator that tells it, such as `influence`").into())
+    Err(complaint.help("remove `force`, or fit an estimator of the force, such as `influence`").into())
 }
 
 /// Refuses rules that publish, where there is no broker.
 pub fn refuse_publishing(publishing: &Rules, path: &Path, help: &str) -> Result<(), Failure> {
     let Some(rule) = publishing.as_slice().first() else { return Ok(()) };
     let complaint =
-        Complaint::about(path, format!("rule `{}` publishes a message, and there is no broker", rule.name));
+        Complaint::about(path, format!("rule `{}` publishes a message, but no broker is given", rule.name));
     Err(complaint.help(help).into())
 }

@@ -47,7 +47,7 @@ impl SessionOptions {
     pub fn session<'a>(&self, locator: &'a Locator, path: &Path) -> Result<Session<'a>, Failure> {
         Session::new(locator, &self.config()).map_err(|error| {
             Complaint::about(path, error)
-                .help("leave --track, --frequency or --creep out, or fit another estimator")
+                .help("omit --track, --frequency or --creep, or fit another estimator")
                 .into()
         })
     }

@@ -53,7 +53,7 @@ impl TareOption {
     pub fn check_recorded(&self, files: &RecordingFiles) -> Result<(), Failure> {
         if self.tare.is_some() && files.data.is_none() {
             let complaint = Complaint::new("--tare needs a recording: simulated calibrations start at zero");
-            return Err(complaint.help("--data names a recording to judge by").into());
+            return Err(complaint.help("--data names a recording to evaluate on").into());
         }
         Ok(())
     }
@@ -62,7 +62,7 @@ impl TareOption {
     pub fn check_drifts(&self, files: &RecordingFiles, setup: &Setup) -> Result<(), Failure> {
         if self.tare.is_some() && files.data.is_none() && setup.imperfections().is_none() {
             let complaint = Complaint::new("--tare: simulated readings do not drift");
-            return Err(complaint.help("--data names a recording to judge by").into());
+            return Err(complaint.help("--data names a recording to evaluate on").into());
         }
         Ok(())
     }
@@ -248,12 +248,12 @@ impl<'a> Taring<'a> {
             Source::First(_) => {}
             Source::Auto { .. } | Source::Last { .. } if locator.false_alarm_rate().is_none() => {
                 let complaint = format!(
-                    "--tare {}: a locator of kind `{}` does not tell untouched readings from contacts",
+                    "--tare {}: a locator of kind `{}` cannot distinguish untouched readings from contacts",
                     source.followed().unwrap_or_default(),
                     locator.kind()
                 );
                 return Err(Complaint::new(complaint)
-                    .help("--tare N takes the first N readings for untouched, --tare FILE those of a file")
+                    .help("--tare N uses the first N readings as untouched, --tare FILE those of a file")
                     .into());
             }
             Source::Auto { .. } => {}
@@ -268,12 +268,11 @@ impl<'a> Taring<'a> {
             self.add(&reading).map_err(|error| Complaint::about(path, error))?;
         }
         if !readings.lines.is_whole() {
-            let complaint =
-                Complaint::about(path, "not every line is a reading, and so the tare would be another one");
-            return Err(complaint.help("mend the lines above, or take them out").into());
+            let complaint = Complaint::about(path, "not every line is a reading, so the tare would be wrong");
+            return Err(complaint.help("correct the lines above, or remove them").into());
         }
         if self.count == 0 {
-            let complaint = Complaint::about(path, "it holds no untouched reading");
+            let complaint = Complaint::about(path, "it contains no untouched reading");
             return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
         }
         self.look_again();
@@ -353,7 +352,7 @@ impl<'a> Taring<'a> {
         }
         if touched as f64 > MOST_TOUCHED * kept.len() as f64 {
             remark!(
-                "palpate: warning: {touched} of {} readings of the tare are not within the noise of their mean: was the surface touched, or did it drift?",
+                "palpate: warning: {touched} of {} readings of the tare are not within the noise of their mean: the surface was touched, or it drifts",
                 kept.len()
             );
         }
@@ -385,14 +384,13 @@ impl<'a> Taring<'a> {
         if self.count < settled {
             let found = if self.count == 0 { "no".to_owned() } else { format!("only {}", self.count) };
             remark!(
-                "palpate: warning: --tare {followed} found {found} untouched reading{} in {source}, and so the baseline may be that of a touch; \
-                 leave the surface alone for a moment, or tare by --tare N or --tare FILE",
+                "palpate: warning: --tare {followed} found {found} untouched reading{} in {source}, so the baseline may be that of a contact; leave the surface untouched for a moment, or use --tare N or --tare FILE",
                 if self.count > 1 { "s" } else { "" }
             );
         } else if !self.tare.is_confirmed() && self.unexplained >= settled {
             remark!(
-                "palpate: warning: --tare {followed}: {} readings of {source} are no contact by the baseline, and none has come and gone by it: \
-                 was the surface touched when the readings began? --tare N or --tare FILE takes readings that are known to be untouched",
+                "palpate: warning: --tare {followed}: {} readings of {source} differ from the baseline without matching a contact, and no contact has started \
+                 and ended: the surface may have been touched at the start. --tare N or --tare FILE uses readings that are known to be untouched",
                 format_count(self.unexplained)
             );
         }
@@ -406,7 +404,7 @@ impl<'a> Taring<'a> {
         if self.is_beginning {
             let needed = self.source.first();
             let complaint = format!(
-                "--tare {needed}: {source} holds {} readings; the first {needed} are to be the untouched ones",
+                "--tare {needed}: {source} contains {} readings; the first {needed} must be untouched",
                 self.count
             );
             return Err(Complaint::new(complaint).help("give fewer, or record longer").into());
@@ -429,9 +427,9 @@ pub fn tare_splits(
     match option.tare {
         Some(Source::Auto { first: Start::NONE }) => {}
         Some(_) => {
-            let complaint = "--tare takes `auto` alone here; N, a time, a FILE and `last` are for a locator: a rig is judged by folds of one recording";
+            let complaint = "--tare accepts only `auto` here; N, a time, a FILE and `last` need a locator: a rig is evaluated by folds of one recording";
             return Err(Complaint::new(complaint)
-                .help("--tare auto takes off the drift that the presses tell")
+                .help("--tare auto subtracts the drift that the presses show")
                 .into());
         }
         None if recording.rows.len() > MOST_LOOKED_AT => return Ok(()),
@@ -443,7 +441,7 @@ pub fn tare_splits(
                 .map_err(|error| Failure::from_error(&error))?;
             if let Some(course) = course {
                 remark!(
-                    "warning: {}: {}, and so do the readings that are held out; `--tare auto` takes it off",
+                    "warning: {}: {}, and so do the held-out readings; `--tare auto` subtracts it",
                     recording.provenance.source,
                     moved_most(setup, &course.spans())
                 );
@@ -456,14 +454,14 @@ pub fn tare_splits(
         .map_err(|error| Failure::from_error(&error))?;
     match spans {
         Some(spans) => say_drift(setup, &spans),
-        None => remark!("palpate: the presses tell no drift; readings are judged as they are"),
+        None => remark!("palpate: the presses show no drift; readings are evaluated unchanged"),
     }
     Ok(())
 }
 
 /// Reports how far the channels drift, if held-out readings are corrected for it.
 pub fn say_drift(setup: &Setup, spans: &[f64]) {
-    remark!("palpate: {}; it is taken off held-out readings", moved_most(setup, spans));
+    remark!("palpate: {}; it is subtracted from held-out readings", moved_most(setup, spans));
 }
 
 /// Largest number of rows for which a warning is computed.
@@ -474,7 +472,7 @@ fn moved_most(setup: &Setup, spans: &[f64]) -> String {
     let Some((channel, value)) = most else { return "no channel drifts".to_owned() };
     let sensor = &setup.layout().sensors()[channel];
     let moved = Quantity { value: *value, dimension: sensor.kind.dimension() };
-    format!("the channels drift in the course of the recording, {} by {moved}", sensor.name)
+    format!("the channels drift during the recording, {} by {moved}", sensor.name)
 }
 
 /// A recording with readings tared as in `palpate locate`; the readings of the baseline are omitted.

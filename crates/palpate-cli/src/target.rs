@@ -89,7 +89,7 @@ impl Target {
         let place = target.place()?;
         if let Some(name) = result_beside(&place) {
             let complaint = format!(
-                "cannot write {}: it is a result of the study whose {name} is beside it",
+                "cannot write {}: it is a result of the study with {name} in the same folder",
                 path.display()
             );
             return Err(Complaint::new(complaint).help("name another file").into());
@@ -113,8 +113,8 @@ impl Target {
     fn place(&self) -> Result<PathBuf, Failure> {
         let refused = |why: &str| Complaint::new(format!("cannot write {}: {why}", self.path.display()));
         if self.path == Path::new("-") {
-            let complaint = refused("stdout is for what the command says");
-            return Err(complaint.help("name a file; one that is called so is `./-`").into());
+            let complaint = refused("stdout is reserved for the output of the command");
+            return Err(complaint.help("name a file; a file named `-` is `./-`").into());
         }
         if self.path.file_name().is_none() && !self.path.is_dir() {
             return Err(refused("it names no file").into());
@@ -136,7 +136,7 @@ impl Target {
         let folder = folder_of(&place);
         match folder.is_dir() {
             true => Ok(place),
-            false => Err(refused(&format!("there is no folder {}", folder.display())).into()),
+            false => Err(refused(&format!("folder {} does not exist", folder.display())).into()),
         }
     }
 }
@@ -161,15 +161,15 @@ fn reason_against(there: &Metadata) -> Option<&'static str> {
 fn what_it_is(there: &Metadata) -> &'static str {
     use std::os::unix::fs::FileTypeExt;
     match there.file_type() {
-        kind if kind.is_fifo() => "it is a pipe (FIFO), and no file",
-        kind if kind.is_socket() => "it is a socket, and no file",
-        _ => "it is a device, and no file",
+        kind if kind.is_fifo() => "it is a pipe (FIFO), not a file",
+        kind if kind.is_socket() => "it is a socket, not a file",
+        _ => "it is a device, not a file",
     }
 }
 
 #[cfg(not(unix))]
 fn what_it_is(_: &Metadata) -> &'static str {
-    "it is no regular file"
+    "it is not a regular file"
 }
 
 /// A folder that takes a report, with all files that belong to it.
@@ -189,7 +189,7 @@ impl TargetFolder {
                 let found = path.join(name);
                 let complaint =
                     format!("cannot write a report into {}: a study's {name} is there", path.display());
-                let help = format!("name another folder, or take {} away", found.display());
+                let help = format!("name another folder, or remove {}", found.display());
                 Err(Complaint::new(complaint).help(help).into())
             }
         }
@@ -203,7 +203,7 @@ impl TargetFolder {
             path.ancestors().find(|above| above.exists()).filter(|above| !above.as_os_str().is_empty());
         let nearest = nearest.unwrap_or(Path::new("."));
         if !nearest.is_dir() {
-            return Err(refused(&Error::other(format!("{} is no folder", nearest.display()))));
+            return Err(refused(&Error::other(format!("{} is not a folder", nearest.display()))));
         }
         check_takes_files(nearest).map_err(|error| refused(&error))?;
         if path.is_dir() {

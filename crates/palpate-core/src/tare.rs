@@ -824,7 +824,7 @@ mod tests {
             }
             let rest: [Status; 150] = core::array::from_fn(|_| next(&mut tare, 0.0, 0.0, left));
             let late = rest[100..].iter().filter(|status| **status != Status::NoContact).count();
-            assert!(late == 0, "press {press}: {late} of 50 readings are no rest");
+            assert!(late == 0, "press {press}: {late} of 50 readings are not at rest");
             for _ in 0..press * 23 {
                 next(&mut tare, 0.0, 0.0, left);
             }

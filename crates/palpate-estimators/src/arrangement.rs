@@ -71,7 +71,9 @@ pub enum ArrangementError {
         middle: usize,
     },
     /// The middle portion is empty or reaches a support.
-    #[error("the middle portion goes from {start} to {end} of the length; 0 < start < end < 1 must hold")]
+    #[error(
+        "the middle portion goes from {start} to {end} of the length; it must satisfy 0 < start < end < 1"
+    )]
     Portion {
         /// Start, as a share of the length.
         start: f64,
@@ -79,7 +81,7 @@ pub enum ArrangementError {
         end: f64,
     },
     /// The portion of even positions is empty or reaches beyond the surface.
-    #[error("the portion goes from {start} to {end} of the length; 0 ≤ start < end ≤ 1 must hold")]
+    #[error("the portion goes from {start} to {end} of the length; it must satisfy 0 ≤ start < end ≤ 1")]
     EvenPortion {
         /// Start, as a share of the length.
         start: f64,
@@ -99,7 +101,7 @@ pub enum ArrangementError {
     OffSurface(#[from] OffSurface),
     /// A rule along a line, on a surface that has a width as well.
     #[error(
-        "{count} training positions on a line do not say where they are on a plane; a plane needs a grid"
+        "{count} training positions along a line do not define positions on a plane; a plane needs a grid"
     )]
     LineOnPlane {
         /// Number of positions.

@@ -36,7 +36,7 @@ pub type TakeBlock<'a> = dyn Fn(usize, &[Estimate]) + Sync + 'a;
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum BatchError {
     /// Values that do not make whole readings.
-    #[error("{values} values are no whole number of readings; the locator has {channels} channels")]
+    #[error("expected a multiple of {channels} values, found {values}")]
     Uneven {
         /// Number of values.
         values: usize,

@@ -84,7 +84,7 @@ pub enum SetupError {
     },
     /// A sensor that is insensitive to contacts anywhere on the surface.
     #[error(
-        "{kind} sensor {number} is at {} and would read nothing: {reason}",
+        "{kind} sensor {number} is at {} and would always read 0: {reason}",
         extent.place_in_words(*position)
     )]
     Insensitive {
@@ -112,7 +112,7 @@ pub enum SetupError {
     #[error("a grid of sensors needs a plane; this surface is a line")]
     GridOnLine,
     /// Evenly spaced sensors on a plane, where a number alone does not define their positions.
-    #[error("{count} sensors along a length do not say where on a plane they are; place them by a grid")]
+    #[error("{count} sensors along a length do not define positions on a plane; place them by a grid")]
     EvenlyOnPlane {
         /// Number of sensors.
         count: usize,

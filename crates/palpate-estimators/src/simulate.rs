@@ -31,7 +31,7 @@ pub enum SimulateError {
     #[error("a measured surface has no model to simulate; it needs a recording")]
     NoModel,
     /// The contact force is not given.
-    #[error("a simulation needs the contact force; there is no [contact] force")]
+    #[error("a simulation needs the contact force; `force` in [contact] is missing")]
     NoForce,
     /// The training positions cannot be laid out.
     #[error(transparent)]

@@ -81,7 +81,7 @@ mod tests {
         assert!(link.is_symlink());
         assert_eq!(std::fs::read(&file).unwrap(), b"two");
         assert_eq!(std::fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing temporary is left");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "temporary files are removed");
     }
 
     #[test]

@@ -34,7 +34,7 @@ struct Case {
 fn main() -> Result<(), Box<dyn Error>> {
     let seconds: f64 = std::env::args().nth(1).map_or(Ok(10.0), |text| text.parse())?;
     println!(
-        "readings/s  browsers  asleep  samples  lost  recorded  lost  median ms  p99 ms  worst ms  CPU %  memory MB: before, after  messages at 60 Hz"
+        "readings/s  browsers  asleep  samples  lost  recorded  lost  median ms  p99 ms  worst ms  CPU %  memory MB: start, end  messages at 60 Hz"
     );
     for case in [
         Case { rate_hz: 1_000.0, browsers: 1, asleep: 0, records: false },

@@ -42,7 +42,7 @@ pub fn explain(broker: &str, error: &ConnectionError) -> String {
         }
         ConnectionError::ConnectionRefused(code) => format!("the broker {broker} refuses: {code:?}"),
         ConnectionError::Io(error) => {
-            format!("the broker {broker} cannot be reached: {error}; see that it runs there")
+            format!("the broker {broker} cannot be reached: {error}; check that it runs there")
         }
         ConnectionError::NetworkTimeout | ConnectionError::FlushTimeout => {
             format!("the broker {broker} does not answer")

@@ -116,8 +116,9 @@ impl FeedWatch {
         let bad = frames.bad_in_a_row();
         if let Some((cause, frame)) = frames.last_bad_frame().filter(|_| bad > 0) {
             let (cause, remedy) = (cause.describe(), cause.remedy(frames.labels()));
-            let are = if bad == 1 { "frame is" } else { "frames in a row are" };
-            return format!("{bad} {are} no reading: {cause}; the last is `{frame}`; {remedy}");
+            let are_not =
+                if bad == 1 { "frame is not a reading" } else { "frames in a row are not readings" };
+            return format!("{bad} {are_not}: {cause}; the last is `{frame}`; {remedy}");
         }
         if self.bytes > 0 {
             let (bytes, last) = (self.bytes, quote(frames.unfinished()));
@@ -126,6 +127,7 @@ impl FeedWatch {
         if self.state == FeedState::Ended {
             return "the source ended; check what sends to it".to_owned();
         }
-        "the source is open and sends nothing; check that the board is on and sends to this port".to_owned()
+        "the source is connected but sends no data; check that the board is on and sends to this port"
+            .to_owned()
     }
 }

@@ -273,7 +273,7 @@ impl Monitor {
         self.source.as_ref()?;
         if self.bytes == 0 {
             return Some(
-                "the board sends nothing: see that it runs, and that the port is its own".to_owned(),
+                "the board sends no data: check that it runs, and that the port is its own".to_owned(),
             );
         }
         if self.detected.is_some() && self.unexplained < UNEXPLAINED {
@@ -287,7 +287,7 @@ impl Monitor {
         Some(match (self.lines.is_empty(), is_text) {
             (true, _) if self.bytes < MOST_PARTIAL as u64 => format!("no line has ended yet: `{last}`"),
             (false, true) => format!(
-                "lines arrive, and no values are found in them; the last is `{last}`; send one line a reading, such as `12,34,56`"
+                "lines arrive without values; the last is `{last}`; send one line per reading, such as `12,34,56`"
             ),
             _ => format!("the bytes are not text: `{last}`; try another baud rate"),
         })
@@ -521,8 +521,8 @@ mod tests {
     #[test]
     fn says_why_there_are_no_readings() {
         let problem = |monitor: &Monitor| monitor.record(Duration::ZERO).problem.unwrap_or_default();
-        assert!(problem(&of_lines(&[])).contains("sends nothing"));
-        assert!(problem(&of_lines(&["hello\n", "world\n"])).contains("no values are found"));
+        assert!(problem(&of_lines(&[])).contains("sends no data"));
+        assert!(problem(&of_lines(&["hello\n", "world\n"])).contains("without values"));
         let mut monitor = of_lines(&[]);
         monitor.receive(&arrived(1, Arrival::Bytes(vec![0xf8; 5000])));
         assert!(problem(&monitor).contains("baud"), "{}", problem(&monitor));

@@ -175,7 +175,7 @@ impl Rules {
         let file: FileIn = toml::from_str(text)
             .map_err(|error| RuleError { problem: error.message().to_owned(), span: error.span() })?;
         if file.rule.is_empty() {
-            return Err(RuleError { problem: "there is no [[rule]]".to_owned(), span: None });
+            return Err(RuleError { problem: "[[rule]] is missing".to_owned(), span: None });
         }
         if let Some(beyond) = file.rule.get(MOST) {
             return Err(error_at(beyond.span(), format!("there are more than {MOST} rules")));
@@ -227,7 +227,7 @@ impl Rules {
         }
         match self.first_of_force() {
             Some(rule) if !locator.tells_force() => {
-                Err(format!("rule `{}` asks for a `force`, which this locator does not estimate", rule.name))
+                Err(format!("rule `{}` requires a `force`, which this locator does not estimate", rule.name))
             }
             _ => Ok(()),
         }
@@ -335,7 +335,7 @@ fn action(
         (Some(topic), Some(message), None) => {
             let text = topic.get_ref();
             if text.is_empty() || text.len() > 1000 || text.contains(['+', '#', '\0']) {
-                let problem = "`topic` must have 1 to 1000 bytes, and none of + and #".to_owned();
+                let problem = "`topic` must have 1 to 1000 bytes, without + and #".to_owned();
                 return Err(error_at(topic.span(), problem));
             }
             Ok(Action::Publish { topic: topic.into_inner(), message: message.into_inner() })
@@ -440,7 +440,7 @@ fn check_on_surface(
         (Some(width_m), _) => beside("y", &given.y, y_m, width_m),
         (None, Some(y)) => Err(error_at(
             y.span(),
-            "`y` does not go with a surface that is a line: contacts differ by `x` alone; leave it out"
+            "`y` does not go with a surface that is a line: contacts differ only by `x`; remove `y`"
                 .to_owned(),
         )),
         (None, None) => Ok(()),

@@ -21,7 +21,7 @@ pub struct HostClock {
 
 impl HostClock {
     /// Clocks that start now.
-    #[expect(clippy::new_without_default, reason = "a clock's start is no default value")]
+    #[expect(clippy::new_without_default, reason = "a clock's start is not a default value")]
     pub fn new() -> Self {
         Self::with_speed(1)
     }

@@ -208,7 +208,7 @@ fn a_file_that_is_taken_away_ends_the_recording_in_words() {
     let Ok(Input::Command(Command::Trouble(text))) = reports.recv_timeout(Duration::from_secs(20)) else {
         panic!("nothing is told");
     };
-    assert!(text.contains("a.mcap") && text.contains("taken away"), "{text}");
+    assert!(text.contains("a.mcap") && text.contains("its file was removed"), "{text}");
     session(&rig, &locator, 100, &mut switch);
     let status = switch.end().unwrap();
     assert_eq!((status.readings, status.lost), (100, 100), "{status:?}");

@@ -381,7 +381,7 @@ fn a_feed_without_readings_is_reported_once_and_with_its_cause() {
     assert_eq!(bench.report_after(0, Arrival::Opened("board".to_owned())), None);
     assert_eq!(bench.report_at(2900), None);
     let report = bench.report_at(3000).unwrap();
-    assert!(report.contains("sends nothing"), "{report}");
+    assert!(report.contains("sends no data"), "{report}");
     assert_eq!(bench.report_at(9000), None, "it is reported once");
     // A starting board prints some lines first.
     assert_eq!(bench.report_after(10_000, Arrival::Joined("board".to_owned())), None);
@@ -391,7 +391,7 @@ fn a_feed_without_readings_is_reported_once_and_with_its_cause() {
     // A channel vanishes.
     assert_eq!(bench.report_after(11_000, bytes(&"0,0,0,0,0,0,0\n".repeat(50))), None);
     let report = bench.report_after(11_900, bytes("0,0,0,0,0,0,0\n")).unwrap();
-    assert!(report.contains("51 frames in a row are no reading: another number of values"), "{report}");
+    assert!(report.contains("51 frames in a row are not readings: another number of values"), "{report}");
     assert!(report.contains("`0,0,0,0,0,0,0`"), "{report}");
     assert_eq!(bench.report_after(12_900, bytes("0,0,0,0,0,0,0\n")), None, "it is reported once");
     assert!(

@@ -458,8 +458,8 @@ impl ChannelModel {
 pub enum NoiseError {
     /// An active sensor has neither noise nor resolution: the noise is singular.
     #[error(
-        "sensor {number} ({kind}) has noise {noise_sd} and resolution {resolution}; one of them must be greater than 0, or \
-         nothing limits what it tells"
+        "sensor {number} ({kind}) has noise {noise_sd} and resolution {resolution}; one of them must be greater than 0, \
+         otherwise its precision is unlimited"
     )]
     Singular {
         /// Number of the sensor, from 1.

@@ -99,7 +99,7 @@ pub enum UnitError {
         wanted: Dimension,
     },
     /// A unit after an expected plain number.
-    #[error("`{text}` has a unit where a plain number is wanted")]
+    #[error("`{text}` has a unit, but a plain number is expected")]
     UnwantedUnit {
         /// The text.
         text: String,

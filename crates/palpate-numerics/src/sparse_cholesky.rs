@@ -93,7 +93,7 @@ pub enum SparseCholeskyError {
         size: usize,
     },
     /// The factor does not fit into memory.
-    #[error("there is no memory for the factor of a sparse matrix of {size} rows")]
+    #[error("the factor of a sparse matrix of {size} rows does not fit into memory")]
     OutOfMemory {
         /// Rows of the matrix.
         size: usize,
@@ -184,7 +184,7 @@ impl SparseCholesky {
     /// When the length of b is not a multiple of the matrix size.
     pub fn solve_in_place(&self, b: &mut [f64]) {
         let done = self.solve_in_place_watched(b, Watch::NONE);
-        debug_assert_eq!(done, Ok(()), "nobody watches");
+        debug_assert_eq!(done, Ok(()), "the watch does not stop it");
     }
 
     /// Solves as [`SparseCholesky::solve_in_place`], watched; b is not a solution after a stop.

@@ -79,7 +79,7 @@ impl DeadAreasReport<'_> {
         let chart = Chart::new("Effective length by the number of sensors", x, y, lines).with_height(560);
         let caption = html! {
             "Share of the contacts, every 1/400 of the length, that are located within " (mm(self.study.tolerance_m))
-            " mm. Solid: sensors under one surface; dashed: sensors of an array, each of which sees only what is near."
+            " mm. Solid: sensors under one surface; dashed: an array of sensors, each sensitive only to nearby contacts."
         };
         Figure::chart(&chart, caption)
     }

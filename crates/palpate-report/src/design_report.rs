@@ -61,7 +61,7 @@ pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
         section.text(report.counts_in_words()).figure(figure)
     }));
     sections.push(Section::new("given", "What was given").text(report.given()));
-    sections.push(Section::new("meaning", "How layouts are found and judged").text(meaning()));
+    sections.push(Section::new("meaning", "How layouts are searched and scored").text(meaning()));
     Page::new(report.title, report.summary(), sections).with_source(html! { ", seed " (report.seed) }).files()
 }
 
@@ -107,7 +107,7 @@ impl<'a> SensorDesignReport<'a> {
                 (self.problem.places_in_words(&best.layout)) "."
             }
             li {
-                "Its mean limit is " b { (number(limit(best))) " mm" }
+                "The mean limit is " b { (number(limit(best))) " mm" }
                 @if let Some(even) = even { (compared(limit(even), limit(best))) }
                 "; force " (self.problem.force().name()) "."
             }
@@ -127,7 +127,7 @@ impl<'a> SensorDesignReport<'a> {
         let caption = html! {
             "The layouts. Score: " (score_in_words(design.criterion)) ", the smaller the better. One dead: the worst score when \
              any one sensor dies. Expected: the mean error of an estimator at the limit; simulated: that of a locator, \
-             calibrated with noise and asked. A dash: the readings do not tell some contact, or the layout was not simulated."
+             calibrated and evaluated with noise. A dash: some contact is unidentifiable, or the layout was not simulated."
             @if broken { " *: breaks a constraint." }
         };
         let mut table = Table::from_rows(self.designed)
@@ -274,8 +274,8 @@ impl<'a> SensorDesignReport<'a> {
         let ends = (first.count as f64 - 0.5, last.count as f64 + 0.5);
         let x = Axis::linear("sensors").from_to(ends.0, ends.1).ticks_at(ticks);
         let caption = html! {
-            "The mean limit of the even layout and of the layout by greedy choice and exchange. Where a curve is missing, the readings \
-             of so few sensors do not tell some contact."
+            "The mean limit of the even layout and of the layout by greedy choice and exchange. Where a curve is missing, some \
+             contact is unidentifiable with so few sensors."
         };
         Some(Figure::chart(
             &Chart::new("How the limit falls with the number of sensors", x, y, series),
@@ -331,7 +331,8 @@ impl<'a> SensorDesignReport<'a> {
                     ", " (stated(self.problem.force_n())) " N, force " (self.problem.force().name())
                     @let left_out = self.problem.contacts_over_supports().len();
                     @if left_out > 0 {
-                        ", of which those over supports (" (left_out) "), where no layout tells a force that is not known, are left out of scores and limits"
+                        "; those over supports (" (left_out) ") are excluded from scores and limits, because an unknown force \
+                         is unidentifiable there"
                     }
                     @if !design.contacts.weights.is_empty() { ", some stretches touched more often than others" }
                     "."
@@ -355,10 +356,10 @@ impl<'a> SensorDesignReport<'a> {
 fn score_in_words(criterion: DesignCriterion) -> &'static str {
     match criterion {
         DesignCriterion::MeanLimit => {
-            "the mean limit in mm, each contact's combined with what the surface's size tells"
+            "the mean limit in mm, each contact's combined with the size of the surface"
         }
-        DesignCriterion::WorstLimit => "the largest limit in mm, combined with what the surface's size tells",
-        DesignCriterion::WithinTolerance => "the share of contacts whose limit exceeds the tolerance, in %",
+        DesignCriterion::WorstLimit => "the largest limit in mm, combined with the size of the surface",
+        DesignCriterion::WithinTolerance => "the share of contacts with a limit above the tolerance, in %",
         DesignCriterion::DOptimality => "the mean of ½·ln det of a contact's least covariance",
     }
 }
@@ -366,17 +367,18 @@ fn score_in_words(criterion: DesignCriterion) -> &'static str {
 fn meaning() -> Markup {
     html! {
         p {
-            "A layout is judged by the limit, the least standard deviation with which any estimator that is right on average \
-             can locate a contact, over the contacts that are expected. Where the readings do not tell a contact, the limit is \
-             boundless; the score combines it with what is known without any reading: that the contact is on the surface."
+            "A layout is scored by the limit over the expected contacts: the smallest standard deviation with which an \
+             unbiased estimator can locate a contact. Where a contact is unidentifiable, the limit is infinite; the score \
+             combines it with the prior knowledge that the contact is on the surface."
         }
         p {
-            b { "greedy-exchange" } " adds the sensor that helps most until all are placed, then exchanges one after the other for \
-             a better one until none is found, from several starts. " b { "exhaustive" } " tries every layout, where they are few. "
+            b { "greedy-exchange" } " adds the sensor that improves the score most until all are placed, then exchanges one \
+             sensor at a time until no exchange improves the score, from several starts. "
+            b { "exhaustive" } " tries every layout, where they are few. "
             b { "genetic" } " breeds layouts. " b { "refined" } " moves the best of these off the candidate sites. "
             b { "d-optimal" } " has the most information about position and force together, " b { "principal-components" }
-            " reconstructs the readings at all sites best, " b { "qr-pivoting" } " takes the sites by which the strongest \
-             components of the readings are told apart; these three do not look at the location error."
+            " reconstructs the readings at all sites best, " b { "qr-pivoting" } " takes the sites that best separate the \
+             strongest components of the readings; these three ignore the location error."
         }
     }
 }

@@ -68,8 +68,8 @@ pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
         vec![Series::line("position unknown, estimated along", 1, points)],
     );
     let caption = html! {
-        "The limit of the force, " (stated(unknown.force_n)) " N, at each contact position. A contact that fewer than two gauges \
-         see has none: one gauge tells force times lever, and no more."
+        "The limit of the force, " (stated(unknown.force_n)) " N, at each contact position. A contact has none with fewer than \
+         two sensitive gauges: one gauge determines only force times lever arm."
     };
     Figure::chart(&chart, caption)
 }

@@ -53,7 +53,7 @@ impl ElliottReport<'_> {
                 li { "The chain is best with " b { (count) " components" } ": mean error " b { (number(error_m * 1e3)) " mm" } "." }
             }
             @if let Some(error) = pressed(Chain::Readings) {
-                li { "The same network on all readings: " (number(error.median * 1e3)) " mm." }
+                li { "This network on all readings: " (number(error.median * 1e3)) " mm." }
             }
             @if let (Some(error), Some(limit_m)) = (pressed(Chain::Influence), self.row(Chain::Influence).and_then(|row| row.limit_m)) {
                 li {
@@ -79,7 +79,7 @@ impl ElliottReport<'_> {
         series.extend(self.across(|row| row.error_m));
         let caption = html! {
             "Mean error of one press at each of some 400 places, within the inner " (INNER * 100.0) " % of the plate: medians over \
-             the calibrations, bars from the 5th to the 95th percentile. The limit is the Cramér–Rao bound of what the components hold."
+             the calibrations, bars from the 5th to the 95th percentile. The limit is the Cramér–Rao bound of the components."
         };
         Figure::chart(&self.by_count("Error by the number of components", series), caption)
     }
@@ -97,7 +97,8 @@ impl ElliottReport<'_> {
         let x = Axis::linear("component").from_to(0.0, points.len() as f64 + 1.0);
         let y = Axis::log10("share of the readings’ variance, %");
         let series = vec![Series::markers("component", 0, points, Marker::Circle)];
-        let caption = html! { "Of the first calibration. Where the shares level off, components are noise and nothing else." };
+        let caption =
+            html! { "Of the first calibration. Where the shares level off, components are only noise." };
         Figure::chart(&Chart::new("What each component carries", x, y, series), caption)
     }
 
@@ -135,7 +136,7 @@ impl ElliottReport<'_> {
     fn table(&self) -> Table {
         let caption = html! {
             "Mean errors within the inner plate and under the moving load, over " (self.study.calibrations) " calibrations: median and \
-             5th to 95th percentile. Limit: of what the chain sees, a reading at a time."
+             5th to 95th percentile. Limit: of the inputs of the chain, for one reading."
         };
         let shown = |figure: Option<Quantiles>| {
             figure.map_or_else(|| NOTHING.to_owned(), |figure| spread(figure, number))
@@ -155,8 +156,9 @@ impl ElliottReport<'_> {
     fn how(&self) -> Markup {
         html! {
             p {
-                "After Elliott and others, who told the place of a load that moves over a plate from principal components of a grid \
-                 of sensors by a back-propagation network. Here the readings of " (self.study.rig.setup.layout().len()) " sensors, less \
+                "After Elliott and others, who located a load that moves over a plate from principal components of a grid of \
+                 sensors by a back-propagation network. Here the readings of "
+                (self.study.rig.setup.layout().len()) " sensors, less \
                  their mean and over their noise, are turned onto the eigenvectors of their covariance over the presses of a \
                  calibration (Karhunen–Loève), and the first components, each scaled to variance 1, are what a network with one hidden \
                  layer sees. Networks stop after " (whole(f64::from(self.study.presentations))) " presentations. The effective area \

@@ -125,8 +125,7 @@ impl EvaluationReport<'_> {
                 counted(folds, "fold", "folds")
             ),
             Judged::Locator(locator) if *self.recording == locator.provenance.recording => {
-                "The locator was fitted to this very recording, so the errors tell how well it remembers, not how well it \
-                 would locate elsewhere."
+                "The locator was fitted to this recording, so these are training errors; errors at other positions are larger."
                     .to_owned()
             }
             Judged::Locator(_) => "The locator was fitted to another recording.".to_owned(),
@@ -283,7 +282,7 @@ impl EvaluationReport<'_> {
         Table::from_rows(facts)
             .short("fact", |(name, _)| *name)
             .column("text", "value", |(_, value)| value.clone())
-            .caption(html! { "What was judged, and where it comes from." })
+            .caption(html! { "Subject of the evaluation, and its origin." })
     }
 
     fn surface_in_words(&self) -> String {

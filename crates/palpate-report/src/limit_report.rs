@@ -91,7 +91,7 @@ pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
         Section::new("lightest-touch", "The lightest touch")
             .text(report.lightest_touch_in_words())
             .figure(report.touch_figure()),
-        Section::new("warnings", "What this bench cannot tell").text(report.warnings_in_words()),
+        Section::new("warnings", "Limitations of this bench").text(report.warnings_in_words()),
         Section::new("meaning", "What the limit means").text(meaning()),
     ];
     Page::new(report.title, report.summary(), sections).files()
@@ -123,11 +123,11 @@ impl LimitReport<'_> {
                     " % of the length; mean " (number(summary.mean_m * 1e3)) " mm, smallest " (at(summary.best))
                     ", largest " (at(summary.worst)) "."
                     @if let Some(words) = self.curve().not_told_in_words() {
-                        " Left out, because the readings do not tell the position there: " (words) "."
+                        " Excluded, because the position is unidentifiable there: " (words) "."
                     }
                 }
             } @else {
-                li { "With this knowledge of the force the readings do not tell the position anywhere." }
+                li { "With this knowledge of the force the position is unidentifiable everywhere." }
             }
             @if let Some(surely) = self.surely() {
                 li {
@@ -216,7 +216,7 @@ impl LimitReport<'_> {
              along and across. No unbiased estimator has a smaller one."
             @if !map.dots_mm.is_empty() { " Dots: the sensors." }
             @if cut_off { " Limits above the length of the surface have its colour: contacts there cannot be located." }
-            @if nowhere { " Grey: the readings do not tell the position." }
+            @if nowhere { " Grey: the position is unidentifiable." }
         };
         Figure::map(&map, caption)
     }
@@ -234,8 +234,8 @@ impl LimitReport<'_> {
             (position, [Force::Known, Force::Unknown].map(|force| self.limit.bound_at(contact, force)))
         });
         let caption = html! {
-            "The limit at some positions: least standard deviations, and the mean error that goes with the first. A dash: \
-             the readings do not tell."
+            "The limit at some positions: least standard deviations, and the mean error that goes with the first. A dash: the \
+             position is unidentifiable."
         };
         Table::from_rows(bounds)
             .short("position, mm", |(position, _)| place(*position, self.known.extent))
@@ -261,10 +261,10 @@ impl LimitReport<'_> {
                 "Below some force a reading is " code { "no_contact" } ": it can come from noise alone, or from the scatter of the untouched \
                  rows of a locator. The bound is such that an untouched surface gives a contact in " (self.touch.rate().to_string())
                 " of its readings (" code { "false_alarm_rate" } " in the rig). The smallest detectable force (lightest touch) is detected in "
-                (half) " % and in " (surely) " % of its readings, by a locator that does not know the force."
+                (half) " % and in " (surely) " % of its readings, by a locator without a known force."
             }
             @if let Some(TouchSummary { without: without @ 1.., .. }) = self.surely() {
-                p { "At " (counted(without, "position", "positions")) " no force is found." }
+                p { "At " (counted(without, "position", "positions")) " no force is detected." }
             }
         }
     }
@@ -374,9 +374,9 @@ fn meaning() -> Markup {
              reaches it; none that is right on average beats it."
         }
         p {
-            "With a known force, a change of any reading tells. With an unknown force, what a harder touch would do to the \
-             readings cannot be told from what a move does, and only the rest counts: next to a support, where all \
-             deflections vanish together, little is left."
+            "With a known force, a change of any reading is informative. With an unknown force, a larger force changes the \
+             readings partly as a displacement does, and only the remainder is informative: next to a support, where all \
+             deflections vanish together, it is small."
         }
         p {
             "The limit looks at small errors. That two contacts far apart may read alike it does not see; the warnings do. \

@@ -38,7 +38,7 @@ pub fn position_design_report(report: &PositionDesignReport) -> Vec<ReportFile> 
         }
         Extent::Plane { .. } => (positions, errors.figures(report.maps())),
     };
-    let meaning = Section::new("meaning", "How positions are found and judged").text(report.meaning());
+    let meaning = Section::new("meaning", "How positions are searched and scored").text(report.meaning());
     let sections = vec![positions.table(report.places()), errors, meaning];
     Page::new(report.title, report.summary(), sections)
         .with_source(html! { ", seed " (report.problem.design().seed) })

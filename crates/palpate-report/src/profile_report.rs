@@ -77,7 +77,7 @@ impl<'a> ProfileReport<'a> {
             @if let Some(centre) = &profile.centre {
                 li {
                     "Total force " b { (number(profile.total_n)) " N" } ", 95 % interval " (interval_n(total_95_n)) " N"
-                    " whatever the shape of the load; " (interval_n(seen_95_n)) " N where nothing lies within " (mm(margin_m))
+                    " for any shape of the load; " (interval_n(seen_95_n)) " N if no load lies within " (mm(margin_m))
                     " mm of an edge."
                 }
                 li {
@@ -130,11 +130,11 @@ impl<'a> ProfileReport<'a> {
         let chart =
             Chart::new("The load along the surface", x, y, series).with_marks(centre.into_iter().collect());
         let caption = html! {
-            "The load that the reading tells, with its 95 % interval cell by cell. Beside an edge, where force and place trade off, it is the lightest; the \
-             patches of Table 1 are not."
+            "The estimated load, with its 95 % interval cell by cell. Beside an edge, where force and position trade off, it \
+             is the smallest load; the patches of Table 1 are not."
             @if !self.truth.is_empty() { " Dashes: the load that was simulated." }
-            " Neighbouring cells share their uncertainty: where one is too high, the next is too low, and their sum is told better than \
-             either."
+            " Neighbouring cells share their uncertainty: where one is too high, the next is too low, and their sum is more \
+             certain than either."
         };
         Figure::chart(&chart, caption)
     }
@@ -197,16 +197,16 @@ impl<'a> ProfileReport<'a> {
         let cells = 0..profile.cells.len();
         let kpa =
             |name, pa: Vec<f64>| HeatPanel::new(name, pa.into_iter().map(|pa| pa * PER_THOUSAND).collect());
-        let mut panels = vec![kpa("told", cells.clone().map(|cell| profile.density(cell).0).collect())];
+        let mut panels = vec![kpa("estimated", cells.clone().map(|cell| profile.density(cell).0).collect())];
         if !self.truth.is_empty() {
             panels.push(kpa("simulated", profile.cells.mean_density(self.truth)));
         }
         panels.push(kpa("standard deviation", cells.map(|cell| profile.density_sd(cell)).collect()));
         let caption = html! {
-            "The pressure that the reading tells, cell by cell"
+            "The estimated pressure, cell by cell"
             @if !self.truth.is_empty() { ", the pressure that was simulated," }
-            " and the standard deviation of what is told. Neighbouring cells share their uncertainty: where one is too high, the next is too \
-             low, and their sum is told better than either. Dots: the sensors."
+            " and the standard deviation of the estimate. Neighbouring cells share their uncertainty: where one is too high, \
+             the next is too low, and their sum is more certain than either. Dots: the sensors."
         };
         Figure::map(&self.map("The pressure on the surface", "kPa", panels), caption)
     }
@@ -348,10 +348,10 @@ fn tenths_mm(length_m: f64) -> String {
 fn status_in_words(profile: &LoadProfile) -> Markup {
     let (misfit, worst) = (number(profile.misfit), stated(profile.worst_misfit.round()));
     match profile.status {
-        Status::NoContact => html! { "No contact: the reading is no more than its noise." },
+        Status::NoContact => html! { "No contact: the reading does not exceed its noise." },
         Status::OutsideModel => html! {
             b { "Outside the model" } ": no load explains the reading within its noise. The least sum of squared residuals is "
-            (misfit) " standard deviations squared; noise alone seldom makes more than " (worst) "."
+            (misfit) " standard deviations squared; noise alone rarely exceeds " (worst) "."
         },
         Status::Ambiguous => html! {
             b { "Ambiguous" } ": the number of patches is not resolved. More patches than these explain the reading better, with a probability of error \
@@ -367,15 +367,15 @@ fn status_in_words(profile: &LoadProfile) -> Markup {
 fn meaning() -> Markup {
     html! {
         p {
-            "A few readings do not tell a whole function. Shown is the mixture of all non-negative loads that explain the reading, \
-             from very smooth to rough, each smoothness weighed by how probable it makes the reading. Total force, centre of \
-             pressure, and the centres and forces of patches are told far better than the shape of the load."
+            "A few readings do not determine a whole function. The profile is the mixture of all non-negative loads that \
+             explain the reading, from very smooth to rough, with each smoothness weighted by its marginal likelihood. Total \
+             force, centre of pressure, and the centres and forces of patches are far more certain than the shape of the load."
         }
         p {
-            "The averaging kernels say over how much of the surface the profile is a mean. They are those of the linear inverse; \
-             that a load cannot pull resolves more than they show. What lies next to a support hardly moves any sensor, and the \
-             profile puts no load there unless the reading asks for it: a patch and a total that even loads exclude are theirs, and not the sum of the \
-             profile that is drawn."
+            "The averaging kernels show over how much of the surface the profile is a mean. They belong to the linear inverse; \
+             the constraint that a load cannot pull resolves more than they show. A load next to a support hardly moves any \
+             sensor, and the profile puts no load there unless the reading requires it: patches and total force account for \
+             such loads, the sum of the drawn profile does not."
         }
     }
 }

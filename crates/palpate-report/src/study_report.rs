@@ -447,7 +447,7 @@ fn arm_columns(report: &StudyReport) -> Vec<ArmColumn> {
     }));
     columns.extend([
         spread("error over the limit's", &|arm| arm.limit.as_ref()?.error_over_limit),
-        spread("95 % intervals that hold, %", &|arm| arm.coverage_percent),
+        spread("coverage of 95 % intervals, %", &|arm| arm.coverage_percent),
     ]);
     columns
 }
@@ -512,7 +512,10 @@ pub(crate) fn glossary(report: &StudyReport) -> Markup {
     html! {
         dl {
             dt { "Training positions" }
-            dd { "The contact positions whose readings a " (report.noun()[0]) " is " (if report.noun()[0] == "network" { "trained on" } else { "fitted to" }) "." }
+            dd {
+                "The contact positions of the readings that a "
+                (report.noun()[0]) " is " (if report.noun()[0] == "network" { "trained on" } else { "fitted to" }) "."
+            }
             dt { "Percentage error" }
             dd { "The distance between the true and the estimated position, in % of the surface's length." }
             dt { "Effective length" }
@@ -524,22 +527,25 @@ pub(crate) fn glossary(report: &StudyReport) -> Markup {
             @if report.results.arms.iter().any(|arm| arm.limit.is_some()) {
                 dt { "Limit" }
                 dd {
-                    "The mean error of the best unbiased estimator for the noise of these readings (Cramér–Rao bound). Where readings \
-                     hardly tell the position, it is still known that the contact lies on the surface; the limit's average reckons \
-                     with that. Error over the limit's: at contacts whose limit is at most 1/200 of the length, not at the very ends."
+                    "The mean error of the best unbiased estimator for the noise of these readings (Cramér–Rao bound). Where \
+                     readings hardly determine the position, the contact is still known to lie on the surface; the limit's \
+                     average includes this. Error over the limit's: at contacts with a limit of at most 1/200 of the length, \
+                     not at the very ends."
                 }
             }
             @if report.results.arms.iter().any(|arm| arm.coverage_percent.is_some()) {
-                dt { "95 % intervals that hold" }
-                dd { "The share of estimates whose 95 % interval holds the true position: 95 % if the estimator knows how sure it can be." }
+                dt { "Coverage of 95 % intervals" }
+                dd {
+                    "The share of 95 % intervals that contain the true position: 95 % if the estimator's uncertainty is correct."
+                }
             }
             dt { "Seed" }
             dd {
                 @if report.results.arms.iter().any(|arm| arm.limit.is_some()) {
                     "The number from which the noise of an arm's recording follows, and a network's random start; "
                 } @else {
-                    "The number from which a network's random start follows. Networks that differ in nothing else come out \
-                     differently, so "
+                    "The number from which a network's random start follows. Networks that differ only in it give different \
+                     results, so "
                 }
                 "each figure here is the median over the seeds of its arm, with the range in which all but the \
                  lowest and the highest twentieth of them lie (5–95 %)."

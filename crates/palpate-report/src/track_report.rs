@@ -153,7 +153,7 @@ impl TrackReport<'_> {
             (
                 "How far the track is off",
                 "position less the true one, mm",
-                "The track's error over time and its 95 % interval, while something touched: the interval should hold 0.",
+                "The track's error over time and its 95 % interval, during contact: the interval should contain 0.",
             )
         };
         let chart = Chart::new(title, Axis::linear("time, s"), Axis::linear(y), series).with_height(480);
@@ -208,16 +208,16 @@ impl TrackReport<'_> {
         ];
         let (x, y) = (Axis::log10("speed over the critical speed"), Axis::log10("average error, mm"));
         let caption = html! {
-            "The same motion at other speeds, simulated with the beam's inertia and damping. The influence functions are those of a \
-             beam in balance: the faster the contact, the less that holds."
+            "This motion at other speeds, simulated with the beam's inertia and damping. The influence functions are those of \
+             a beam in balance: the faster the contact, the less accurate they are."
         };
         Figure::chart(&Chart::new("Errors against the contact's speed", x, y, series), caption)
     }
 
     fn errors_table(&self) -> Table {
         let caption = html! {
-            "Errors while something touched; covered: how often the 95 % interval held the contact; number right: how often as \
-             many contacts were found as touched."
+            "Errors during contact; covered: the share of 95 % intervals that contain the contact; number right: the share of \
+             readings with the right number of contacts."
         };
         Table::from_rows(self.errors)
             .short("track", |(name, _)| *name)

@@ -119,7 +119,7 @@ impl At<DesignKeys> {
     pub fn build(&self, setup: &Setup) -> Result<SensorDesign, RigError> {
         let extent = setup.surface().extent();
         let Ok(default) = SensorDesign::for_setup(setup) else {
-            let with = "a surface without a model, which cannot tell what a sensor elsewhere would read";
+            let with = "a surface without a model, which cannot predict the reading of a sensor elsewhere";
             return Err(self.place.unused(with));
         };
         let offers = match &self.kinds {
@@ -182,7 +182,9 @@ impl At<OfferKeys> {
         if channel.noise_sd == 0.0 && channel.resolution == 0.0 {
             return Err(match &self.noise {
                 None => self.place.missing("noise"),
-                Some(noise) => noise.place.refuse("greater than 0, or nothing limits what the sensor tells"),
+                Some(noise) => {
+                    noise.place.refuse("greater than 0, otherwise the precision of the sensor is unlimited")
+                }
             });
         }
         Ok(SensorOffer { kind, channel, cost: self.cost.map_or(1.0, |cost| cost.si), supply: Supply::Any })

@@ -31,7 +31,7 @@ pub enum RigProblem {
     #[error("{}", .0.message())]
     Toml(toml::de::Error),
     /// A section is missing.
-    #[error("there is no section {section}")]
+    #[error("section {section} is missing")]
     MissingSection {
         /// Name in brackets.
         section: &'static str,
@@ -122,7 +122,7 @@ pub enum RigProblem {
     Arrangement(ArrangementError),
     /// An insensitive sensor: its reading does not depend on the contact.
     #[error(
-        "{kind} sensor {number} is at {} and would read nothing: {reason}",
+        "{kind} sensor {number} is at {} and would always read 0: {reason}",
         extent.place_in_words(*position)
     )]
     InsensitiveSensor {
@@ -316,7 +316,7 @@ impl serde::de::Error for RigError {
 fn force_takers(extent: Extent, supports: &[Position]) -> String {
     let places: Vec<String> = supports.iter().map(|support| extent.place_in_words(*support)).collect();
     match places.as_slice() {
-        [] => "none of the supports does".to_owned(),
+        [] => "no support does".to_owned(),
         [only] => format!("the only one that does is at {only}"),
         [first @ .., last] => format!("those that do are at {} and {last}", first.join(", ")),
     }

@@ -215,7 +215,7 @@ fn input_scale(scale: &At<Written>, layout: &Layout) -> Result<InputScale, RigEr
     let kinds = layout.kinds();
     let Some(first) = kinds.first() else { return Ok(InputScale::FullScale) };
     if let Some(second) = kinds.iter().find(|kind| kind.dimension() != first.dimension()) {
-        let bound = format!("a word: no one reading scales both {first} and {second} sensors");
+        let bound = format!("a word: one reading cannot scale both {first} and {second} sensors");
         return Err(scale.place.refuse(bound));
     }
     scale.si::<AboveZero>(first.dimension()).map(InputScale::DivideBy)

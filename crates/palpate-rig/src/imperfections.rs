@@ -130,7 +130,7 @@ impl At<ImperfectionsKeys> {
         match &self.touch_width {
             None => Ok(0.0),
             Some(width) if width.si > 0.0 && matches!(surface, SurfaceSpec::Digit(_)) => {
-                Err(width.place.unused("a digit, whose readings under several forces do not add up"))
+                Err(width.place.unused("a digit: its readings under several forces do not add up"))
             }
             Some(width) => {
                 let shortest_m = surface.extent().sides_m().fold(f64::INFINITY, f64::min);

@@ -98,14 +98,14 @@ impl At<MotionKeys> {
     /// A second contact, without the keys that both share.
     fn further(&self, extent: Extent, known_force_n: Option<f64>) -> Result<MovingContact, RigError> {
         match place(&self.rate).or(place(&self.damping)) {
-            Some(key) => Err(key.unused("a second [[motion]]; the first says it for both")),
+            Some(key) => Err(key.unused("a second [[motion]]; the first sets it for both")),
             None => self.contact(extent, known_force_n),
         }
     }
 
     fn contact(&self, extent: Extent, known_force_n: Option<f64>) -> Result<MovingContact, RigError> {
         if let (Some(force), Some(_)) = (&self.force, known_force_n) {
-            return Err(force.place.unused("a [contact] whose force is known"));
+            return Err(force.place.unused("a [contact] of known force"));
         }
         let force_n = self.force.as_ref().map(|force| force.si);
         Ok(MovingContact { motion: self.motion(extent)?, force_n })
@@ -210,14 +210,14 @@ mod tests {
         let told = ["rate = \"1 kHz\"", "damping = 0.1", "force = \"-1 N\"", third]
             .map(|keys| complaint(&with_second(keys)));
         insta::assert_snapshot!(told.join("\n"), @r#"
-        `rate` does not go with a second [[motion]]; the first says it for both | "1 kHz"
-        `damping` does not go with a second [[motion]]; the first says it for both | 0.1
+        `rate` does not go with a second [[motion]]; the first sets it for both | "1 kHz"
+        `damping` does not go with a second [[motion]]; the first sets it for both | 0.1
         `force` is -1 N; it must be greater than 0 | "-1 N"
         `motion` is a list of 3; it must be one, or a list of two | [[motion]]
         "#);
         let known = RIG.replacen("passes = 4", "force = \"2 N\"", 1);
         let told = Rig::from_toml(&known).unwrap_err().to_string();
-        assert_eq!(told, "`force` does not go with a [contact] whose force is known");
+        assert_eq!(told, "`force` does not go with a [contact] of known force");
     }
 
     #[test]

@@ -203,7 +203,7 @@ pub enum RigSimulationError {
     #[error("a simulation needs training positions; the rig has no [training]")]
     NoTraining,
     /// The rig has no `[motion]`, which determines how a contact moves.
-    #[error("a moving contact needs to be told of; the rig has no [motion]")]
+    #[error("a moving contact needs the section [motion]; the rig has none")]
     NoMotion,
     /// The bench cannot be simulated.
     #[error(transparent)]

@@ -108,7 +108,7 @@ impl StageKeys {
             return Err(self.depths.place.refuse(format!("a list of at least 1 and at most {MOST_DEPTHS}")));
         }
         if let (Some(limit), None) = (&self.force_limit, &self.load_cell) {
-            return Err(limit.place.unused("a machine without a `load_cell`, whose force nobody knows"));
+            return Err(limit.place.unused("a machine without a `load_cell`, which measures the force"));
         }
         Ok(Stage {
             origin_m: (self.origin.0.si, self.origin.1.si),

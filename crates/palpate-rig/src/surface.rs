@@ -149,7 +149,7 @@ pub(crate) enum EdgesKeys {
 }
 
 #[derive(Clone, Debug, Deserialize)]
-#[serde(rename = "by shape", expecting = "a list of points on a plate; its edges are held by `edges`")]
+#[serde(rename = "by shape", expecting = "a list of points on a plate; `edges` supports its edges")]
 pub(crate) enum PointSupportsKeys {
     List(Vec<At<PointSupportKeys>>),
 }

@@ -40,10 +40,10 @@ impl ContactKeys {
             return Err(range.place.unused("`force`, by which the force is known"));
         }
         if let SurfaceSpec::Digit(_) = surface {
-            return Err(range.place.unused("a digit, whose model bounds the force"));
+            return Err(range.place.unused("a digit: its model bounds the force"));
         }
         if let Some(greatest) = &self.greatest_force {
-            return Err(greatest.place.unused("`force_range`, whose upper end it is"));
+            return Err(greatest.place.unused("`force_range`, which contains the greatest force"));
         }
         let ForceRangeKeys(least, greatest) = **range;
         let built = ForceRange::new(least.si, greatest.si);
@@ -61,7 +61,7 @@ impl ContactKeys {
             return Err(greatest.place.unused("`force`, by which the force is known"));
         }
         match surface {
-            SurfaceSpec::Digit(_) => Err(greatest.place.unused("a digit, whose model bounds the force")),
+            SurfaceSpec::Digit(_) => Err(greatest.place.unused("a digit: its model bounds the force")),
             surface if surface.model().is_none() => {
                 Err(greatest.place.unused("a `measured` surface; give `force_range`"))
             }
@@ -239,7 +239,7 @@ pub(crate) fn check_force(
 impl At<LoadKeys> {
     pub fn build(&self, surface: &SurfaceSpec) -> Result<UniformLoad, RigError> {
         if let SurfaceSpec::Digit(_) = surface {
-            return Err(self.place.unused("a digit, whose readings under several loads do not add up"));
+            return Err(self.place.unused("a digit: its readings under several loads do not add up"));
         }
         let extent = surface.extent();
         let (from, to) = (self.from.on_surface(extent)?, self.to.on_surface(extent)?);

@@ -156,7 +156,7 @@ impl<'de, const LEAST: i64, const MOST: i64> Deserialize<'de> for Count<LEAST, M
 
 /// Text for messages: a number of positions does not go with a plane, and the remedy.
 pub(crate) const ON_A_PLANE: &str =
-    "a plane; say `grid = [3, 3]`, columns and rows, or list pairs in `positions`";
+    "a plane; set `grid = [3, 3]`, columns and rows, or list pairs in `positions`";
 
 /// Columns and rows of a grid of at most `MOST` positions.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
@@ -167,7 +167,7 @@ impl<const MOST: i64> At<Grid<MOST>> {
     /// Columns and rows.
     pub fn sides(&self, extent: Extent) -> Result<(usize, usize), RigError> {
         if let Extent::Line { .. } = extent {
-            return Err(self.place.unused("a surface that is a line; say `count`"));
+            return Err(self.place.unused("a surface that is a line; set `count`"));
         }
         let (columns, rows) = (self.0.get(), self.1.get());
         if columns.saturating_mul(rows) as u64 > MOST.unsigned_abs() {

@@ -48,7 +48,7 @@ pub enum AssemblyError {
         place: String,
     },
     /// A shard with missing fits, because it was stopped before its end.
-    #[error("{place}: shard {shard} is not finished: {found} of its {wanted} fits are there")]
+    #[error("{place}: shard {shard} is not finished: it has {found} of its {wanted} fits")]
     Unfinished {
         /// Place of the shard.
         place: String,
@@ -76,9 +76,7 @@ pub enum AssemblyError {
         seed: u64,
     },
     /// Missing fits.
-    #[error(
-        "{found} of {wanted} fits are there; the first that is missing is of arm `{arm}` from seed {seed}"
-    )]
+    #[error("{found} of {wanted} fits exist; the first that is missing is of arm `{arm}` from seed {seed}")]
     MissingFits {
         /// Number of the present fits.
         found: usize,
@@ -90,7 +88,7 @@ pub enum AssemblyError {
         seed: u64,
     },
     /// No shard at all.
-    #[error("there are no shards: there must be at least 1")]
+    #[error("expected at least 1 shard, found 0")]
     Nothing,
 }
 

@@ -53,7 +53,7 @@ pub struct Shard {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ShardError {
     /// Not of the form K/N.
-    #[error("{found:?} is no shard: it must be K/N, the K-th of N shares, as in 3/16")]
+    #[error("{found:?} is not a shard: it must be K/N, the K-th of N shares, as in 3/16")]
     NotAShard {
         /// The text.
         found: String,

@@ -86,7 +86,7 @@ fn chosen(names: &[String]) -> Result<Vec<(&'static str, &'static str)>> {
     let find = |name: &String| {
         let known = BENCHES.map(|(name, _)| name).join(", ");
         let bench = BENCHES.into_iter().find(|(bench, _)| bench == name);
-        bench.with_context(|| format!("there is no bench `{name}`; there are {known}"))
+        bench.with_context(|| format!("bench `{name}` does not exist; the benches are {known}"))
     };
     names.iter().map(find).collect()
 }
@@ -197,7 +197,7 @@ const COLUMNS: [&str; 14] = [
     "world",
     "tared",
     "median, mean error (mm)",
-    "said at held-out places",
+    "stated at held-out places",
     "position in 95 %",
     "force in 95 %",
     "outside model",
@@ -271,7 +271,7 @@ mod tests {
         let refused = run(&options, |_, _, _| ()).unwrap_err().to_string();
         assert_eq!(
             refused,
-            "there is no bench `real-bridge`; there are real-strip, real-finger, real-skin, real-floor"
+            "bench `real-bridge` does not exist; the benches are real-strip, real-finger, real-skin, real-floor"
         );
     }
 }

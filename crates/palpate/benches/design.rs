@@ -54,7 +54,7 @@ fn by_limit(setup: &Setup, design: &SensorDesign) {
     let limit_mm = designed.assessment.mean_limit_m.unwrap_or(f64::NAN) * 1e3;
     println!("{SENSORS} of {SITES} sites by the limit, {} contacts:", problem.contacts().len());
     println!(
-        "  what every site tells {rows_s:.3} s, search {search_s:.3} s: {:.3} s in all (wanted: 1 s)",
+        "  rows of all sites {rows_s:.3} s, search {search_s:.3} s: {:.3} s in all (wanted: 1 s)",
         rows_s + search_s
     );
     println!("  mean limit {limit_mm:.4} mm");

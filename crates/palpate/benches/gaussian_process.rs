@@ -28,7 +28,7 @@ fn main() {
         let factor_s =
             seconds(|| drop(std::hint::black_box(regression.condition(samples, &found, Watch::NONE))));
         figure(&format!("gaussian_process: fit of {rows} presses"), fit_s, "s");
-        println!("{rows} presses: fitted in {fit_s:.2} s, of which {factor_s:.2} s with all rows");
+        println!("{rows} presses: fitted in {fit_s:.2} s, including {factor_s:.2} s with all rows");
 
         let mut scratch = process.scratch();
         let (mut mean, mut variance, mut gradient) = ([0.0], [0.0], [0.0; 8]);

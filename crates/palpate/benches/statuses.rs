@@ -122,7 +122,7 @@ fn main() {
             continue;
         }
         println!("\n{}\n", bench.name);
-        println!("Two contacts: any test tells at most {:.1} %\n", 100.0 * most_told(bench, 2000));
+        println!("Two contacts: any test detects at most {:.1} %\n", 100.0 * most_told(bench, 2000));
         print_table(&calibrated.iter().map(|benches| &benches[i]).collect::<Vec<_>>(), count);
     }
 }
@@ -198,7 +198,7 @@ fn cases(bench: &Bench, count: usize, seed: u64) -> Vec<Case> {
         }),
     ];
     let shares: &[(&str, f64)] = match bench.setup.force_n() {
-        Some(_) => &[("95 % cover", 1.0), ("… or doubted, at ½ force", 0.5), ("… at 2 × force", 2.0)],
+        Some(_) => &[("95 % cover", 1.0), ("… or flagged, at ½ force", 0.5), ("… at 2 × force", 2.0)],
         None => &[("95 % cover", 1.0), ("… at ½ force", 0.5), ("… at 2 × force", 2.0)],
     };
     for (name, share) in shares.iter().copied() {

@@ -41,7 +41,7 @@ fn price_of_shuffling(precision: Precision) {
             let task = TrainingTask { topology: &topology, patterns: &patterns, rule: &rule };
             let mut queue = SeedList::new(0..4 * precision.lanes() as u64);
             let start = ThreadTime::now();
-            train_many(set, precision, &task, &mut queue, Watch::NONE).expect("nobody stops it");
+            train_many(set, precision, &task, &mut queue, Watch::NONE).expect("the watch never stops it");
             start.elapsed().as_secs_f64()
         });
         shares.push(100.0 * (seconds[0] - seconds[1]) / seconds[0]);
@@ -62,13 +62,13 @@ fn compare(count: usize, precision: Precision) {
     for _ in 0..ROUNDS {
         let start = ThreadTime::now();
         for seed in 0..4 {
-            train_one(precision, &task, seed, Watch::NONE).expect("nobody stops it");
+            train_one(precision, &task, seed, Watch::NONE).expect("the watch never stops it");
         }
         rates[0].push(f64::from(4 * EPOCHS) * count as f64 / start.elapsed().as_secs_f64());
         for (set, rates) in sets.iter().zip(&mut rates[1..]) {
             let mut queue = SeedList::new(0..4 * precision.lanes() as u64);
             let start = ThreadTime::now();
-            train_many(*set, precision, &task, &mut queue, Watch::NONE).expect("nobody stops it");
+            train_many(*set, precision, &task, &mut queue, Watch::NONE).expect("the watch never stops it");
             let presentations = f64::from(EPOCHS) * (count * 4 * precision.lanes()) as f64;
             rates.push(presentations / start.elapsed().as_secs_f64());
         }

@@ -14,9 +14,10 @@ pub fn mid_span_m() -> Result<f64, Box<dyn std::error::Error>> {
     let bound = setup.cramer_rao_bound()?;
     for x_m in [mm(20.0), mm(100.0), mm(200.0)] {
         let contact = Contact { position: Position::along(x_m), force_n: newtons(3.0) };
-        let unknown = bound.bound_at(contact, Force::Unknown).ok_or("nothing tells the position there")?;
+        let unknown =
+            bound.bound_at(contact, Force::Unknown).ok_or("the position is unidentifiable there")?;
         println!("{:3.0} mm, unknown force: {:.3} mm", 1e3 * x_m, 1e3 * unknown.sd_position_m);
     }
     let contact = Contact { position: Position::along(mm(200.0)), force_n: newtons(3.0) };
-    Ok(bound.bound_at(contact, Force::Known).ok_or("nothing tells the position there")?.sd_position_m)
+    Ok(bound.bound_at(contact, Force::Known).ok_or("the position is unidentifiable there")?.sd_position_m)
 }

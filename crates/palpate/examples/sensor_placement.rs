@@ -19,6 +19,7 @@ pub fn gain() -> Result<f64, Box<dyn std::error::Error>> {
     for sensor in best.layout.sensors() {
         println!("{}: {:.0} mm", sensor.name, 1e3 * sensor.position.x_m);
     }
-    let limit = |designed: &Designed| designed.assessment.mean_limit_m.ok_or("some contact is not told");
+    let limit =
+        |designed: &Designed| designed.assessment.mean_limit_m.ok_or("some contact is unidentifiable");
     Ok(1.0 - limit(&best)? / limit(&even)?)
 }

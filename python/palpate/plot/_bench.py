@@ -182,7 +182,7 @@ def arrangements(setup: Setup, arrangements: Mapping[str, Any] | TrainingPlaceme
 
 
 def plane(canvas: Canvas, setup: Setup) -> None:
-    """A plane from above: its edges by what holds them, its supports and its sensors."""
+    """A plane from above: its edges by their supports, its point supports and its sensors."""
     length, width = setup.length, setup.width or 0.0
     canvas.to_scale(length, width)
     held = setup.edges or {}

@@ -83,7 +83,7 @@ class Canvas:
             self.ax.set_ylim(bottom=0)
 
     def logarithmic(self, axis: Any) -> None:
-        """A logarithmic axis whose ticks are plain numbers."""
+        """A logarithmic axis with plain numbers as ticks."""
         name = axis.axis_name
         (self.ax.set_xscale if name == "x" else self.ax.set_yscale)("log")
         low, high = sorted(self.ax.get_xlim() if name == "x" else self.ax.get_ylim())
@@ -180,7 +180,7 @@ class Canvas:
         return float(self.ax.figure.bbox.x1 - self.ax.get_window_extent().x0)
 
     def heat_map(self, x_m: Floats, y_m: Floats, values: Floats, length_m: float, width_m: float, label: str, most: float | None = None) -> None:
-        """Values over a plane as colours: cells where the places lie on a grid, else dots; with a bar that says what they mean."""
+        """Values over a plane as colours: cells where the places lie on a grid, else dots; with a colour bar."""
         self.to_scale(length_m, width_m)
         finite = values[np.isfinite(values)]
         top = float(finite.max()) if finite.size else 1.0
@@ -219,7 +219,7 @@ def _plain_ticks(low: float, high: float) -> LogLocator:
 
 
 def _new_axes(size: tuple[float, float]) -> Axes:
-    """Axes of a new figure; a style sheet may say its size."""
+    """Axes of a new figure; a style sheet may set its size."""
     import matplotlib.pyplot as plt
 
     own = tuple(mpl.rcParams["figure.figsize"])
@@ -229,7 +229,7 @@ def _new_axes(size: tuple[float, float]) -> Axes:
 
 
 def _grid(x: Floats, y: Floats, values: Floats) -> tuple[Floats, Floats, Floats] | None:
-    """Columns, rows and cells of values whose places lie on a grid, NaN where there is none; None where most cells would be empty."""
+    """Columns, rows and cells of values at places on a grid, NaN in empty cells; None if most cells would be empty."""
     columns, column = np.unique(np.round(x, 9), return_inverse=True)
     rows, row = np.unique(np.round(y, 9), return_inverse=True)
     if columns.size < 2 or rows.size < 2 or columns.size * rows.size >= 4 * x.size:

@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 def check_type(value: Any, *kinds: type) -> None:
-    """Refuses what is of none of some types."""
+    """Refuses a value of any other type than the given ones."""
     if not isinstance(value, kinds):
         names = " or ".join(kind.__name__ for kind in kinds)
         raise TypeError(f"{names} is needed, and this is of the type {type(value).__name__}")

@@ -46,7 +46,7 @@ def placement_curve(placement: SensorPlacement | SensorCounts, *, ax: Axes | Non
     check_type(placement, SensorPlacement, SensorCounts)
     counts = placement.counts if isinstance(placement, SensorPlacement) else placement
     if counts is None:
-        raise PalpateError("the design is of one number of sensors; `place_sensors` with `counts=(2, 12)` tells how the limit falls")
+        raise PalpateError("the design is of one number of sensors; `place_sensors` with `counts=(2, 12)` computes how the limit falls")
     canvas = Canvas(ax)
     curves = {"even": 1e3 * counts.even_mean_limit, "designed": 1e3 * counts.designed_mean_limit}
     canvas.ax.plot(counts.count, curves["even"], color=canvas.ink, linestyle="--", marker="s", markersize=canvas.marker_size, label="even")
@@ -86,7 +86,7 @@ def placement_limit(placement: SensorPlacement, *, method: str | None = None, ax
     check_type(placement, SensorPlacement)
     chosen = placement.best_method if method is None else method
     if chosen not in placement.methods:
-        raise PalpateError(f"there is no layout {chosen!r}; the layouts are {', '.join(placement.methods)}")
+        raise PalpateError(f"layout {chosen!r} does not exist; the layouts are {', '.join(placement.methods)}")
     setup = placement[chosen].setup
     if setup.width is not None:
         canvas = Canvas.of_plane(ax, setup.length, setup.width, bar=True)
@@ -134,7 +134,7 @@ def training_errors(placement: TrainingPlacement, *, setup: Setup | None = None,
     check_type(placement, TrainingPlacement)
     chosen = placement.best_method if method is None else method
     if chosen not in placement.methods:
-        raise PalpateError(f"there are no positions {chosen!r}; there are {', '.join(placement.methods)}")
+        raise PalpateError(f"positions {chosen!r} do not exist; the positions are {', '.join(placement.methods)}")
     x, y = placement.contacts["x"], placement.contacts.get("y")
     is_plane = placement.positions[0].ndim == 2
     if setup is not None:

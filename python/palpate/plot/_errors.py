@@ -333,7 +333,7 @@ def calibration(estimates: Estimates, truth: Recording, *, ax: Axes | None = Non
         raise PalpateError(f"the truth has {len(truth)} rows and there are {len(estimates)} estimates; they must be of the same readings")
     nominal = _region_probabilities(estimates, truth)
     if not nominal.size:
-        raise PalpateError("no estimate of a contact has a covariance; there is nothing to hold beside the truth")
+        raise PalpateError("no estimate of a contact has a covariance to compare with the truth")
     canvas = Canvas(ax, (3.6, 3.6))
     canvas.reference([0, 100], [0, 100], "as it should be")
     found = 100 * np.arange(1, nominal.size + 1) / nominal.size
@@ -347,7 +347,7 @@ def calibration(estimates: Estimates, truth: Recording, *, ax: Axes | None = Non
 
 
 def _region_probabilities(estimates: Estimates, truth: Recording) -> Floats:
-    """Probability of the smallest region about each estimate that holds its contact, in rising order."""
+    """Probability of the smallest region about each estimate that contains its contact, in rising order."""
     covariance = estimates.covariance
     xx, xy, yy = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
     touched = truth.touches & (estimates.status != "no_contact")

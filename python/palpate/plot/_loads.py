@@ -1,4 +1,4 @@
-"""Pictures of load profiles: the load that a reading tells, over what it is a mean, and what it leaves of the reading."""
+"""Pictures of load profiles: the estimated load, its averaging kernels, and its residuals."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ def _check(profile: Any, setup: Setup | None) -> None:
 
 
 def _size(profile: LoadProfile) -> tuple[float, float]:
-    """Length and width of the surface, of which the cells are parts."""
+    """Length and width of the surface that the cells divide."""
     columns, rows = profile.cells
     length = float(profile.x.max() + profile.x.min())
     return length, 0.0 if profile.y is None else float(profile.y.max() + profile.y.min())
@@ -237,7 +237,7 @@ def _size(profile: LoadProfile) -> tuple[float, float]:
 
 def _resolution(profile: LoadProfile) -> tuple[Floats, Floats]:
     if profile.kernels is None or profile.kernel_widths is None:
-        raise PalpateError("the reading tells no load; there are no averaging kernels")
+        raise PalpateError("the reading determines no load, so it has no averaging kernels")
     return profile.kernels, profile.kernel_widths
 
 

@@ -1,4 +1,4 @@
-"""Pictures of readings: a recording by position, and influence functions with what presses leave open of them."""
+"""Pictures of readings: a recording by position, and influence functions with their posterior standard deviation."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def recording(recording: Recording, *, channels: Channels = None, ax: Axes | Non
     check_type(recording, Recording)
     setup, touches = recording.setup, recording.touches
     if not touches.any():
-        raise PalpateError("no row of the recording has a contact; there is nothing to draw")
+        raise PalpateError("no row of the recording has a contact to draw")
     chosen = _of_one_picture(setup, channels)
     readings = recording.readings[touches][:, chosen]
     factor, symbol = unit_of(setup.measures[chosen[0]], readings)
@@ -177,5 +177,5 @@ def _per_newton(recording: Recording, channel: int, offset: float) -> tuple[Floa
     """Positions of presses of known force, and what a channel reads there per newton."""
     known = np.nan_to_num(recording.force) > 0
     if not known.any():
-        raise PalpateError("no row of the recording has a known force; nothing can be drawn per newton")
+        raise PalpateError("no row of the recording has a known force, so readings per newton are undefined")
     return recording.x[known], (recording.readings[known, channel] - offset) / recording.force[known]

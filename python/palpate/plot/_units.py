@@ -20,7 +20,7 @@ _UNITS = {
 
 
 def chosen_channels(setup: Setup, channels: Sequence[str | int] | str | int | None) -> list[int]:
-    """Indices of some channels, by name or index; of all where nothing is said. They measure one quantity, as they share an axis."""
+    """Indices of some channels, by name or index; of all by default. They measure one quantity, as they share an axis."""
     names = setup.channels
     if channels is None:
         chosen = list(range(len(names)))
@@ -37,10 +37,10 @@ def chosen_channels(setup: Setup, channels: Sequence[str | int] | str | int | No
 def _index(channel: str | int, names: Sequence[str]) -> int:
     if isinstance(channel, str):
         if channel not in names:
-            raise PalpateError(f"there is no channel {channel!r}; the channels are {', '.join(names)}")
+            raise PalpateError(f"channel {channel!r} does not exist; the channels are {', '.join(names)}")
         return names.index(channel)
     if not -len(names) <= channel < len(names):
-        raise PalpateError(f"there is no channel {channel}; there are {len(names)}, from 0")
+        raise PalpateError(f"channel {channel} does not exist; the channels are 0 to {len(names) - 1}")
     return range(len(names))[channel]
 
 

@@ -387,7 +387,7 @@ initial_weights
 
 
 class _Plain(_Regressor):
-    """A method that has nothing to set."""
+    """A method without settings."""
 
     _kind: type[estimators.Estimator]
 
@@ -532,7 +532,7 @@ class ClosedFormRegressor(_Regressor):
 
     def _surface_of(self, X: _Floats, y: _Floats) -> Setup:
         if y.ndim == 2:
-            raise PalpateError(f"y has the shape {y.shape}; a beam is a line, whose positions have one column")
+            raise PalpateError(f"y has the shape {y.shape}; a beam is a line, and its positions have one column")
         return _palpate.Setup(Beam(1.0, 0.1, 0.01, "200 GPa"), deflection(X.shape[1], noise="1 um"), force=1.0)
 
     def __sklearn_tags__(self) -> Any:

@@ -221,7 +221,7 @@ function writeStatements(state: CalibrationRecord): void {
 
 /** Why a second weight is asked for. */
 export function weightWords(force_n: number): string {
-  return `All presses have ${Number(force_n.toPrecision(3))} N, and the force in use is unknown: one weight cannot tell how readings grow with the force.`;
+  return `All presses have ${Number(force_n.toPrecision(3))} N, and the force in use is unknown: one weight does not determine how readings grow with the force.`;
 }
 
 function beginWords(state: CalibrationRecord): string {
@@ -301,7 +301,7 @@ function whyWords(state: CalibrationRecord): string {
 function errorWords(outcome: CalibrationOutcome): string {
   const fitted = `Fitted to ${outcome.presses} presses`;
   if (outcome.median_mm === null || outcome.mean_mm === null) return `${fitted}.`;
-  return `${fitted}: error at positions held out ${size(outcome.median_mm)} mm (median), ${size(outcome.mean_mm)} mm (mean)`;
+  return `${fitted}: error at held-out positions ${size(outcome.median_mm)} mm (median), ${size(outcome.mean_mm)} mm (mean)`;
 }
 
 function gainWords(outcome: CalibrationOutcome): string {

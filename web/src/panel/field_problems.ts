@@ -73,7 +73,7 @@ export interface Field {
 export function fieldProblem(field: Field): string | null {
   const { validity } = field;
   if (field.disabled || validity.valid) return null;
-  if (validity.badInput) return "This is no number.";
+  if (validity.badInput) return "This is not a number.";
   if (validity.valueMissing) return "This is needed.";
   if (validity.rangeUnderflow) return Number(field.min) < 0.01 ? "This must be greater than 0." : `This must be at least ${field.min}.`;
   if (validity.rangeOverflow) return `This must be at most ${field.max}.`;

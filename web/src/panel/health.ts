@@ -79,5 +79,5 @@ function ageWords(shown: Snapshot): string {
 
 function tareWords(session: SessionInfo): string {
   if (!session.tare.available) return session.tare.why ?? "this locator cannot be tared";
-  return session.tare.follows ? "followed while nothing touches" : "stays until somebody tares";
+  return session.tare.follows ? "tracked while the surface is untouched" : "stays until somebody tares";
 }

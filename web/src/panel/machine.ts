@@ -106,7 +106,7 @@ export function movesWords(moves: MovesRecord, presses: number): string[] {
   const [below, z] = [moves.depths_mm, moves.depths_mm.map((depth) => moves.touch_z_mm - depth)];
   const limit = moves.force_limit_n === null ? "" : `more than ${size(moves.force_limit_n)} N at the load cell ${moves.load_cell}, `;
   return [
-    "It looks for its end stops first: its way there must be free.",
+    "It searches for its end stops first: its path there must be free.",
     `It travels over ${spanWords("x", moves.x_mm)} and ${spanWords("y", moves.y_mm)} of its own axes, at z ${mm(moves.travel_z_mm)} mm with ${mm(moves.travel_mm_per_s)} mm/s.`,
     `It presses ${presses} times, down to z ${list(z)} mm (${list(below)} mm below the untouched surface) with ${mm(moves.press_mm_per_s)} mm/s.`,
     `The button or Escape stops it at once, and so does ${limit}a channel at the end of its range, or 2 s without readings.`,
@@ -122,7 +122,7 @@ export function machineStep(machine: MachineRecord, state: CalibrationRecord): s
     case "blind":
       return "Waiting for readings";
     case "homing":
-      return "The machine looks for its end stops";
+      return "The machine searches for its end stops";
     default: {
       if (state.waiting === "nothing") return "Lifting the finger";
       const at = positionWords(machine);

@@ -11,7 +11,7 @@ export function writeNumbers({ session, sample }: Snapshot): void {
   if (sample === null) {
     status.dataset.status = "none";
     setText(status, "—");
-    setText(need("why"), session.locator === null ? "There is no locator." : "No reading yet.");
+    setText(need("why"), session.locator === null ? "No locator yet." : "No reading yet.");
   } else {
     const { word, why } = statusWords(sample);
     status.dataset.status = sample.status;
@@ -40,7 +40,7 @@ function intervalWords(sample: SampleRecord): string {
 function forceWords(session: SessionInfo, sample: SampleRecord | null): string {
   const known = session.force.known_n;
   if (known !== null) return `Known: every contact presses with ${known} N.`;
-  if (sample?.force_n === undefined) return sample === null ? "" : "This locator tells no force.";
+  if (sample?.force_n === undefined) return sample === null ? "" : "This locator does not estimate the force.";
   if (sample.force_95_n !== undefined) {
     const [low, high] = sample.force_95_n;
     return `95 %: ${number(low, sample.sd_force_n)} to ${number(high, sample.sd_force_n)} N`;

@@ -42,7 +42,7 @@ export function budgetWords(session: SessionInfo, sample: SampleRecord | null): 
   if (limit === null) return "The limit is known of surfaces that have a model; this one has none.";
   const factor = forceFactor(session, sample !== null && isPlaced(sample.status) ? sample.force_n : undefined);
   const sds = limit.sd_mm.filter((sd) => sd !== null);
-  if (sds.length === 0) return "No position can be told on this surface: every limit is infinite.";
+  if (sds.length === 0) return "No position is identifiable on this surface: every limit is infinite.";
   const [best, worst] = [factor * Math.min(...sds), factor * Math.max(...sds)];
   const force_n = limit.force_n / factor;
   const over = `Limit for ${number(force_n)} N: ${size(best)} to ${size(worst)} mm over the surface.`;

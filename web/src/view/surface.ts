@@ -14,7 +14,7 @@ export function isPlane(session: SessionInfo): boolean {
 export function describe(shown: Snapshot): string {
   const { session, sample } = shown;
   const surface = session.surface;
-  if (surface === null) return "There is no surface: there is no rig yet.";
+  if (surface === null) return "No surface yet: the rig does not exist yet.";
   const across = isPlane(session) ? ` by ${number(surface.width_mm ?? 0, 1)}` : "";
   const what = `${surface.kind} of ${number(surface.length_mm, 1)}${across} mm with ${session.channels.length} sensors`;
   const next = shown.calibration?.next ?? null;

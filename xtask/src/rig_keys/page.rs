@@ -22,7 +22,7 @@ pub fn page(root: &Path) -> Result<String> {
     let types = Types::read(root)?;
     let folder = root.join("crates/palpate-rig/src");
     let find = |file: &str, name: &str| {
-        types.find(&folder.join(file), name).with_context(|| format!("there is no {name} in {file}"))
+        types.find(&folder.join(file), name).with_context(|| format!("{file} has no {name}"))
     };
     let mut page = Page { types: &types, text: HEAD.to_owned(), explained: BTreeMap::new() };
     page.sections("The rig", find("sections.rs", "RigFile")?);

@@ -16,7 +16,7 @@ pub fn findings(project: &Project) -> Vec<Finding> {
     versions.dedup();
     let unknown = versions.into_iter().filter(|version| !has_section(&text, version));
     unknown
-        .map(|version| Finding::new(CHANGELOG, 1, format!("no section `## {version}`: say what is in it")))
+        .map(|version| Finding::new(CHANGELOG, 1, format!("no section `## {version}`: describe the version")))
         .collect()
 }
 
@@ -44,7 +44,7 @@ mod tests {
         assert_eq!(messages(&[]), ["this document is missing: write it"]);
         assert_eq!(
             messages(&[("CHANGELOG.md", "## 0.1.00\n0.1.0\n")]),
-            ["no section `## 0.1.0`: say what is in it"]
+            ["no section `## 0.1.0`: describe the version"]
         );
     }
 

@@ -33,7 +33,7 @@ fn of_crate(project: &Project, krate: &Crate) -> Vec<Finding> {
     let place = |name: &str| ORDER.iter().position(|other| *other == name);
     let Some(own) = place(&krate.name) else {
         let message = format!(
-            "crate {} is not in the table of xtask/src/tidy/crates.rs: say what it may use",
+            "crate {} is not in the table of xtask/src/tidy/crates.rs: list the crates that it may use",
             krate.name
         );
         return vec![Finding::new(&krate.manifest, 1, message)];

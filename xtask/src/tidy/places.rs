@@ -39,7 +39,7 @@ fn of_file(file: &File) -> Vec<Finding> {
             add(format!("/{path}/… is a path of one machine: make it relative, or an argument"));
         }
         for host in hosts(line).filter(|host| !is_lock && !HOSTS.contains(host)) {
-            add(format!("{host} is no host that the project names: name the package or the DOI instead"));
+            add(format!("{host} is not a host that the project names: name the package or the DOI instead"));
         }
     }
     found

@@ -239,7 +239,7 @@ pub fn stage(
     let Some(stage) = &rig.stage else {
         let complaint = Complaint::about(path, "--stage needs the rig's section [stage]");
         return Err(complaint
-            .help("docs/how-to/press-with-a-machine.md says how: origin, touch and depths at least")
+            .help("docs/how-to/press-with-a-machine.md describes it; `origin`, `touch` and `depths` are required")
             .into());
     };
     if force_n.is_some() && (stage.load_cell.is_some() || stage.depths_m.len() > 1) {
@@ -263,8 +263,10 @@ fn rows_before(
 ) -> Result<(Vec<Row>, Option<f64>), Failure> {
     let path = &arguments.presses;
     if path.exists() && !arguments.resume {
-        let complaint = Complaint::new(format!("{} is there already", path.display()));
-        return Err(complaint.help("--resume goes on with its presses; another name begins anew").into());
+        let complaint = Complaint::new(format!("{} exists already", path.display()));
+        return Err(complaint
+            .help("--resume continues with its presses; another name starts a new calibration")
+            .into());
     }
     pressed_before(&arguments.rig, rig, path, depths)
 }
@@ -345,7 +347,7 @@ impl Bench<'_> {
         match outcome.end {
             JogEnd::Begin => Ok(true),
             JogEnd::Quit => Ok(false),
-            JogEnd::Interrupted => Err(Failure::Interrupted("stopped; nothing was pressed".to_owned())),
+            JogEnd::Interrupted => Err(Failure::Interrupted("stopped before the first press".to_owned())),
         }
     }
 
@@ -374,9 +376,7 @@ impl Bench<'_> {
         let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
         let plan = calibration::check_presses(rig, rows, weights, depths_m);
         if plan.is_empty() {
-            return Err(
-                Complaint::new("there is no place between those of the calibration to check at").into()
-            );
+            return Err(Complaint::new("no check position lies between those of the calibration").into());
         }
         let path = calibration::check_path(&arguments.presses);
         let depths = DepthKnowledge::for_stage(stage.as_ref());
@@ -443,7 +443,7 @@ impl Bench<'_> {
             }
         }
         for (cause, count) in calibration.bad_frames() {
-            alert!("{count} frames were no reading: {}", cause.describe());
+            alert!("{count} frames were not readings: {}", cause.describe());
         }
         if calibration.guide().waiting() != Waiting::Nothing {
             if let Some(machine) = machine {
@@ -505,7 +505,7 @@ fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage, clock: HostClock) -> 
     let positions = calibration::dry_run(&plan);
     let keys = keys();
     let mut thread = open_stage(url, stage, clock)?;
-    alert!("the machine looks for its end stops");
+    alert!("the machine searches for its end stops");
     let orders = std::iter::once(Order::Home).chain(positions.iter().copied().map(Order::Travel));
     for order in orders {
         thread.order(order);
@@ -554,9 +554,9 @@ fn step(
     }
     machine.heed(notes)?;
     match machine.step(now, calibration)? {
-        Some(MachineNote::Homing) => alert!("the machine looks for its end stops"),
-        Some(MachineNote::Unseen) => alert!("left out: a press that no reading showed"),
-        Some(MachineNote::NoRest) => alert!("left out: a press whose reading did not come to rest"),
+        Some(MachineNote::Homing) => alert!("the machine searches for its end stops"),
+        Some(MachineNote::Unseen) => alert!("press excluded: it changed no reading"),
+        Some(MachineNote::NoRest) => alert!("press excluded: its reading did not settle"),
         Some(MachineNote::SetUp(note)) => alert!("{note}"),
         None => {}
     }
@@ -603,11 +603,11 @@ fn keys() -> Receiver<String> {
 fn help(can_strike: bool) -> &'static str {
     match can_strike {
         true => {
-            "keys, each with Enter: r takes the last press back, s leaves the next out, u learns the untouched reading anew, l lists the presses, \
-             x 7 strikes press 7 out, q ends here"
+            "keys, each with Enter: r removes the last press, s skips the next, u measures the untouched reading again, l lists the presses, \
+             x 7 removes press 7, q ends the calibration"
         }
         false => {
-            "keys, each with Enter: r takes the last press back, s leaves the next out, u learns the untouched reading anew, q ends here"
+            "keys, each with Enter: r removes the last press, s skips the next, u measures the untouched reading again, q ends the calibration"
         }
     }
 }
@@ -623,7 +623,7 @@ fn press_key(
     match (key.trim(), replan) {
         ("r", _) => {
             if !calibration.redo().map_err(|error| about(&error))? {
-                alert!("nothing was pressed yet");
+                alert!("no press is recorded yet");
             }
         }
         ("s", _) => calibration.skip(),
@@ -639,7 +639,7 @@ fn press_key(
             if is_struck {
                 let to_come = replan(calibration.journal().rows())?;
                 calibration.replan(to_come);
-                alert!("struck out; it is asked for again");
+                alert!("removed; it is requested again");
             } else {
                 alert!("no such press; l lists them");
             }
@@ -661,11 +661,11 @@ fn stopped(arguments: &Arguments, calibration: &Calibration) -> Failure {
 fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
     let presses = calibration.journal().presses();
     if presses == 0 {
-        return "no press was taken".to_owned();
+        return "no press is recorded".to_owned();
     }
     let path = calibration.journal().path();
     match path == arguments.presses {
-        true => format!("{presses} presses are in {}, and --resume goes on", path.display()),
+        true => format!("{presses} presses are in {}; --resume continues", path.display()),
         false => format!(
             "{presses} presses are in {}, and --resume --check begins the check again",
             path.display()
@@ -677,13 +677,13 @@ fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
 fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Recording), Failure> {
     if !arguments.presses.exists() {
         let words =
-            "the calibration ended before any press, so there is nothing to fit; run it again and press";
+            "the calibration ended before any press, so no locator can be fitted; run it again and press";
         return Err(Failure::GoalMissed(words.to_owned()));
     }
     let recording = input::read_recording(&rig.setup, &arguments.presses)?;
     let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
     let failed = |error: &(dyn std::error::Error + 'static)| match Failure::from_error(error) {
-        Failure::BadInput(complaint) => complaint.help("press at more places: --resume goes on").into(),
+        Failure::BadInput(complaint) => complaint.help("press at more positions: --resume continues").into(),
         other => other,
     };
     let observer = Observer::of_rounds(rig.estimator.most_rounds());
@@ -707,7 +707,7 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Re
     if let Some(held_out) = assessment.held_out {
         let (median, mean) = (format_length_mm(held_out.median_m), format_length_mm(held_out.mean_m));
         let folds = held_out.folds;
-        output::say(format!("error at positions held out ({folds} folds): median {median}, mean {mean}"))?;
+        output::say(format!("error at held-out positions ({folds} folds): median {median}, mean {mean}"))?;
     }
     assessment.remarks.iter().for_each(|remark| remark!("{remark}"));
     match assessment.gain {
@@ -715,7 +715,7 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Re
             output::say(format!("more presses would lower the error by less than {} %", gain.stop_percent))?;
         }
         Some(gain) => output::say(format!(
-            "endlessly many more presses would lower the expected error by {:.0} %: `palpate design positions {} --data {}` says where",
+            "unlimited further presses would lower the expected error by {:.0} %: `palpate design positions {} --data {}` proposes positions",
             gain.percent,
             arguments.rig.display(),
             arguments.presses.display()

@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     output::say(format!("{}: {how}; {readings} readings\n", arguments.rig.display()))?;
     output::say(table(&rig, &comparisons, arguments))?;
     for (name, why) in &left_out {
-        output::say(format!("\n{name} is left out: {why}"))?;
+        output::say(format!("\n{name} is skipped: {why}"))?;
     }
     output::say_report("\n", arguments.report.as_deref())
 }
@@ -193,7 +193,7 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
         };
         let plural = if calibrations == 1 { "" } else { "s" };
         let how = format!(
-            "{calibrations} simulated calibration{plural}, judged at {judged} positions each{forces}"
+            "{calibrations} simulated calibration{plural}, evaluated at {judged} positions each{forces}"
         );
         return Ok(Trials { data: "simulation".to_owned(), source: how.clone(), how, trials });
     };

@@ -232,7 +232,7 @@ fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Fail
 }
 
 fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
-    Complaint::new(error).help("--data names a recording to judge by")
+    Complaint::new(error).help("--data names a recording to evaluate on")
 }
 
 /// Contacts all over the bench after its calibration, simulated.
@@ -246,7 +246,7 @@ fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
 fn warn_of_training_data(locator: &Locator, recording: &Recording) {
     if locator.provenance.recording.digests == recording.provenance.digests {
         remark!(
-            "warning: the locator was fitted to this very recording; at positions that it has not seen it is worse: `palpate evaluate RIG --data …` cross-validates"
+            "warning: the locator was fitted to this recording; errors at other positions are larger: `palpate evaluate RIG --data …` cross-validates"
         );
     }
 }

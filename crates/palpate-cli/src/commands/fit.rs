@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) = training {
         let epochs = format_count(u64::from(epochs));
         return Err(Failure::GoalMissed(format!(
-            "training diverged after {epochs} epochs; nothing was written: lower the learning rate or the momentum"
+            "training diverged after {epochs} epochs, and no file was written: lower the learning rate or the momentum"
         )));
     }
     let learnt = learnt::of_locator(&locator);
@@ -166,7 +166,7 @@ fn decide(rig: &Rig, recording: &Recording, arguments: &Arguments) -> Result<Opt
         remark!("{name:<26} {error:>12} {score:>20} {covers:>14}");
     }
     for (name, reason) in &choice.left_out {
-        remark!("{name:<26} left out: {reason}");
+        remark!("{name:<26} skipped: {reason}");
     }
     Ok(Some(choice))
 }

@@ -124,8 +124,8 @@ impl Arguments {
         let Some(out) = &self.out else { return Ok(None) };
         let target = Target::new(out, &Inputs::new([self.recording.as_path()]))?;
         if out.exists() && !self.overwrite {
-            let complaint = Complaint::new(format!("{} is there already", out.display()));
-            return Err(complaint.help("name another file, or write over it with --overwrite").into());
+            let complaint = Complaint::new(format!("{} exists already", out.display()));
+            return Err(complaint.help("name another file, or overwrite it with --overwrite").into());
         }
         Ok(Some(target))
     }
@@ -169,6 +169,6 @@ fn word<T: Copy>(text: &str, all: &[T], name: fn(T) -> &'static str) -> Result<T
     let found = all.iter().copied().find(|value| name(*value) == text);
     found.ok_or_else(|| {
         let known: Vec<&str> = all.iter().map(|value| name(*value)).collect();
-        format!("`{text}` is none of {}", known.join(", "))
+        format!("`{text}` is not one of {}", known.join(", "))
     })
 }

@@ -93,7 +93,7 @@ impl Jog {
             self.take_keys(keys)?;
             self.machine.heed(&notes)?;
             match self.machine.step(self.clock.elapsed(), &mut self.calibration)? {
-                Some(MachineNote::Homing) => alert!("the machine looks for its end stops"),
+                Some(MachineNote::Homing) => alert!("the machine searches for its end stops"),
                 Some(MachineNote::SetUp(note)) => {
                     if let SetUpNote::Touch(z_m) = note {
                         self.touch_z_m = Some(z_m);

@@ -433,14 +433,16 @@ fn limit_figure(bound: Option<&Bound>) -> String {
 }
 
 fn told(value: Option<f64>) -> String {
-    value.map_or_else(|| "not told".to_owned(), |value| figure(Some(value)))
+    value.map_or_else(|| "unidentifiable".to_owned(), |value| figure(Some(value)))
 }
 
 /// Positions left out of the limits over the surface, as the readings do not tell them, in a line for each knowledge of the force.
 fn not_told_in_words(limits: &Limits) -> String {
     let line = |(curve, name): (&LimitCurve, &str)| {
         let words = curve.not_told_in_words()?;
-        Some(format!("\nforce {name}: not told, and left out of the limits over the surface, {words}\n"))
+        Some(format!(
+            "\nforce {name}: unidentifiable, and excluded from the limits over the surface, {words}\n"
+        ))
     };
     [(&limits.known, "known"), (&limits.unknown, "unknown")].into_iter().filter_map(line).collect()
 }
@@ -456,7 +458,7 @@ fn lightest_touch_in_words(limits: &Limits) -> String {
     let extent = limits.known.extent;
     let rate = limits.touch.rate();
     let [Some(half), Some(surely)] = &limits.touches else {
-        return format!("lightest touch: none is told from noise at {rate} of false alarms");
+        return format!("lightest touch: no force is detected at {rate} of false alarms");
     };
     let without = match surely.without {
         0 => String::new(),

@@ -60,7 +60,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         left_out.map_err(|error| Complaint::new(format!("--disable {channel}: {error}")))?;
     }
     if arguments.shape.is_some() && locator.kind() != "digit" {
-        let complaint = format!("--shape: a locator of kind `{}` does not tell the shape", locator.kind());
+        let complaint =
+            format!("--shape: a locator of kind `{}` does not estimate the shape", locator.kind());
         return Err(Complaint::new(complaint).help("only the `digit` estimator does").into());
     }
     let path = arguments.readings.as_deref().unwrap_or(Path::new("-"));
@@ -98,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         output::flush(&mut out)?;
     }
     if readings.awaits_columns() && readings.lines.is_whole() {
-        let complaint = Complaint::new(format!("{} holds no reading", readings.lines.name()));
+        let complaint = Complaint::new(format!("{} contains no reading", readings.lines.name()));
         return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
     }
     if let Some(taring) = &taring {

@@ -30,9 +30,7 @@ pub fn ask(
         return Ok(stated);
     }
     if stated.placement_sd_m.is_none() {
-        alert!(
-            "how far off the asked place do you press, as a standard deviation? as in 2 mm; Enter: unknown"
-        );
+        alert!("standard deviation between requested and pressed position? as in 2 mm; Enter: unknown");
         stated.placement_sd_m = answer(keys, |text| input::length(text).map(Some))?;
     }
     if let Some(force_n) = stated.single_weight_n(rig, force_n) {
@@ -57,7 +55,7 @@ pub fn ask(
 /// Warning about a calibration with one weight.
 pub fn single_weight(force_n: f64) -> String {
     format!(
-        "all presses have {force_n} N, and the force in use is unknown: one weight cannot tell how readings grow with the force"
+        "all presses have {force_n} N, and the force in use is unknown: one weight does not determine how readings grow with the force"
     )
 }
 
@@ -101,7 +99,7 @@ fn answer<T>(
 pub fn list(rows: &[Row], extent: Extent) {
     let touched = rows.iter().enumerate().filter(|(_, row)| row.touches());
     if touched.clone().next().is_none() {
-        alert!("no press was taken yet");
+        alert!("no press is recorded yet");
     }
     for (press, (at, row)) in touched.enumerate() {
         let place = place(Press { position: row.position, force_n: row.force_n, depth_m: None }, extent);
@@ -136,8 +134,9 @@ pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Ext
     let covered = check.covered.map_or_else(String::new, |covered| {
         format!("; {covered} of {} within their 95 % intervals", check.places.len())
     });
-    let placement = placement_sd_m
-        .map_or_else(String::new, |sd_m| format!("; your placement of {} is in it", format_length_mm(sd_m)));
+    let placement = placement_sd_m.map_or_else(String::new, |sd_m| {
+        format!("; it includes your placement of {}", format_length_mm(sd_m))
+    });
     output::say(format!("error at fresh places: median {median}, mean {mean}{covered}{placement}"))
 }
 
@@ -179,9 +178,9 @@ pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
             }
             Note::RepeatedReadings => alert!("{REPEATED_READINGS}"),
             Note::Replaced => {
-                alert!("the reading grew: press {} is taken anew", calibration.journal().presses());
+                alert!("the reading grew: press {} is recorded again", calibration.journal().presses());
             }
-            Note::AskedAgain(doubt) => alert!("not taken: {doubt}"),
+            Note::AskedAgain(reason) => alert!("press rejected: {reason}"),
             Note::StillWaiting(words) => alert!("{words}"),
             Note::Saturated(name) => alert!("channel {name} reads the end of its range"),
             Note::Ended | Note::Waits(_) | Note::Untouched | Note::Overload(_) => {}

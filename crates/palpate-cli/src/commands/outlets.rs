@@ -54,7 +54,7 @@ fn foxglove(address: SocketAddr) -> Result<OpenSink, Failure> {
     let address = server.address();
     remark!("palpate: Foxglove connects to ws://{address}");
     if !address.ip().is_loopback() {
-        remark!("warning: whoever can reach {address} can follow the session: Foxglove has no token");
+        remark!("warning: everyone who can reach {address} can follow the session: Foxglove has no token");
     }
     Ok(Box::new(move |channels, extent, _| Ok(Box::new(server.sink(channels, extent)?))))
 }

@@ -129,7 +129,7 @@ impl Printer<'_> {
             self.tell(&reading, Some(readings.lines.count))?;
         }
         if self.told == 0 && readings.lines.is_whole() {
-            return Err(Complaint::new(format!("{} holds no reading", readings.lines.name())).into());
+            return Err(Complaint::new(format!("{} contains no reading", readings.lines.name())).into());
         }
         readings.lines.finish("profile")
     }
@@ -199,15 +199,12 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
     }
     let misfit =
         if told.misfit < 1e6 { format!("{:.1}", told.misfit) } else { format!("{:.1e}", told.misfit) };
-    output::say(format!("misfit {misfit}; noise seldom makes more than {:.1}", told.worst_misfit))?;
+    output::say(format!("misfit {misfit}; noise alone rarely exceeds {:.1}", told.worst_misfit))?;
     let Some(centre) = &told.centre_x_mm else { return Ok(()) };
-    output::say(format!(
-        "total force         {}, whatever the shape of the load",
-        interval(&told.total_n, "N")
-    ))?;
+    output::say(format!("total force         {}, for any shape of the load", interval(&told.total_n, "N")))?;
     let Seen { margin_mm, low_n, high_n } = told.seen;
     output::say(format!(
-        "                    {} where nothing lies within {margin_mm:.0} mm of an edge",
+        "                    {} if no load lies within {margin_mm:.0} mm of an edge",
         ends(low_n, high_n, " N")
     ))?;
     output::say(format!("centre of pressure  {}", interval(centre, "mm")))?;
@@ -261,7 +258,7 @@ struct JsonProfile {
     extent: Extent,
 }
 
-/// The ends of the total force's 95 % interval where nothing lies within a distance of an edge.
+/// The ends of the total force's 95 % interval if no load lies within a distance of an edge.
 #[derive(Clone, Copy, serde::Serialize)]
 struct Seen {
     margin_mm: f64,

@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let commander = source.commander().map_err(|error| {
             let complaint =
                 Complaint::new(format!("--from {}: --rules has a `command`: {error}", arguments.from));
-            complaint.help("name a source with a way back, or leave rules with `command` out")
+            complaint.help("name a source with a way back, or remove rules with `command`")
         })?;
         sinks.push(Box::new(CommandSink::new(commanding, commander, to.clone())));
     }

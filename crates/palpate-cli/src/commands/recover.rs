@@ -44,7 +44,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     if recovery.passed_over.foreign > 0 {
         let foreign = format_count(recovery.passed_over.foreign);
-        remark!("{foreign} messages on topics of other programs are left out");
+        remark!("{foreign} messages on topics of other programs are skipped");
     }
     let (readings, messages) = (format_count(recovery.readings), format_count(recovery.messages));
     let summary = format!("{}: {readings} readings, {messages} messages", out.display());

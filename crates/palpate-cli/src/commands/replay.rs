@@ -128,9 +128,9 @@ fn by_the_same(
     check_losses(arguments, &playback, count, "estimate")?;
     let all = format_count(count);
     match others {
-        0 => remark!("{all} estimates, each as recorded to the last bit"),
+        0 => remark!("{all} estimates, each equal to the recorded one to the last bit"),
         _ => remark!(
-            "{all} estimates, of which {} are not as recorded, by palpate {}",
+            "{all} estimates; {} differ from those recorded by palpate {}",
             format_count(others),
             playback.head().version
         ),
@@ -178,9 +178,9 @@ fn by_another(
 fn check_losses(arguments: &Arguments, playback: &Playback, count: u64, record: &str) -> Result<(), Failure> {
     let passed_over = playback.passed_over();
     if passed_over.foreign > 0 {
-        remark!("{} messages on topics of other programs are left out", format_count(passed_over.foreign));
+        remark!("{} messages on topics of other programs are skipped", format_count(passed_over.foreign));
     }
-    let nothing = (count == 0).then(|| format!("it holds no {record}"));
+    let nothing = (count == 0).then(|| format!("it contains no {record}"));
     let losses: Vec<String> = nothing.into_iter().chain(passed_over.loss()).collect();
     if losses.is_empty() {
         return Ok(());
@@ -202,7 +202,7 @@ fn check_channels(head: &Head, locator: &Locator) -> Result<(), Failure> {
         channels.iter().map(|(name, unit)| format!("{name} ({unit})")).collect::<Vec<_>>().join(", ")
     };
     let complaint =
-        format!("the recording has the channels {}; the locator wants {}", shown(&there), shown(&wanted));
+        format!("the recording has the channels {}; the locator needs {}", shown(&there), shown(&wanted));
     Err(Complaint::new(complaint).into())
 }
 

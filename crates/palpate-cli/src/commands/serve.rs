@@ -181,7 +181,7 @@ fn check_folder(folder: &Path) -> Result<(), Failure> {
     match folder.ancestors().find(is_there) {
         Some(found) if !found.as_os_str().is_empty() && !found.is_dir() => {
             let complaint =
-                Complaint::new(format!("--record {}: {} is no folder", folder.display(), found.display()));
+                Complaint::new(format!("--record {}: {} is not a folder", folder.display(), found.display()));
             Err(complaint.help("name the folder that recordings go into").into())
         }
         _ => Ok(()),
@@ -192,7 +192,7 @@ fn check_folder(folder: &Path) -> Result<(), Failure> {
 fn bringing_up(from: &SourceUrl, arguments: &Arguments) -> Result<Live, Failure> {
     if let Some(path) = &arguments.rules {
         let complaint = Complaint::new(format!("--rules {}: rules need a locator", path.display()));
-        return Err(complaint.help("name the locator, or leave --rules out").into());
+        return Err(complaint.help("name the locator, or omit --rules").into());
     }
     let live = Live::bringing_up(from.clone(), PathBuf::new())
         .map_err(|error| Complaint::new(error).help("--from names the source"))?;
@@ -231,7 +231,7 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
         rules::refuse_untold_forces(&rules.alarming, path, &locator)?;
     }
     if let Some(KeptAlarms { file, rules, .. }) = &alarms {
-        let about = |problem| Complaint::about(file.path(), problem).help("mend the file, or remove it");
+        let about = |problem| Complaint::about(file.path(), problem).help("correct the file, or remove it");
         rules.check_alarms(&locator).map_err(about)?;
     }
     if let Err(error) = locator.tare() {
@@ -313,7 +313,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     else {
         return match arguments.operator.given() {
             Some(option) => Err(Complaint::new(format!("{option} is for a calibration"))
-                .help("add --calibrate with --presses and --out, or leave it out")
+                .help("add --calibrate with --presses and --out, or omit it")
                 .into()),
             None => Ok(None),
         };
@@ -360,7 +360,7 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
     if let Estimator::Auto(Auto { only }) = &rig.estimator
         && only.is_empty()
     {
-        let complaint = Complaint::about(path, "the estimator is `auto`, whose choice may take minutes");
+        let complaint = Complaint::about(path, "the estimator is `auto`, and its choice may take minutes");
         return Err(complaint
             .help("name its candidates by `only`, or `palpate fit` it once and serve the locator")
             .into());

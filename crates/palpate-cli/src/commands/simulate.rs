@@ -124,7 +124,7 @@ fn move_contact(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Fa
                 beam.critical_speed_m_per_s()
             );
         }
-        None => told += "\nthe plate is in balance at every reading: its inertia is left out",
+        None => told += "\nthe plate is in balance at every reading: its inertia is neglected",
     }
     output::say(told)
 }

@@ -154,7 +154,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         FrameName::Binary => FrameForm::Binary { clock_ppm: arguments.clock_ppm },
         FrameName::Text if arguments.clock_ppm == 0.0 => FrameForm::Text,
         FrameName::Text => {
-            let complaint = Complaint::new("--clock-ppm does not go with frames of text, which tell no time");
+            let complaint = Complaint::new("--clock-ppm needs binary frames: text frames carry no time");
             return Err(complaint.help("add --frames binary").into());
         }
     };
@@ -363,7 +363,7 @@ impl Plugged<'_> {
     fn finish(&self, unsent: u64) -> Result<(), Failure> {
         let sent = self.board.sent();
         let words = format!(
-            "{} frames whole, {} torn, {} left out; of these {} while unplugged, {} that nobody read; {} commands received",
+            "{} frames whole, {} torn, {} dropped ({} while unplugged, {} unread); {} commands received",
             format_count(sent.whole),
             format_count(sent.torn),
             format_count(sent.dropped),

@@ -99,21 +99,21 @@ impl Arguments {
             && self.earlier_run() == EarlierRun::Leave
         {
             let complaint = match found {
-                RESULTS_JSON => format!("{} holds the results of a run that was finished", out.display()),
-                SHARD_JSON => format!("{} holds a shard that was finished", out.display()),
-                table => format!("{} is of a run that was not finished", out.join(table).display()),
+                RESULTS_JSON => format!("{} contains the results of a finished run", out.display()),
+                SHARD_JSON => format!("{} contains a finished shard", out.display()),
+                table => format!("{} belongs to an unfinished run", out.join(table).display()),
             };
             let complaint = Complaint::new(complaint);
             return Err(match self.merge.is_empty() {
-                true => complaint.help(
-                    "--resume goes on from what is finished, --overwrite throws it away, --out names another folder",
-                ),
-                false => complaint.help("--overwrite throws it away, --out names another folder"),
+                true => complaint
+                    .help("--resume continues it, --overwrite deletes it, --out names another folder"),
+                false => complaint.help("--overwrite deletes it, --out names another folder"),
             }
             .into());
         }
         if self.shard.is_some() && out.join(REPORT_HTML).exists() {
-            let complaint = Complaint::new(format!("{} holds a report, and a shard has none", out.display()));
+            let complaint =
+                Complaint::new(format!("{} contains a report, and a shard writes none", out.display()));
             return Err(complaint.help("--out names another folder").into());
         }
         Ok(folder)
@@ -239,7 +239,7 @@ fn train(
         let wanted: u64 = tasks.iter().map(Task::fits).sum();
         let path = out.path().join(NETWORKS_CSV);
         return Err(Failure::Interrupted(format!(
-            "stopped; {finished} of {wanted} fits are in {}; --resume goes on from them",
+            "stopped; {finished} of {wanted} fits are in {}; --resume continues from them",
             path.display()
         )));
     }
@@ -354,7 +354,7 @@ fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
     }
     columns
         .push(column("over the limit", move |arm| Some(spread(&arm.limit.as_ref()?.error_over_limit?, 2))));
-    columns.push(column("95 % hold, %", move |arm| Some(spread(&arm.coverage_percent?, 1))));
+    columns.push(column("95 % coverage, %", move |arm| Some(spread(&arm.coverage_percent?, 1))));
     columns
 }
 

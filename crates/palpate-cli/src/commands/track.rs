@@ -194,11 +194,11 @@ impl Stream<'_> {
                 let column =
                     columns.time.as_ref().map_or("`time_s`".to_owned(), |time| time.column.to_string());
                 let complaint = Complaint::new(format!("{} has no column {column}", self.lines.name()));
-                return Err(complaint.help("--rate says how many readings there are a second").into());
+                return Err(complaint.help("--rate gives the number of readings per second").into());
             }
         }
         if parsing.parser.progress().awaits_columns() && self.lines.is_whole() {
-            let complaint = Complaint::new(format!("{} holds no reading", self.lines.name()));
+            let complaint = Complaint::new(format!("{} contains no reading", self.lines.name()));
             return Err(complaint.help("it must begin with a header").into());
         }
         self.taring.as_ref().map_or(Ok(()), |taring| taring.finish(self.lines.name()))

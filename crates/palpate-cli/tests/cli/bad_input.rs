@@ -79,14 +79,14 @@ fn what_is_no_text_is_refused_at_its_first_zero_byte() {
     for verb in ["inspect", "limit", "init"] {
         let told = complaint(&[("rig.toml", &utf16)], &[verb, "rig.toml"]);
         assert!(
-            told.contains("rig.toml is no text: byte 2 is 0") && told.contains("UTF-8"),
+            told.contains("rig.toml is not text: byte 2 is 0") && told.contains("UTF-8"),
             "{verb}: {told}"
         );
     }
     #[cfg(unix)]
     for device in ["/dev/zero", "/dev/full"] {
         let told = complaint(&[], &["inspect", device]);
-        assert!(told.contains("is no text: byte 1 is 0"), "{told}");
+        assert!(told.contains("is not text: byte 1 is 0"), "{told}");
     }
 }
 

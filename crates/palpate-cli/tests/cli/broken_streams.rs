@@ -104,7 +104,7 @@ fn a_recording_is_kept_whole_where_its_samples_cannot_be_printed() {
     let stderr = String::from_utf8_lossy(&to_full.stderr);
     assert_eq!(to_full.status.code(), Some(2), "{stderr}");
     assert!(stderr.contains("cannot write to stdout: No space left"), "{stderr}");
-    assert!(stderr.contains("printed no more") && stderr.contains("full.mcap: "), "{stderr}");
+    assert!(stderr.contains("not printed any longer") && stderr.contains("full.mcap: "), "{stderr}");
     let mut head = palpate(bench.path());
     let mut left = head.args(record).arg("left.mcap").stdout(Stdio::piped()).spawn().unwrap();
     drop(left.stdout.take());

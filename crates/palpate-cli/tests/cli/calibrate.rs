@@ -94,7 +94,10 @@ fn a_machine_calibrates_to_the_limit_unattended() {
     std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
     let bench = Bench::start(folder.path(), "marlin");
     let words = said(&bench.calibrate(folder.path(), &[]).output().unwrap());
-    assert!(words.contains("fitted to 54 presses") && words.contains("held out (5 folds)"), "{words}");
+    assert!(
+        words.contains("fitted to 54 presses") && words.contains("error at held-out positions (5 folds)"),
+        "{words}"
+    );
     assert_eq!(presses(folder.path()), 54);
     let json = std::fs::read_to_string(folder.path().join("locator.json")).unwrap();
     let locator = Locator::from_json(&json).unwrap();
@@ -154,7 +157,7 @@ fn too_much_force_and_enter_stop_the_machine_and_the_presses_are_kept() {
     let bench = Bench::start(folder.path(), "grbl");
     let words = complained(&bench.calibrate(folder.path(), &[]).output().unwrap(), 1);
     assert!(words.contains("more than the limit of 0.8 N"), "{words}");
-    assert!(words.contains("--resume goes on"), "{words}");
+    assert!(words.contains("--resume continues"), "{words}");
     assert_eq!(presses(folder.path()), 3, "those of the first depth");
     std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
     let mut child = bench
@@ -217,7 +220,7 @@ fn ends_with_its_words(firmware: &str, (config, _, finger, taken): &FaultCase, w
     let bench = Bench::with(folder.path(), "tcp://:0", &["--firmware", firmware, "--machine", config]);
     let said = complained(&bench.calibrate(folder.path(), &[]).output().unwrap(), 3);
     assert!(said.contains(words), "{firmware} {config}: {said}");
-    let kept = if *taken > 0 { "--resume goes on" } else { "no press was taken" };
+    let kept = if *taken > 0 { "--resume continues" } else { "no press is recorded" };
     assert!(said.contains(kept), "{firmware} {config}: {said}");
     assert!(!folder.path().join("locator.json").exists(), "{firmware} {config}");
     assert_eq!(taken_presses(folder.path()), *taken, "{firmware} {config}");
@@ -260,7 +263,7 @@ fn stopped_by(signal: &str, code: i32, firmware: &str) -> Duration {
     let mut child =
         bench.calibrate(folder.path(), &[]).stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
-    lines.find(|line| line.contains("looks for its end stops")).expect("it homes");
+    lines.find(|line| line.contains("searches for its end stops")).expect("it homes");
     // It lifts, travels and goes down for seconds.
     std::thread::sleep(Duration::from_millis(700));
     let asked = Instant::now();
@@ -270,7 +273,7 @@ fn stopped_by(signal: &str, code: i32, firmware: &str) -> Duration {
     assert!(line.contains("the machine was stopped"), "{line}");
     assert_eq!(child.wait().unwrap().code(), Some(code), "{signal}");
     let rest: Vec<String> = lines.collect();
-    assert!(rest.iter().any(|line| line.contains("reset it, as by its button")), "{rest:?}");
+    assert!(rest.iter().any(|line| line.contains("reset it, for example by its button")), "{rest:?}");
     at - asked
 }
 
@@ -361,7 +364,7 @@ fn a_saturated_channel_stops_the_machine() {
     let bench = Bench::start(folder.path(), "marlin");
     let words = complained(&bench.calibrate(folder.path(), &[]).output().unwrap(), 1);
     assert!(words.contains("channel `reaction_1` reads the end of its range"), "{words}");
-    assert!(words.contains("no press was taken"), "{words}");
+    assert!(words.contains("no press is recorded"), "{words}");
 }
 
 /// A touch height that is wrong: the finger never reaches the surface.
@@ -372,7 +375,7 @@ fn presses_that_no_reading_shows_end_the_calibration() {
     let bench = Bench::start(folder.path(), "marlin");
     std::fs::write(folder.path().join("rig.toml"), RIG.replace("\"22 mm\"", "\"32 mm\"")).unwrap();
     let words = complained(&bench.calibrate(folder.path(), &[]).output().unwrap(), 1);
-    assert!(words.contains("left out: a press that no reading showed"), "{words}");
+    assert!(words.contains("press excluded: it changed no reading"), "{words}");
     assert!(words.contains("`touch` or `depths` of [stage] are wrong"), "{words}");
 }
 
@@ -433,11 +436,11 @@ fn a_board_whose_frames_are_no_readings_is_told_at_once() {
     child.stdin.take().unwrap().write_all("left:1.5,right:2.5\n".repeat(150).as_bytes()).unwrap();
     let complaint = complained(&child.wait_with_output().unwrap(), 3);
     // Once while it runs, and once as the reason of its end.
-    let cause = "150 frames in a row are no reading: a channel is missing; the last is `left:1.5,right:2.5`; name `reaction_1_n`, `reaction_2_n` as";
+    let cause = "150 frames in a row are not readings: a channel is missing; the last is `left:1.5,right:2.5`; name `reaction_1_n`, `reaction_2_n` as";
     for words in ["no readings: ", "there was no reading: "] {
         assert_eq!(complaint.matches(&format!("{words}{cause}")).count(), 1, "{complaint}");
     }
-    assert!(complaint.contains("150 frames were no reading: a channel is missing"), "{complaint}");
+    assert!(complaint.contains("150 frames were not readings: a channel is missing"), "{complaint}");
 }
 
 #[test]

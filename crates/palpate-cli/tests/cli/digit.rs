@@ -85,5 +85,5 @@ fn the_digit_estimator_is_compared_and_the_shape_is_its_own() {
     said(&run(folder.path(), &["fit", "paper.toml", "-o", "beam.json"]));
     let refused =
         complained(&run(folder.path(), &["locate", "beam.json", "x.csv", "--json", "--shape", "9"]), 2);
-    assert!(refused.contains("does not tell the shape"), "{refused}");
+    assert!(refused.contains("does not estimate the shape"), "{refused}");
 }

@@ -61,12 +61,14 @@ fn a_session_without_a_reading_fails_with_the_cause_and_the_last_line() {
         (b"", &["there was no reading: the source ended"]),
         (
             b"hello\n",
-            &["1 frame is no reading: a value is no number; the last is `hello`; print a decimal number"],
+            &[
+                "1 frame is not a reading: a value is not a number; the last is `hello`; print a decimal number",
+            ],
         ),
         (b"1,2,3\n", &["another number of values", "the last is `1,2,3`", "columns="]),
         (b"S1:1,S2:2,S3:3,X:4\n", &["a channel is missing", "the last is `S1:1,S2:2,S3:3,X:4`"]),
         (b"\x80\xFE\x07\xFF", &["not text", "the last is `\\x80\\xFE\\x07\\xFF`", "check the baud rate"]),
-        (b"nan,1,2,3\nnan,1,2,3\n", &["a value is no number", "the last is `nan,1,2,3`"]),
+        (b"nan,1,2,3\nnan,1,2,3\n", &["a value is not a number", "the last is `nan,1,2,3`"]),
     ];
     for (i, (input, expected)) in cases.into_iter().enumerate() {
         let said = complained(&record(&format!("none-{i}.mcap"), input), 3);
@@ -78,7 +80,7 @@ fn a_session_without_a_reading_fails_with_the_cause_and_the_last_line() {
     );
     let server = TcpListener::bind("127.0.0.1:0").unwrap();
     let silent = record_from("silent.mcap", &format!("tcp://{}", server.local_addr().unwrap()));
-    assert!(silent.contains("sends nothing; check that the board is on"), "{silent}");
+    assert!(silent.contains("sends no data; check that the board is on"), "{silent}");
 }
 
 #[test]
@@ -86,7 +88,7 @@ fn a_channel_that_vanishes_midway_is_an_event_and_a_failure() {
     let input = [READING.repeat(50), "100.5,200.5,300.0\n".repeat(191)].concat();
     let output = record("vanishes.mcap", input.as_bytes());
     let said = complained(&output, 3);
-    assert!(said.contains("the readings ended early: 191 frames in a row are no reading"), "{said}");
+    assert!(said.contains("the readings ended early: 191 frames in a row are not readings"), "{said}");
     assert!(said.contains("the last is `100.5,200.5,300.0`"), "{said}");
     let lines = String::from_utf8(output.stdout).unwrap();
     let objects = lines.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
@@ -137,7 +139,10 @@ fn recordings_of_other_writers_are_replayed() {
         let output = run(BENCH.path(), &["replay", name]);
         assert_eq!(said(&output).lines().count(), 60, "{name}");
         let words = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(words.contains("59 estimates, each as recorded to the last bit"), "{name}: {words}");
+        assert!(
+            words.contains("59 estimates, each equal to the recorded one to the last bit"),
+            "{name}: {words}"
+        );
     }
 }
 
@@ -154,7 +159,7 @@ fn blocks_that_cannot_be_read_are_counted_with_the_fault() {
     unknown[at..at + 4].copy_from_slice(b"brot");
     let said = complained(&replay(&unknown), 3);
     assert!(
-        said.contains("it holds no estimate") && said.contains("compression `brot` is unknown"),
+        said.contains("it contains no estimate") && said.contains("compression `brot` is unknown"),
         "{said}"
     );
     assert!(said.contains("1 blocks cannot be read"), "{said}");
@@ -175,7 +180,7 @@ fn blocks_that_cannot_be_read_are_counted_with_the_fault() {
     let said = complained(&replay(&loose), 3);
     assert!(said.contains("its bytes do not match its checksum"), "{said}");
     let said = complained(&replay(b"S1,S2,S3,S4\n1,2,3,4\n"), 2);
-    assert!(said.contains("is no MCAP file"), "{said}");
+    assert!(said.contains("is not an MCAP file"), "{said}");
 }
 
 #[test]
@@ -232,6 +237,6 @@ fn a_calibration_without_a_press_says_that_there_is_none() {
     let calibrate =
         ["calibrate", "training.toml", "--from", "-", "--presses", "cal.csv", "--out", "cal.json"];
     let said = complained(&run_with(&calibrate, READING.repeat(3).as_bytes()), 3);
-    assert!(said.contains("no press was taken"), "{said}");
+    assert!(said.contains("no press is recorded"), "{said}");
     assert!(!said.contains("cannot read cal.csv"), "{said}");
 }

@@ -89,7 +89,7 @@ fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
     Outcome {
         presses: rows.len(),
         without_touch: rows.iter().filter(|row| is_untouched(&row.reading, row.position)).count(),
-        asked_again: said.matches("not taken:").count(),
+        asked_again: said.matches("press rejected:").count(),
     }
 }
 

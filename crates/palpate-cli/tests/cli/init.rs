@@ -219,7 +219,7 @@ fn untouched_rows_may_have_no_position_and_be_marked_by_a_column() {
     assert!(refused.contains("pressed.csv:4:1"), "{refused}");
     let words = ["init", "nothing.csv", "--untouched", "Kraft"];
     let refused = complained(&run(folder, &words), 2);
-    assert!(refused.contains("column `Kraft [N]` must say 1, true or yes"), "{refused}");
+    assert!(refused.contains("every row of column `Kraft [N]` must be 1, true or yes"), "{refused}");
 }
 
 #[test]
@@ -281,5 +281,5 @@ fn a_locator_of_one_file_locates_its_other_forms() {
 
     fs::write(folder.join("no-heading.csv"), "S1,S2\nbeside,others\n").unwrap();
     let complaint = complained(&run(folder, &["locate", "locator.json", "no-heading.csv"]), 2);
-    assert!(complaint.contains("there is no column `S3`; there are `S1`, `S2`"), "{complaint}");
+    assert!(complaint.contains("column `S3` does not exist; the columns are `S1`, `S2`"), "{complaint}");
 }

@@ -77,7 +77,7 @@ fn noise_by_place_is_said() {
     fs::write(folder.path().join("presses.csv"), csv).unwrap();
     let fitted = said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
     let inspected = said(&run(folder.path(), &["inspect", "board.json"]));
-    let line = fitted.lines().find(|line| line.starts_with("  noise of touches")).unwrap().trim();
+    let line = fitted.lines().find(|line| line.starts_with("  noise of contacts")).unwrap().trim();
     assert!(inspected.contains(line), "{inspected}");
     insta::assert_snapshot!(line);
     let json = said(&run(folder.path(), &["inspect", "board.json", "--json"]));

@@ -93,9 +93,8 @@ fn over_a_support_an_unknown_force_is_not_told() {
     let folder = folder(LONG_BEAM);
     let table = said(&run(folder.path(), &["limit", "rig.toml", "--force", "1000 N", "--report", "report"]));
     let row = table.lines().find(|line| line.starts_with("12000 mm")).unwrap();
-    assert_eq!(row.matches("not told").count(), 2, "{table}");
-    let words =
-        "not told, and left out of the limits over the surface, 1 of 399 positions, 0.3 %, at 12000 mm";
+    assert_eq!(row.matches("unidentifiable").count(), 2, "{table}");
+    let words = "unidentifiable, and excluded from the limits over the surface, 1 of 399 positions, 0.3 %, at 12000 mm";
     assert!(table.contains(&format!("force unknown: {words}")), "{table}");
     let found = json(folder.path(), &["limit", "rig.toml", "--force", "1000 N"]);
     assert_eq!(found["unknown_force"]["positions_without"], 1);

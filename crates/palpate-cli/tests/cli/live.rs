@@ -34,7 +34,9 @@ fn a_recording_is_located_again_to_the_last_bit() {
 
     let output = run(folder.path(), &["replay", "press.mcap", "--json"]);
     let replayed = objects(&said(&output));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("each as recorded to the last bit"));
+    assert!(
+        String::from_utf8_lossy(&output.stderr).contains("each equal to the recorded one to the last bit")
+    );
     assert_eq!(replayed.len(), samples.len());
     for (again, sample) in replayed.iter().zip(&samples) {
         for key in ["number", "time_s", "x_mm", "x_95_mm", "status"] {
@@ -52,7 +54,7 @@ fn a_recording_is_located_again_to_the_last_bit() {
     said(&run(folder.path(), &again));
     assert_eq!(said(&run(folder.path(), &["replay", "again.mcap"])).lines().count(), rows.lines().count());
     let refused = complained(&run(folder.path(), &record), 2);
-    assert!(refused.contains("press.mcap: it is there already"), "{refused}");
+    assert!(refused.contains("press.mcap: it exists already"), "{refused}");
 }
 
 #[test]
@@ -170,7 +172,9 @@ fn bad_input_is_refused_with_its_place() {
 #[test]
 fn a_folder_of_recordings_that_is_none_is_refused_before_anything_is_served() {
     let folder = bench();
-    for (given, what) in [("rig.toml", "rig.toml is no folder"), ("rig.toml/new", "rig.toml is no folder")] {
+    for (given, what) in
+        [("rig.toml", "rig.toml is not a folder"), ("rig.toml/new", "rig.toml is not a folder")]
+    {
         let serve = ["serve", "locator.json", "--listen", "127.0.0.1:0", "--record", given];
         let told = complained(&run(folder.path(), &serve), 2);
         assert!(told.contains(&format!("--record {given}")) && told.contains(what), "{told}");
@@ -210,7 +214,7 @@ fn a_board_of_other_channels_is_no_recording_and_says_why() {
     let board = "simulated:other.toml?rate=500";
     let record = ["record", "locator.json", "--from", board, "--out", "none.mcap", "--duration", "0.5 s"];
     let told = complained(&run(folder.path(), &record), 3);
-    assert!(told.contains("0 readings") && told.contains("frames in a row are no reading"), "{told}");
+    assert!(told.contains("0 readings") && told.contains("frames in a row are not readings"), "{told}");
     assert!(told.contains("another number of values") && told.contains("the last is `"), "{told}");
     assert!(told.contains("columns="), "{told}");
 }
@@ -229,5 +233,5 @@ fn a_broker_that_is_not_there_is_told_with_what_is_lost() {
     said(&output);
     let told = String::from_utf8_lossy(&output.stderr);
     let remarks = told.matches("the broker 127.0.0.1:1 cannot be reached").count();
-    assert!(remarks == 1 && told.contains("see that it runs there"), "{told}");
+    assert!(remarks == 1 && told.contains("check that it runs there"), "{told}");
 }

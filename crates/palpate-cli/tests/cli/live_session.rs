@@ -49,7 +49,7 @@ fn tracked_and_filtered_sessions_are_recorded_and_located_again_to_the_last_bit(
         let output = run(folder.path(), &["replay", out, "--json"]);
         let replayed = samples(&said(&output));
         let words = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(words.contains("each as recorded to the last bit"), "{out}: {words}");
+        assert!(words.contains("each equal to the recorded one to the last bit"), "{out}: {words}");
         for (again, sample) in replayed.iter().zip(&told) {
             for key in ["number", "x_mm", "x_95_mm", "sd_mm", "status"] {
                 assert_eq!(again[key], sample[key], "{out}, {key}: {sample}");
@@ -73,7 +73,7 @@ fn a_contact_on_a_plane_has_its_covariance_tracked_or_not() {
         }
         let output = run(folder.path(), &["replay", out]);
         let words = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(words.contains("each as recorded to the last bit"), "{out}: {words}");
+        assert!(words.contains("each equal to the recorded one to the last bit"), "{out}: {words}");
     }
 }
 
@@ -178,8 +178,8 @@ fn rules_that_ask_for_a_force_of_a_locator_that_tells_none_are_refused() {
     fs::write(folder.path().join("rules.toml"), rule).unwrap();
     for arguments in [&record[..], &serve] {
         let told = complained(&run(folder.path(), arguments), 2);
-        assert!(told.contains("rules.toml: rule `brake` asks for a `force`"), "{told}");
-        assert!(told.contains("kind `network`") && told.contains("leave `force` out"), "{told}");
+        assert!(told.contains("rules.toml: rule `brake` requires a `force`"), "{told}");
+        assert!(told.contains("kind `network`") && told.contains("remove `force`"), "{told}");
     }
     assert!(!folder.path().join("never.mcap").exists());
 }

@@ -104,10 +104,10 @@ fn what_is_no_file_is_not_replaced() {
     refused("/dev/stdout", "it is a pipe (FIFO)");
     refused("about", "cannot write about");
     refused("out", "it is a folder");
-    refused("-", "stdout is for what the command says");
+    refused("-", "stdout is reserved for the output of the command");
     refused("none/..", "it names no file");
     refused("rig.toml/a.csv", "cannot write rig.toml/a.csv");
-    refused("none/a.csv", "there is no folder none");
+    refused("none/a.csv", "folder none does not exist");
     assert!(fs::symlink_metadata(at("pipe")).unwrap().file_type().is_fifo());
     assert!(fs::symlink_metadata(at("null")).unwrap().file_type().is_symlink());
     let limit = |out: &str, why: &str| {
@@ -115,9 +115,9 @@ fn what_is_no_file_is_not_replaced() {
         assert!(complaint.contains(why), "{out}: {complaint}");
     };
     limit("out", "it is a folder");
-    limit("rig.toml", "rig.toml is no folder");
-    limit("rig.toml/out", "rig.toml is no folder");
-    limit("pipe", "pipe is no folder");
+    limit("rig.toml", "rig.toml is not a folder");
+    limit("rig.toml/out", "rig.toml is not a folder");
+    limit("pipe", "pipe is not a folder");
 }
 
 #[test]
@@ -164,10 +164,7 @@ fn finished_studies_are_kept() {
     assert_eq!(networks.lines().count(), 6);
     for count in ["1", "4", "9"] {
         let complaint = complained(&seeds(count, &[]), 2);
-        assert!(
-            complaint.contains("a run that was finished") && complaint.contains("--resume"),
-            "{complaint}"
-        );
+        assert!(complaint.contains("a finished run") && complaint.contains("--resume"), "{complaint}");
     }
     let rig = path.join("rig.toml");
     fs::write(&rig, NOISY_BEAM).unwrap();
@@ -183,7 +180,7 @@ fn finished_studies_are_kept() {
         (&["fit", "rig.toml", "-o", "out/results.json"][..], "results.json"),
         (&["simulate", "rig.toml", "-o", "out/networks.csv"], "networks.csv"),
     ] {
-        kept(path, arguments, &format!("out/{name}"), "it is a result of the study whose");
+        kept(path, arguments, &format!("out/{name}"), "it is a result of the study with");
     }
     said(&run(path, &["fit", "rig.toml", "-o", "out/locator.json"]));
 
@@ -226,8 +223,8 @@ fn finished_studies_that_are_built_in_are_kept() {
     fs::create_dir(folder.path().join("out")).unwrap();
     fs::write(folder.path().join("out/results.json"), "{}").unwrap();
     for study in ["dead-areas", "elliott"] {
-        kept(folder.path(), &["study", study, "--out", "out"], "out/results.json", "a run that was finished");
+        kept(folder.path(), &["study", study, "--out", "out"], "out/results.json", "a finished run");
         let resume = ["study", study, "--out", "out", "--resume"];
-        kept(folder.path(), &resume, "out/results.json", "keeps no networks to go on from");
+        kept(folder.path(), &resume, "out/results.json", "keeps no networks to continue from");
     }
 }

@@ -10,7 +10,7 @@ use std::fs;
 const PRESSED: &str = "\n[training]\ncount = 2\nrepeats = 5\nforce = \"3 N\"\n[estimator]\nkind = \"influence\"\nsource = \"mechanics\"\n";
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 #[test]
@@ -122,5 +122,5 @@ fn a_total_without_an_upper_end_is_said_as_such() {
     let bench = LOAD_PROFILE.split("[[load]]").next().unwrap();
     let folder = folder(format!("{bench}[[load]]\nfrom = \"2 mm\"\nto = \"6 mm\"\nforce = \"0.2 N\"\n"));
     let told = said(&run(folder.path(), &["profile", "rig.toml"]));
-    assert!(told.contains(" N or more where nothing lies within") && !told.contains("inf"), "{told}");
+    assert!(told.contains(" N or more if no load lies within") && !told.contains("inf"), "{told}");
 }

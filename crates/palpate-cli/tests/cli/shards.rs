@@ -173,7 +173,7 @@ fn shards_that_do_not_make_a_study_are_refused() {
     fs::create_dir(folder.join("empty")).unwrap();
     for none in ["empty", "nowhere"] {
         let told = refused(&[none]);
-        assert!(told.contains(&format!("{none}: there is no networks.csv")), "{told}");
+        assert!(told.contains(&format!("{none}: networks.csv is missing")), "{told}");
     }
 
     // Of another study file.
@@ -193,7 +193,7 @@ fn shards_that_do_not_make_a_study_are_refused() {
     let facts = text(folder, "of-3/1/shard.json");
     fs::remove_file(folder.join("of-3/1/shard.json")).unwrap();
     let told = refused(&[&three[0], &three[1], &three[2]]);
-    assert!(told.contains("of-3/1: there is no shard.json"), "{told}");
+    assert!(told.contains("of-3/1: shard.json is missing"), "{told}");
     fs::write(folder.join("of-3/1/shard.json"), facts.replace("\"threads\": 1", "\"threads\": -1")).unwrap();
     let told = refused(&[&three[0], &three[1], &three[2]]);
     assert!(told.contains("of-3/1/shard.json: ") && told.contains("-1"), "{told}");
@@ -214,7 +214,7 @@ fn outputs_of_shards_follow_the_rules_of_a_study() {
     study(folder, &one);
     let before = text(folder, "one/networks.csv");
     let told = complaint(folder, &one);
-    assert!(told.contains("one holds a shard that was finished") && told.contains("--resume"), "{told}");
+    assert!(told.contains("one contains a finished shard") && told.contains("--resume"), "{told}");
     // Neither another shard nor the whole study goes on from it.
     for arguments in
         [&["--shard", "2/2", "--seeds", "1"][..], &["--shard", "1/2", "--seeds", "2"], &["--seeds", "1"]]
@@ -236,11 +236,11 @@ fn outputs_of_shards_follow_the_rules_of_a_study() {
     assert_eq!(text(folder, "one/networks.csv"), before);
     merge(folder, &["one".to_owned(), "two".to_owned()], "both");
     let told = complaint(folder, &["--out", "both", "--merge", "one", "two"]);
-    assert!(told.contains("both holds the results of a run that was finished"), "{told}");
+    assert!(told.contains("both contains the results of a finished run"), "{told}");
     assert!(told.contains("--overwrite") && !told.contains("--resume"), "{told}");
     said(&run(folder, &["study", "small.toml", "--out", "both", "--overwrite", "--merge", "one", "two"]));
     let told = complaint(folder, &["--shard", "1/2", "--out", "both", "--overwrite"]);
-    assert!(told.contains("both holds a report, and a shard has none"), "{told}");
+    assert!(told.contains("both contains a report, and a shard writes none"), "{told}");
 
     for (shard, why) in [("3/2", "from 1 to 2"), ("1/0", "from 1 to 1000000"), ("one", "it must be K/N")] {
         let told = complaint(folder, &["--shard", shard]);
@@ -279,7 +279,7 @@ fn a_stopped_shard_goes_on_where_it_was() {
     let output = child.wait_with_output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(130), "{told}");
-    assert!(told.contains("fits are in parts/networks.csv; --resume goes on from them"), "{told}");
+    assert!(told.contains("fits are in parts/networks.csv; --resume continues from them"), "{told}");
     assert!(!folder.path().join("parts/shard.json").exists());
     said(&run(folder.path(), &[&arguments[..], &["parts", "--resume"]].concat()));
     for name in ["networks.csv", "evaluations.csv"] {

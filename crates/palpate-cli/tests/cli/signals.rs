@@ -213,7 +213,7 @@ fn the_equations_of_a_plate_are_left_at_a_signal() {
         let stopped = end(child, signal, SOON);
         let stderr = String::from_utf8_lossy(&stopped.stderr);
         // The work itself stopped: it was not ended with the process.
-        assert!(stderr.contains("nothing was written"), "{arguments:?}: {stderr}");
+        assert!(stderr.contains("no output was written"), "{arguments:?}: {stderr}");
     }
     assert!(!folder.join("never.csv").exists() && !folder.join("never.json").exists());
 }

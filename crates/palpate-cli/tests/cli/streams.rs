@@ -63,7 +63,7 @@ fn a_torn_first_line_is_skipped() {
     // Two lines of the same wrong length are no torn ones.
     let wrong = "1,2,3,4\n1,2,3,4\n";
     let output = fed(bench.path(), &["locate", "locator.json", "--no-header"], wrong.as_bytes());
-    assert!(complained(&output, 2).contains("there is no column number 5"), "{output:?}");
+    assert!(complained(&output, 2).contains("column number 5 does not exist"), "{output:?}");
 }
 
 #[test]

@@ -74,7 +74,7 @@ fn a_contact_over_a_rigid_support_is_said_not_to_show() {
     let faint: Vec<&str> = found.lines().filter(|line| line.contains("faint")).collect();
     assert!(faint.iter().any(|line| line.contains("500 mm")), "{found}");
     assert!(
-        found.contains("reaction sensors at the supports; less noise or a harder touch does not help"),
+        found.contains("reaction sensors at the supports; less noise or a larger force does not help"),
         "{found}"
     );
 }

@@ -184,7 +184,10 @@ fn an_automatic_tare_says_how_many_untouched_readings_it_found() {
     fs::write(folder.path().join("palm.csv"), csv).unwrap();
     let output = run(folder.path(), &["locate", "board.json", "palm.csv", "--tare", "auto"]);
     let doubted = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(doubted.contains("readings of palm.csv are no contact by the baseline"), "{doubted}");
+    assert!(
+        doubted.contains("readings of palm.csv differ from the baseline without matching a contact"),
+        "{doubted}"
+    );
 }
 
 #[test]
@@ -263,22 +266,22 @@ fn held_out_readings_are_judged_without_the_drift_of_the_recording() {
     };
     let (raw_mm, _, warned) = mean_mm(&["evaluate"]);
     assert!(warned.contains("drift.csv: 12 rows without a position, taken as untouched"), "{warned}");
-    assert!(warned.contains("`--tare auto` takes it off"), "{warned}");
+    assert!(warned.contains("`--tare auto` subtracts it"), "{warned}");
     let (tared_mm, tared, told) = mean_mm(&["evaluate", "--tare", "auto"]);
-    assert!(tared && told.contains("it is taken off held-out readings"), "{told}");
+    assert!(tared && told.contains("it is subtracted from held-out readings"), "{told}");
     println!("mean error {raw_mm:.2} mm, {tared_mm:.2} mm with --tare auto");
     assert!(tared_mm < 0.4 * raw_mm, "{tared_mm} mm, {raw_mm} mm");
     let (compared_mm, tared, _) = mean_mm(&["compare", "--only", "influence force-linear", "--tare", "auto"]);
     assert!(tared && (compared_mm / tared_mm - 1.0).abs() < 1e-9, "{compared_mm} mm, {tared_mm} mm");
     let refused =
         complained(&run(folder.path(), &["evaluate", "rig.toml", "--data", "drift.csv", "--tare", "5"]), 2);
-    assert!(refused.contains("--tare auto takes off the drift"), "{refused}");
+    assert!(refused.contains("--tare auto subtracts the drift"), "{refused}");
     // `auto` judges likewise.
     file("auto.toml", &RIG.replace("\"influence\"", "\"auto\""));
     let options = ["--data", "drift.csv", "--time-limit", "30 s", "-o", "auto.json"];
     let fit = run(folder.path(), &[&["fit", "auto.toml"][..], &options].concat());
     let chosen = String::from_utf8(fit.stderr).unwrap();
-    assert!(chosen.contains("it is taken off held-out readings\nchosen: influence force-"), "{chosen}");
+    assert!(chosen.contains("it is subtracted from held-out readings\nchosen: influence force-"), "{chosen}");
     let tried = chosen.lines().find_map(|line| line.strip_prefix("influence force-linear "));
     let auto_mm: f64 = tried.unwrap().split_whitespace().next().unwrap().parse().unwrap();
     assert!((auto_mm / tared_mm - 1.0).abs() < 1e-2, "{auto_mm} mm, {tared_mm} mm");

@@ -46,12 +46,12 @@ fn sources(port: &str) -> Vec<Source> {
     // A broker's answer to a client whose password it does not take.
     let broker = format!("mqtt://{}/board", server(&[0x20, 2, 0, 5]));
     let all: [(&str, String, &[&str], &[&str]); 7] = [
-        ("silent", tcp(b""), &["the source is open and sends nothing"], &["the board sends nothing"]),
+        ("silent", tcp(b""), &["the source is connected but sends no data"], &["the board sends no data"]),
         (
             "carriage returns",
             tcp(b"hello\rhello\rhello\rhello\rhello\rhello\r"),
-            &["frames in a row are no reading: a value is no number", "the last is `hello`"],
-            &["no values are found", "the last is `hello`"],
+            &["frames in a row are not readings: a value is not a number", "the last is `hello`"],
+            &["without values", "the last is `hello`"],
         ),
         (
             "wrong baud rate",
@@ -75,7 +75,7 @@ fn sources(port: &str) -> Vec<Source> {
         (
             "vanished channel",
             tcp(vanishing),
-            &["191 frames in a row are no reading", "the last is `100.5,200.5,300.0`"],
+            &["191 frames in a row are not readings", "the last is `100.5,200.5,300.0`"],
             &[],
         ),
     ];

@@ -192,7 +192,9 @@ pub enum PositionError {
         found: usize,
     },
     /// Too few places pressed to see how smooth the influence functions are.
-    #[error("the recording has {found} distinct positions; at least {needed} tell how smooth the surface is")]
+    #[error(
+        "the recording has {found} distinct positions; at least {needed} are needed to estimate the smoothness of the surface"
+    )]
     TooFewPresses {
         /// Number of distinct positions in the recording.
         found: usize,
@@ -201,7 +203,7 @@ pub enum PositionError {
     },
     /// Presses of a small part of the surface, which do not tell the rest.
     #[error(
-        "the presses reach over {:.1} mm of {:.1} mm along {axis}, and do not tell how readings change elsewhere",
+        "the presses cover {:.1} mm of {:.1} mm along {axis}; readings elsewhere are undetermined",
         reach_m * 1e3,
         side_m * 1e3
     )]
@@ -219,13 +221,11 @@ pub enum PositionError {
     )]
     NothingTold,
     /// Presses of forces that differ on a surface without a model, of whose readings without contact nothing is known.
-    #[error(
-        "the forces of the presses differ, and nothing says what the channels read while nothing touches"
-    )]
+    #[error("the forces of the presses differ, and the readings of the untouched surface are unknown")]
     NoOffset,
     /// A channel of unknown noise.
     #[error(
-        "nothing says how noisy channel {channel} is: no position was pressed twice, or its repeats are equal, and the setup states no noise"
+        "the noise of channel {channel} is unknown: no position was pressed twice, or its repeats are equal, and the setup states no noise"
     )]
     NoNoise {
         /// Which channel, from 1.

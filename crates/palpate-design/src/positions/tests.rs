@@ -318,7 +318,7 @@ fn a_recording_that_tells_too_little_is_refused() {
     let (mut setup, recording) = begun(&[0.1, 0.2, 0.3, 0.35], 1);
     let perfect = |sensor: &mut Sensor| sensor.channel = ChannelModel::default();
     setup.edit_sensors(|sensors| sensors.iter_mut().for_each(perfect)).unwrap();
-    assert!(refused(&setup, &recording).contains("how noisy channel 1 is"));
+    assert!(refused(&setup, &recording).contains("the noise of channel 1 is unknown"));
     setup.edit_sensors(|sensors| drop(sensors.pop())).unwrap();
     assert!(refused(&setup, &recording).contains("8 channels; the setup has 7"));
     assert_eq!(setup.layout().kinds()[0], SensorKind::Deflection);
@@ -344,7 +344,7 @@ fn presses_that_do_not_tell_places_apart_are_refused() {
     let (setup, near) = begun(&[0.2, 0.201, 0.202, 0.203], 3);
     let error = refused(&setup, &near);
     assert!(matches!(error, PositionError::SmallPart { axis: 'x', .. }), "{error}");
-    assert!(error.to_string().contains("over 3.0 mm of 400.0 mm"), "{error}");
+    assert!(error.to_string().contains("cover 3.0 mm of 400.0 mm"), "{error}");
     // Noise alone, in three draws.
     for seed in 0..3 {
         let positions: Vec<Position> = TEN_M.map(Position::along).to_vec();

@@ -334,20 +334,20 @@ pub enum DesignError {
     Layout(#[from] LayoutError),
     /// A kind without noise.
     #[error(
-        "{kind} sensors have no noise and no resolution; one of them must be greater than 0, or the limit is 0 wherever they sit"
+        "{kind} sensors have no noise and no resolution; one of them must be greater than 0, otherwise the limit is 0 for every layout"
     )]
     SingularNoise {
         /// Quantity that the sensors measure.
         kind: SensorKind,
     },
     /// All contacts are over supports.
-    #[error("all {contacts} contacts are over supports, where no layout tells a force that is not known")]
+    #[error("all {contacts} contacts are over supports, where an unknown force is unidentifiable")]
     OverSupports {
         /// Number of contacts.
         contacts: usize,
     },
     /// Fewer sites than sensors.
-    #[error("{count} sensors are wanted, but only {sites} sites can hold one")]
+    #[error("{count} sensors are requested, but only {sites} sites are available")]
     TooFewSites {
         /// Requested number of sensors.
         count: usize,
@@ -387,7 +387,7 @@ pub enum DesignError {
         least: f64,
     },
     /// `must_have` has more sensors than the layout.
-    #[error("`must_have` lists {listed} sensors{}, but only {count} are wanted", if *mirrored { " with their mirror images" } else { "" })]
+    #[error("`must_have` lists {listed} sensors{}, but only {count} are requested", if *mirrored { " with their mirror images" } else { "" })]
     TooManyMustHaves {
         /// Number of listed sensors.
         listed: usize,
@@ -397,7 +397,7 @@ pub enum DesignError {
         mirrored: bool,
     },
     /// A fixed sensor at a position where it would always read 0.
-    #[error("the {kind} sensor of {list} at {} would read nothing there", extent.place_in_words(*position))]
+    #[error("the {kind} sensor of {list} at {} would always read 0 there", extent.place_in_words(*position))]
     MustHaveReadsNothing {
         /// The list that contains it.
         list: FixedList,
@@ -435,7 +435,7 @@ pub enum DesignError {
         extent: Extent,
     },
     /// A fixed sensor with a mirror image where no sensor can be.
-    #[error("symmetry is wanted, but the mirror image of the {kind} sensor of {list} at {} is no place for one", extent.place_in_words(*position))]
+    #[error("symmetry is requested, but the mirror image of the {kind} sensor of {list} at {} is not a possible position", extent.place_in_words(*position))]
     MustHaveWithoutTwin {
         /// The list that contains it.
         list: FixedList,
@@ -458,7 +458,7 @@ pub enum DesignError {
     },
     /// Too few sites have their mirror image among the sites.
     #[error(
-        "symmetry is wanted, but {count} sensors cannot be placed symmetrically: {pairs} pairs of sites mirror each other, {middle} sites lie in the middle"
+        "symmetry is requested, but {count} sensors cannot be placed symmetrically: {pairs} pairs of sites mirror each other, {middle} sites lie in the middle"
     )]
     Symmetry {
         /// Requested number of sensors.
@@ -475,7 +475,7 @@ pub enum DesignError {
         method: &'static str,
     },
     /// More candidates and contacts than fit into memory.
-    #[error("{sites} candidate sites and {contacts} contacts need {:.1} GB; at most {:.1} GB can be held", bytes / 1e9, most / 1e9)]
+    #[error("{sites} candidate sites and {contacts} contacts need {:.1} GB; at most {:.1} GB can be used", bytes / 1e9, most / 1e9)]
     TooLarge {
         /// Number of candidates.
         sites: usize,

@@ -108,7 +108,7 @@ impl Sensitivity<'_> {
             self.fill_row(&mut rows[i], response, sensors[i].channel);
             Ok(())
         });
-        debug_assert_eq!(filled, Ok(()), "nobody watches");
+        debug_assert_eq!(filled, Ok(()), "the watch does not stop it");
         rows
     }
 

@@ -120,8 +120,8 @@ fn lines_and_planes_are_not_mixed_up() {
     insta::assert_snapshot!(messages.join("\n"), @r"
     a grid of 3 × 2 training positions needs a plane; this surface is a line
     6 training positions are listed, but their count is given as 7
-    6 training positions on a line do not say where they are on a plane; a plane needs a grid
-    10 training positions on a line do not say where they are on a plane; a plane needs a grid
+    6 training positions along a line do not define positions on a plane; a plane needs a grid
+    10 training positions along a line do not define positions on a plane; a plane needs a grid
     training position 1 is at 100 mm, 250 mm, off the surface; it must be within 0 and 300 mm along, 0 and 200 mm across
     training position 1 is at 100 mm, 250 mm, off the surface; it must be within 0 and 400 mm
     ");

@@ -154,7 +154,7 @@ fn the_first_bad_reading_is_named_whatever_the_number_of_threads() {
 fn values_that_make_no_whole_readings_are_refused() {
     let (locator, _) = several_blocks();
     let error = locator.locate_batch(&[0.0; 15]).unwrap_err();
-    assert_eq!(error.to_string(), "15 values are no whole number of readings; the locator has 8 channels");
+    assert_eq!(error.to_string(), "expected a multiple of 8 values, found 15");
     assert_eq!(locator.locate_batch(&[]).unwrap(), []);
     locator.locate_blocks(&[], BatchOptions::default(), &|_, _| panic!("nothing was located")).unwrap();
 }

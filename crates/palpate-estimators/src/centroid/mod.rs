@@ -49,13 +49,13 @@ pub enum CentroidFitError {
     #[error(transparent)]
     Positions(#[from] TooFewPositions),
     /// All readings of the sensors of one kind are 0.
-    #[error("every {kind} reading of the recording is 0; a centroid weighs sensors by what they read")]
+    #[error("every {kind} reading of the recording is 0; a centroid weights sensors by their readings")]
     Silent {
         /// The kind.
         kind: SensorKind,
     },
     /// All sensors are at the same place, or all readings are alike.
-    #[error("the centroids of the recording do not tell its positions apart: {0}")]
+    #[error("the centroids of the recording do not distinguish its positions: {0}")]
     Alike(#[from] NotPositiveDefinite),
     /// The recording's channels are not the setup's.
     #[error(transparent)]

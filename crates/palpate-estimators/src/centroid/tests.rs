@@ -114,7 +114,7 @@ fn what_does_not_calibrate_is_named() {
     let silent = rows.iter().map(|row| Row { reading: vec![0.0; 2], ..row.clone() }).collect();
     assert_eq!(
         message(&setup, silent),
-        "every reaction reading of the recording is 0; a centroid weighs sensors by what they read"
+        "every reaction reading of the recording is 0; a centroid weights sensors by their readings"
     );
     setup.set_dead(0, true);
     assert_eq!(

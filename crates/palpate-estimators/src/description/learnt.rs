@@ -91,14 +91,14 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     }
     if let Some(Scatter { force_n, sd }) = linear.scatter() {
         lines.push(format!(
-            "scatter of the presses that grows with the force, beside the noise: at {force_n:.2} N, {}; presses are weighed by it",
+            "scatter of the presses that grows with the force, beside the noise: at {force_n:.2} N, {}; presses are weighted by it",
             by_channel(&sd)
         ));
     }
     if let Some([(least, quiet), (most, noisy)]) = linear.noise_by_place() {
         let place = |position: Position| linear.extent().place_in_words(position);
         lines.push(format!(
-            "noise of touches by place, over that of the untouched board: {least:.1} times at {} to {most:.1} times at {}; presses and readings are weighed by it",
+            "noise of contacts by position, over that of the untouched surface: {least:.1} times at {} to {most:.1} times at {}; presses and readings are weighted by it",
             place(quiet),
             place(noisy)
         ));
@@ -108,13 +108,13 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     }
     if !linear.tells_untouched() {
         lines.push(
-            "the offsets are open by what touches read: no reading is `no_contact`, before some rows are recorded untouched (force 0)"
+            "the offsets are undetermined by about the size of contact readings: no reading is `no_contact` unless some rows are recorded untouched (force 0)"
                 .to_owned(),
         );
     }
     if !linear.set_aside().is_empty() {
         lines.push(format!(
-            "set aside, as no function of the position explains them: {}",
+            "outliers, excluded because no function of the position explains them: {}",
             rows(linear.set_aside())
         ));
     }
@@ -125,7 +125,7 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
 pub fn noise_is_hardly_told(presses: usize) -> String {
     let presses = format_count(presses as u64);
     format!(
-        "{presses} presses, hardly any repeated: the noise is hardly told, and taken to be about a hundredth of what presses change; press one place three times, or leave rows untouched (force 0)"
+        "{presses} presses with too few repeats: the noise estimate is unreliable, about a hundredth of the change by a press; press one position three times, or record untouched rows (force 0)"
     )
 }
 
@@ -152,7 +152,7 @@ fn influences(linear: &ForceLinearLocator) -> String {
         Source::Deflection => "deflection",
     };
     let rest = smooth.map(|smooth| format!(", and {smooth}")).unwrap_or_default();
-    format!("those of sensors of {kind} at places that the presses tell, polynomials{rest}")
+    format!("those of {kind} sensors at positions estimated from the presses, polynomials{rest}")
 }
 
 #[cfg(test)]

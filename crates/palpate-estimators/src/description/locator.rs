@@ -35,11 +35,11 @@ pub fn locator(locator: &Locator) -> Vec<String> {
     lines.push(match locator.false_alarm_rate() {
         Some(rate) if locator.untouched_scatter.is_some() => {
             format!(
-                "untouched readings taken for a contact: {rate}, by noise and scatter of the untouched rows"
+                "false-alarm rate: {rate}, from noise and scatter of the untouched rows"
             )
         }
-        Some(rate) => format!("untouched readings taken for a contact: {rate}, by the noise of the channels"),
-        None => "untouched readings are not told from contacts: it does not know what the board reads then"
+        Some(rate) => format!("false-alarm rate: {rate}, from the noise of the channels"),
+        None => "untouched readings are not distinguished from contacts: the readings of the untouched surface are unknown"
             .to_owned(),
     });
     lines.extend(interval_check(locator.interval_check.as_ref()));
@@ -171,16 +171,14 @@ fn method(locator: &Locator) -> Vec<String> {
             gaussian.process.points(),
             gaussian.process.log_evidence()
         )],
-        Method::ClosedForm(_) => vec!["the beam's own equations; nothing was learnt".to_owned()],
-        Method::Digit(_) => vec!["the bending finger's own equations; nothing was learnt".to_owned()],
+        Method::ClosedForm(_) => vec!["the equations of the beam, without learnt parameters".to_owned()],
+        Method::Digit(_) => vec!["the equations of the bending finger, without learnt parameters".to_owned()],
         Method::Neighbours(neighbours) => {
             vec![format!("the {} nearest of {} presses", neighbours.count, neighbours.rows.len())]
         }
         Method::Centroid(centroid) => vec![match centroid.weighing {
             Weighing::Positions(_) => "the centroid of the sensors' positions, calibrated".to_owned(),
-            Weighing::Channels => {
-                "the centroid of the channels, whose positions calibration finds".to_owned()
-            }
+            Weighing::Channels => "the centroid of the channels at calibrated positions".to_owned(),
         }],
     }
 }
@@ -190,10 +188,10 @@ fn free(measured: &MeasuredLocator) -> String {
     let counts = [table.x.count, table.y.count, table.nuisance.count];
     let nodes: Vec<String> = counts.iter().filter(|count| **count > 1).map(usize::to_string).collect();
     let (nuisance, why) = match measured.role() {
-        NuisanceRole::None => ("", "nothing else was recorded that they depend on, or the rig asks for it"),
+        NuisanceRole::None => ("", "no other quantity was recorded, or the rig requests it"),
         NuisanceRole::Force => (
             " and force",
-            "they are no multiple of a function of the force, as far as the presses tell, or the rig asks for it",
+            "the presses show that they are not a multiple of a function of the force, or the rig requests it",
         ),
         NuisanceRole::Other => (" and the nuisance coordinate", "the rig names a nuisance column"),
     };

@@ -84,7 +84,7 @@ pub enum DigitFitError {
     },
     /// A gauge without noise.
     #[error(
-        "gauge {gauge} has neither noise nor resolution; the digit estimator weighs gauges by their noise: give `noise` in [sensors]"
+        "gauge {gauge} has neither noise nor resolution; the digit estimator weights gauges by their noise: give `noise` in [sensors]"
     )]
     NoNoise {
         /// Number of the gauge, from 1.
@@ -309,7 +309,7 @@ impl Locate for DigitLocator {
         LocatorFault::check_count("gauges", setup.layout().len(), self.layout.len())?;
         check_offsets(&self.offsets, self.layout.len())?;
         let others = self.layout.kinds().into_iter().filter(|kind| *kind != SensorKind::Strain).count();
-        LocatorFault::check_count("sensors that are no gauges", 0, others)?;
+        LocatorFault::check_count("sensors other than gauges", 0, others)?;
         let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);
         let on_digit = |x: f64| self.digit.contains(Position::along(x));
         LocatorFault::check_numbers("gauge position", places, on_digit, "on the digit")?;

@@ -26,7 +26,7 @@ pub struct MemoryLimit {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MemoryLimitError {
     /// The text is not a number with a unit.
-    #[error("`{0}` is no size of memory; it is written as in \"2 GB\" or \"500 MB\"")]
+    #[error("`{0}` is not a size of memory; write it as in \"2 GB\" or \"500 MB\"")]
     Text(String),
     /// A size that is not greater than 0 and finite.
     #[error("{0} bytes of memory; it must be greater than 0, and finite")]

@@ -71,7 +71,7 @@ macro_rules! estimators {
         /// The methods that can locate.
         #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(rename_all = "kebab-case")]
-        #[expect(clippy::large_enum_variant, reason = "a program holds one locator, or a few")]
+        #[expect(clippy::large_enum_variant, reason = "a program has one locator, or a few")]
         pub enum Method {
             $($(#[doc = $doc])* #[doc = concat!("(`", $kind, "`).")] $variant($method),)*
         }
@@ -378,7 +378,7 @@ where
 /// A locator without an untouched reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "a locator of kind `{kind}`, fitted to a recording without rows of force 0, does not know what its surface reads untouched"
+    "a locator of kind `{kind}` has no reading of the untouched surface: its recording has no rows of force 0"
 )]
 pub struct NoBaseline {
     /// The locator's kind.
@@ -389,7 +389,7 @@ pub struct NoBaseline {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LeaveOutError {
     /// The channel does not exist.
-    #[error("there is no channel {channel}; the locator has channels 1 to {channels}")]
+    #[error("channel {channel} does not exist; the locator has channels 1 to {channels}")]
     NoChannel {
         /// Number of the named channel, from 1.
         channel: usize,
@@ -674,7 +674,7 @@ pub enum NotTrackable {
     },
     /// The first mode of its surface is not known.
     #[error(
-        "inertia is reckoned with on a beam on two simple supports, whose first mode is half a sine; this surface is held otherwise: follow it in balance, without a natural frequency"
+        "inertia is modelled only for a beam on two simple supports; this surface has other supports: track it without a natural frequency"
     )]
     Mode,
 }

@@ -59,7 +59,7 @@ impl Estimator {
 }
 
 fn false_alarms(rate: FalseAlarmRate) -> Setting {
-    Setting::new("false_alarm_rate", "untouched readings taken for a contact", rate.to_string())
+    Setting::new("false_alarm_rate", "false-alarm rate", rate.to_string())
 }
 
 fn nodes(hidden: &[usize]) -> String {
@@ -74,7 +74,7 @@ fn influence(config: Influence) -> Vec<Setting> {
     };
     let force = match config.force_sd_n {
         Some(sd_n) => format!("about the bench's, ± {sd_n} N (1 σ)"),
-        None => "as the bench says: known, or unknown".to_owned(),
+        None => "known or unknown, as in the setup".to_owned(),
     };
     vec![
         Setting::new("source", "influence functions from", source),

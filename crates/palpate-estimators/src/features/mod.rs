@@ -47,7 +47,7 @@ impl FeatureKind {
 
 /// A recording with constant readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("none of the recording's {channels} channels varies over its {rows} rows; at least 1 must")]
+#[error("all {channels} channels of the recording are constant over its {rows} rows; at least 1 must vary")]
 pub struct NoFeatures {
     /// Channels of the recording.
     pub channels: usize,

@@ -148,9 +148,7 @@ pub enum InfluenceFitError {
         what: &'static str,
     },
     /// A setting that only a surface without a model has.
-    #[error(
-        "the surface has a model, whose readings are linear in the force; {what} is for `measured` surfaces"
-    )]
+    #[error("the surface has a model with readings linear in the force; {what} is for `measured` surfaces")]
     OnlyOnMeasured {
         /// The setting.
         what: &'static str,
@@ -195,7 +193,7 @@ pub enum InfluenceFitError {
         sensors: usize,
     },
     /// Presses that contradict each other so exactly that they cannot be weighed.
-    #[error("the presses of sensor {sensor} cannot be weighed against each other: {problem}")]
+    #[error("the presses of sensor {sensor} cannot be weighted: {problem}")]
     Singular {
         /// Which, from 1.
         sensor: usize,

@@ -145,7 +145,7 @@ impl Influence {
         match self {
             Self { source: InfluenceSource::Mechanics, .. } => Err(InfluenceFitError::NoModel),
             Self { contacts: 2.., .. } => {
-                Err(InfluenceFitError::NotOnMeasured { what: "telling several contacts apart" })
+                Err(InfluenceFitError::NotOnMeasured { what: "locating several contacts" })
             }
             Self { force_sd_n: Some(_), .. } => Err(InfluenceFitError::NotOnMeasured { what: "`force_sd`" }),
             _ => Ok(()),

@@ -88,7 +88,7 @@ fn patches_are_held_wherever_they_lie() {
     let readings = fixtures::readings(30);
     for two in [false, true] {
         println!(
-            "| centre | patches told | force held | bounded | centre held | centre of pressure | total |"
+            "| centre | patches estimated | force covered | bounded | centre covered | centre of pressure | total |"
         );
         println!("|---|---|---|---|---|---|---|");
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);

@@ -81,7 +81,7 @@ pub fn train_one(
     let mut queue = SeedList::new([seed]);
     run_loops(Training::<true> { precision, task, queue: &mut queue, watch })?;
     let trained = queue.into_results().pop();
-    Ok(trained.expect("a queue that nobody stops is trained to its end").1)
+    Ok(trained.expect("an unwatched queue is trained to its end").1)
 }
 
 /// Training of networks: one after the other where they are `ALONE`, as a single network trains faster without idle lanes; else side by side, one a

@@ -46,14 +46,14 @@ pub enum CsvProblem {
     #[error("the file is empty; a recording has at least 1 row")]
     Empty,
     /// The file has a header but no rows below it.
-    #[error("there are 0 rows below the header; a recording has at least 1")]
+    #[error("a recording has at least 1 row below the header, found 0")]
     NoRows,
     /// The text is neither UTF-8 nor Windows-1252.
-    #[error("the bytes are no text in UTF-8 or Windows-1252; save the file as CSV in UTF-8")]
+    #[error("the bytes are not text in UTF-8 or Windows-1252; save the file as CSV in UTF-8")]
     NotText,
     /// The first line contains several separators, and more than one of them gives the columns.
     #[error(
-        "fields may be separated by {first} or by {second}; say which as `separator` in [recording], \"comma\", \"semicolon\", \"tab\", \"pipe\" or \"blanks\""
+        "fields may be separated by {first} or by {second}; set `separator` in [recording] to \"comma\", \"semicolon\", \"tab\", \"pipe\" or \"blanks\""
     )]
     ManySeparators {
         /// A separator that gives the columns.
@@ -65,7 +65,11 @@ pub enum CsvProblem {
     #[error("a quoted field does not end on this line")]
     OpenQuote,
     /// The header lacks a column.
-    #[error("there is no column `{wanted}`; there are {}{}", list(present), advice_on_header(present))]
+    #[error(
+        "column `{wanted}` does not exist; the columns are {}{}",
+        list(present),
+        advice_on_header(present)
+    )]
     MissingColumn {
         /// The requested name.
         wanted: String,
@@ -73,7 +77,7 @@ pub enum CsvProblem {
         present: Vec<String>,
     },
     /// A column number is 0 or beyond the last column.
-    #[error("there is no column number {wanted}; columns are numbered from 1 to {count}")]
+    #[error("column number {wanted} does not exist; columns are numbered from 1 to {count}")]
     NoSuchColumn {
         /// The requested number.
         wanted: usize,
@@ -135,7 +139,7 @@ pub enum CsvProblem {
     },
     /// A number that is ambiguous between a whole number with a separator of thousands and a number with a decimal comma.
     #[error(
-        "`{text}` may be {} or {}; say `decimal = \"comma\"` in [recording] for the second, or write it without the comma for the first",
+        "`{text}` may be {} or {}; set `decimal = \"comma\"` in [recording] for the second, or write it without the comma for the first",
         text.replace(',', ""),
         text.replace(',', ".")
     )]
@@ -145,7 +149,7 @@ pub enum CsvProblem {
     },
     /// Numbers of a column that are plausible both with a decimal mark and with separators of thousands.
     #[error(
-        "`{text}` beside `{beside}` may be {} or {}; write all numbers without thousands marks for the first, or say \
+        "`{text}` beside `{beside}` may be {} or {}; write all numbers without thousands marks for the first, or set \
          `decimal = \"{}\"` in [recording] for the second",
         text.replace([',', '.'], ""),
         text.replace(',', "."),
@@ -185,7 +189,7 @@ pub enum CsvProblem {
     },
     /// A heading contains another unit than the one in which its column is read.
     #[error(
-        "the header says `{said}`, but the column is read in {read_as}; say the unit as `{key}`, or correct the header"
+        "the header has the unit `{said}`, but the column is read in {read_as}; set `{key}`, or correct the header"
     )]
     OtherUnit {
         /// The unit in the header.
@@ -211,7 +215,7 @@ pub enum CsvProblem {
     },
     /// A field of the column that marks untouched rows is neither a yes nor a no.
     #[error(
-        "`{text}` does not say whether the row is untouched; write 1, true or yes where it is, and 0, false, no or nothing where it is not"
+        "`{text}` does not mark whether the row is untouched; write 1, true or yes in an untouched row, and 0, false, no or an empty field in others"
     )]
     NotAMark {
         /// The field.
@@ -219,7 +223,7 @@ pub enum CsvProblem {
     },
     /// Untouched times are given, but the rows of the file have no time.
     #[error(
-        "`untouched_times` says when nothing touched, but the rows have no time; name its column as `time` in [recording]"
+        "`untouched_times` needs the times of the rows, which are missing; name their column as `time` in [recording]"
     )]
     NoTimes,
     /// No row has a time within an untouched span.
@@ -272,7 +276,7 @@ pub enum CsvProblem {
         extent: Extent,
     },
     /// The numbers of readings and contacts differ.
-    #[error("there are {readings} readings but {contacts} contacts; row by row they must pair")]
+    #[error("found {readings} readings and {contacts} contacts; their numbers must be equal")]
     RowsDiffer {
         /// Rows of the readings' file.
         readings: usize,

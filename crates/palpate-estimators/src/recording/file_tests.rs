@@ -179,7 +179,7 @@ fn a_stream_finds_its_heading_and_loses_no_line_in_silence() {
     let mut parser = ReadingParser::new("stdin", &titled());
     assert_eq!(parser.parse_line(b"S1,S2,S3,S5").unwrap(), None);
     let error = parser.parse_line(b"1,2,3,4").unwrap_err().to_string();
-    assert!(error.starts_with("stdin:1: there is no column `S4`"), "{error}");
+    assert!(error.starts_with("stdin:1: column `S4` does not exist"), "{error}");
     assert!(parser.progress().awaits_columns());
 
     let mut parser = ReadingParser::new("stdin", &titled());

@@ -399,10 +399,7 @@ mod tests {
             Some("t.csv:1: fields may be separated by commas or by semicolons")
         );
         assert_eq!(refused("a;b\n1;2;3\n"), "t.csv:2: the row has 3 fields; it must have 2");
-        assert_eq!(
-            refused("a;b\n;\n"),
-            "t.csv: there are 0 rows below the header; a recording has at least 1"
-        );
+        assert_eq!(refused("a;b\n;\n"), "t.csv: a recording has at least 1 row below the header, found 0");
         assert!(refused("a,b\n1,\"1,234\"\n").starts_with(doubtful));
         assert_eq!(refused("\n#\n"), "t.csv: the file is empty; a recording has at least 1 row");
     }

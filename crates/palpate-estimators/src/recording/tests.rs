@@ -89,7 +89,7 @@ fn rows_have_times_where_a_column_tells_them() {
     assert_eq!(times(&columns, "X;Pl;Pr;F;Zeit [ms]\n10;1;2;3;2,5\n").unwrap(), Some(vec![0.0025]));
 
     let missing = times(&foreign().time("Zeit"), "X,Pl,Pr,F\n10,1,2,3\n").unwrap_err().to_string();
-    assert_eq!(missing, "bench.csv:1: there is no column `Zeit`; there are `X`, `Pl`, `Pr`, `F`");
+    assert_eq!(missing, "bench.csv:1: column `Zeit` does not exist; the columns are `X`, `Pl`, `Pr`, `F`");
     let headless = times(&foreign(), "10,1,2.5,3\n12,1,2,3\n").unwrap_err().to_string();
     assert!(headless.contains("`2.5`, `3`: numbers; where no line names the columns"), "{headless}");
     let other = times(&foreign().time("Zeit"), "X,Pl,Pr,F,Zeit\n10,1,2,3,14:03:25\n11,1,2,3,4\n");
@@ -246,7 +246,7 @@ fn readings_and_contacts_in_two_files_without_headers_pair_row_by_row() {
     assert_eq!(recording.rows[1].contact().map(|contact| contact.force_n), Some(2.0));
     assert_eq!(recording.provenance.digests.len(), 2);
     let message = pair("1.0,10,20,0\n").unwrap_err().to_string();
-    assert_eq!(message, "c.csv: there are 2 readings but 1 contacts; row by row they must pair");
+    assert_eq!(message, "c.csv: found 2 readings and 1 contacts; their numbers must be equal");
 }
 
 #[test]

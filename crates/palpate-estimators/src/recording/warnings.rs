@@ -492,7 +492,7 @@ impl fmt::Display for Warning {
                 )
             }
             Self::NoPositiveForce { least_n: 0.0 } => f.write_str(
-                "the force is 0 in every row, so nothing touches: name another column as `force`, or none where no force was measured",
+                "the force is 0 in every row, so no row has a contact: name another column as `force`, or none if no force was measured",
             ),
             Self::NoPositiveForce { least_n } => write!(
                 f,

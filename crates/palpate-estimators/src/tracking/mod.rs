@@ -148,7 +148,7 @@ pub struct Across {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TrackError {
     /// The time is not later than that of the reading before.
-    #[error("the reading is of {time_s} s; it must be later than the one before, of {before_s} s")]
+    #[error("the reading is of {time_s} s; it must be later than the previous one, of {before_s} s")]
     Time {
         /// Time, in seconds.
         time_s: f64,

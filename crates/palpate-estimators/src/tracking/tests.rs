@@ -252,7 +252,7 @@ fn readings_out_of_order_are_refused_and_change_nothing() {
         assert!(one.follow(time_s, &reading).is_err());
     }
     let told = one.follow(0.5, &reading).unwrap_err().to_string();
-    assert_eq!(told, "the reading is of 0.5 s; it must be later than the one before, of 1 s");
+    assert_eq!(told, "the reading is of 0.5 s; it must be later than the previous one, of 1 s");
     assert_eq!(one.follow(2.0, &reading), other.follow(2.0, &reading));
 }
 

@@ -69,7 +69,7 @@ impl Assessment {
                     });
                 }
                 Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
-                Err(error) => own.remarks.push(format!("no error at positions held out: {error}")),
+                Err(error) => own.remarks.push(format!("no error at held-out positions: {error}")),
             }
         }
         let design = rig.training.as_ref().map_or_else(PositionDesign::default, PositionDesign::for_training);

@@ -248,7 +248,7 @@ impl Guide {
                 ))
             }
             Waiting::Release => Some(format!(
-                "the reading is still at {:.0} % of the press; if nothing touches, take this reading as untouched",
+                "the reading is still at {:.0} % of the press; if the surface is untouched, take this reading as untouched",
                 100.0 * size / baseline.size_of(&self.pressed).max(1.0)
             )),
             Waiting::Untouched | Waiting::Nothing => None,

@@ -48,9 +48,7 @@ impl JournalError {
     /// The remedy.
     pub fn help(&self) -> &'static str {
         match self {
-            Self::Nuisance { .. } => {
-                "leave `nuisance` out of [recording], or record with a program of your own"
-            }
+            Self::Nuisance { .. } => "remove `nuisance` from [recording], or record with another program",
             Self::Numbered => "name the channels of [recording] instead of counting them",
             Self::Write { .. } => "make room, or name another file",
         }

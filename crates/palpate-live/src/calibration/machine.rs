@@ -48,7 +48,7 @@ pub enum MachineError {
     #[error("the machine was stopped by hand")]
     ByHand,
     /// No page is connected.
-    #[error("nobody has watched the machine for {seconds} s: its finger was lifted")]
+    #[error("no page has been open for {seconds} s: the machine lifted its finger")]
     Unwatched {
         /// Seconds without an open page.
         seconds: u64,
@@ -59,7 +59,7 @@ pub enum MachineError {
     )]
     Unseen,
     /// The surface does not come to rest.
-    #[error("the untouched readings have not come to rest within {} s", RELEASED_WITHIN.as_secs())]
+    #[error("the untouched readings have not settled within {} s", RELEASED_WITHIN.as_secs())]
     NoRest,
 }
 
@@ -67,27 +67,29 @@ impl MachineError {
     /// The remedy.
     pub fn help(&self) -> &'static str {
         match self {
-            Self::Stage(StageError::Line(_)) => "see that it is on, and at this port",
+            Self::Stage(StageError::Line(_)) => "check that it is on, and at this port",
             Self::Stage(StageError::Doubt { doubt: Doubt::OffPosition { .. }, .. }) => {
-                "see that `origin`, `touch` and `depths` of [stage] are within its travel; then reset it"
+                "check that `origin`, `touch` and `depths` of [stage] are within its travel; then reset it"
             }
             Self::Stage(StageError::Doubt { finger: Finger::Unmoved, .. }) => {
-                "reset it, and see that no other program uses its port"
+                "reset it, and check that no other program uses its port"
             }
             Self::Stage(StageError::Doubt { .. }) => {
-                "see its own display, and that its way is free; then reset it"
+                "check its display, and that its path is free; then reset it"
             }
             Self::Stage(StageError::Unknown { .. }) => "give the baud rate of its firmware",
-            Self::Stage(StageError::OutOfRange(_) | StageError::NoResetLine) => "mend [stage] of the rig",
+            Self::Stage(StageError::OutOfRange(_) | StageError::NoResetLine) => "correct [stage] of the rig",
             Self::Stage(StageError::Stopped | StageError::NotHomed) | Self::ByHand => {
-                "reset it, as by its button, before it goes on"
+                "reset it, for example by its button, then continue"
             }
             Self::Saturated { .. } => "reset it, and press less deep: `depths` of [stage]",
             Self::Overload { .. } => "reset it, and press less deep, or raise `force_limit` of [stage]",
-            Self::Silent => "see to the board that sends the readings; then reset the machine",
+            Self::Silent => "check the board that sends the readings; then reset the machine",
             Self::Unwatched { .. } => "keep a page open while it presses",
             Self::Unseen => "jog the finger to the untouched surface, and write its z as `touch`",
-            Self::NoRest => "see that nothing else touches or shakes the surface",
+            Self::NoRest => {
+                "make sure that only the finger touches the surface and that the surface does not shake"
+            }
         }
     }
 }

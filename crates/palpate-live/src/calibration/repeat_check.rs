@@ -40,7 +40,7 @@ impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Drift => write!(f, "the reading drifted; no press was seen"),
-            Self::Grew => write!(f, "the press grew after its reading was taken"),
+            Self::Grew => write!(f, "the press grew after its reading was recorded"),
             Self::Light { percent } => {
                 write!(f, "the touch has only {percent:.1} % of an earlier press")
             }

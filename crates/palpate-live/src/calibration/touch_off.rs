@@ -36,7 +36,7 @@ pub enum TouchOffFailure {
     },
     /// The untouched reading does not come to rest.
     #[error(
-        "the untouched readings have not come to rest within {} s: keep the surface free of other contacts",
+        "the untouched readings have not settled within {} s: keep the surface free of other contacts",
         SETTLES_WITHIN.as_secs()
     )]
     NoRest,

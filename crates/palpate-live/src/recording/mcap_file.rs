@@ -199,7 +199,7 @@ impl McapFile {
             })
         })?;
         self.head = Head::from_metadata(&metadata)
-            .ok_or_else(|| lacks("its metadata do not say its channels and how readings were located"))?;
+            .ok_or_else(|| lacks("its metadata lack its channels or how readings were located"))?;
         Ok(())
     }
 
@@ -406,7 +406,7 @@ fn open_regular(path: &Path) -> std::io::Result<(File, u64)> {
     if found.is_file() {
         Ok((file, found.len()))
     } else {
-        Err(std::io::Error::other("it is no regular file"))
+        Err(std::io::Error::other("it is not a regular file"))
     }
 }
 

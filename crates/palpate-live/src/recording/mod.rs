@@ -52,21 +52,21 @@ pub enum RecordingError {
         error: std::io::Error,
     },
     /// The file exists already, and is not overwritten.
-    #[error("cannot record into {path}: it is there already; name another file")]
+    #[error("cannot record into {path}: it exists already; name another file")]
     Exists {
         /// The file.
         path: String,
     },
     /// A name that a recording cannot have.
     #[error(
-        "`{name}` is no name of a recording: at most 100 letters, digits, dots, dashes and underscores, of which a dot is not the first"
+        "`{name}` is not a name of a recording: use at most 100 letters, digits, dots, dashes and underscores, and do not start with a dot"
     )]
     Name {
         /// The name.
         name: String,
     },
     /// A link, a pipe, a device or a folder has the name of a recording.
-    #[error("{path} is no regular file")]
+    #[error("{path} is not a regular file")]
     NotRegular {
         /// The file.
         path: String,
@@ -78,13 +78,13 @@ pub enum RecordingError {
         name: String,
     },
     /// The file is not MCAP.
-    #[error("{path} is no MCAP file")]
+    #[error("{path} is not an MCAP file")]
     NotMcap {
         /// The file.
         path: String,
     },
     /// The file is MCAP, but not a recording of palpate.
-    #[error("{path} is no recording of palpate: {lacks}")]
+    #[error("{path} is not a recording of palpate: {lacks}")]
     NotOurs {
         /// The file.
         path: String,

@@ -290,7 +290,7 @@ impl<'a> Recording<'a> {
             self.look_at = now + LOOK_EVERY;
             if !self.tail.is_there() {
                 self.health = Health::Gone;
-                return self.trouble("its file was taken away; the recording has ended");
+                return self.trouble("its file was removed; the recording has ended");
             }
         } else if self.health == Health::Full {
             return;

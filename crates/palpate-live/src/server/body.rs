@@ -62,7 +62,7 @@ async fn whole_body<S: Send + Sync>(request: Request, state: &S) -> Result<Bytes
         return Err(Refusal::new(
             StatusCode::REQUEST_TIMEOUT,
             error,
-            "send as many bytes as Content-Length says",
+            "send as many bytes as Content-Length states",
         ));
     };
     connection.note_whole_request();
@@ -82,12 +82,12 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
         let bytes = whole_body(request, state).await?;
         let refused = |error: String| {
-            Refusal::new(StatusCode::BAD_REQUEST, error, "docs/reference/server.md says what the body is")
+            Refusal::new(StatusCode::BAD_REQUEST, error, "docs/reference/server.md describes the body")
         };
         let body = serde_json::from_slice(&bytes).map_err(|error| refused(error.to_string()))?;
         // serde would read a list of the values as the struct.
         if bytes.trim_ascii_start().first() != Some(&b'{') {
-            return Err(refused("the body is no JSON object".to_owned()));
+            return Err(refused("the body is not a JSON object".to_owned()));
         }
         Ok(Self(body))
     }

@@ -28,7 +28,7 @@ pub enum BringUpError {
         from: String,
     },
     /// The port does not exist.
-    #[error("there is no serial port {port}")]
+    #[error("serial port {port} does not exist")]
     NoPort {
         /// Name.
         port: String,

@@ -90,13 +90,13 @@ impl CalibrationPlan {
 #[derive(Debug, thiserror::Error)]
 pub enum CalibratorError {
     /// The calibration is running already.
-    #[error("the calibration goes on already")]
+    #[error("the calibration runs already")]
     GoesOn,
     /// The calibration has not begun, or has ended.
     #[error("the calibration has not begun, or has ended")]
     NotBegun,
     /// A machine presses, so that presses cannot be taken back or left out by hand.
-    #[error("a machine presses: it takes no press back and leaves none out by hand, and is to end first")]
+    #[error("a machine presses: end it first, then remove or skip presses by hand")]
     MachinePresses,
     /// No machine runs that could be stopped.
     #[error("no machine runs")]
@@ -108,10 +108,10 @@ pub enum CalibratorError {
     #[error("a jog moves one axis by at most {} mm, and not by 0", LONGEST_JOG_M * 1e3)]
     Jog,
     /// No press was taken that could be fitted, or taken back.
-    #[error("no press was taken yet")]
+    #[error("no press is recorded yet")]
     NoPress,
     /// The press to be struck out does not exist.
-    #[error("there is no press {press}; {presses} were taken")]
+    #[error("press {press} does not exist; {presses} were recorded")]
     NoSuchPress {
         /// Number, from 1.
         press: usize,

@@ -34,14 +34,14 @@ const HEADERS: [(HeaderName, &str); 5] = [
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AccessError {
     /// The address is reachable from other machines, and the token is missing.
-    #[error("{address} can be reached from other machines, and there is no token")]
+    #[error("{address} can be reached from other machines, but no token is set")]
     NoToken {
         /// The address.
         address: IpAddr,
     },
     /// The token is too short, or contains other characters.
     #[error(
-        "the token has {length} characters; it must have at least {SHORTEST_TOKEN}, of which each is a letter, a digit, `-`, `.`, `_` or `~`"
+        "the token has {length} characters; it must have at least {SHORTEST_TOKEN}, each a letter, a digit, `-`, `.`, `_` or `~`"
     )]
     Token {
         /// Length.

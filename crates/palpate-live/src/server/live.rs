@@ -76,7 +76,7 @@ struct Running {
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
     /// The calibration has not produced a locator yet.
-    #[error("there is no locator yet: the calibration has not ended")]
+    #[error("the locator does not exist yet: the calibration has not ended")]
     NoLocator,
     /// The server has no calibration.
     #[error("this server does not calibrate")]
@@ -85,13 +85,13 @@ pub enum LiveError {
     #[error(transparent)]
     Calibrator(#[from] CalibratorError),
     /// No session runs.
-    #[error("no session runs: there is no source, or it has ended")]
+    #[error("no session runs: the source is missing or has ended")]
     NoSession,
     /// The session cannot keep up with its source.
     #[error("the session is behind its source")]
     Behind,
     /// The server has no rig to simulate.
-    #[error("there is no simulated board: the server was started with a locator alone")]
+    #[error("the server has no simulated board: it was started with a locator alone")]
     NotSimulated,
     /// The source belongs to the calibration.
     #[error("this server calibrates, and its readings come from {from}")]
@@ -135,7 +135,7 @@ pub enum LiveError {
         error: std::io::Error,
     },
     /// Sessions are not recorded.
-    #[error("there is no folder for recordings")]
+    #[error("no folder for recordings is set")]
     NoFolder,
     /// A recording cannot be made or read.
     #[error(transparent)]

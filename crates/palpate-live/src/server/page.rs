@@ -19,13 +19,13 @@ pub async fn page(method: Method, uri: Uri) -> Response {
     let file = Dashboard::get(path);
     let is_there = file.is_some() || path == "index.html";
     if is_there && method != Method::GET && method != Method::HEAD {
-        let words = "a page can be got, and nothing else";
+        let words = "a page accepts only GET and HEAD";
         return (StatusCode::METHOD_NOT_ALLOWED, [(header::ALLOW, "GET, HEAD")], words).into_response();
     }
     match file {
         Some(file) => ([(header::CONTENT_TYPE, content_type(path))], file.data).into_response(),
         None if path == "index.html" => Html(include_str!("without_dashboard.html")).into_response(),
-        None => (StatusCode::NOT_FOUND, "there is no such page").into_response(),
+        None => (StatusCode::NOT_FOUND, "the page does not exist").into_response(),
     }
 }
 

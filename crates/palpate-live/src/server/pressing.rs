@@ -65,7 +65,7 @@ impl MachineRun {
             shared.problem = Some(format!("{error}: {}", error.help()));
         } else if left_out > 0 && shared.problem.is_none() {
             shared.problem = Some(format!(
-                "{left_out} presses were left out, which no reading showed or which did not come to rest: go on to try them again"
+                "{left_out} presses were excluded, because they changed no reading or did not settle: continue to try them again"
             ));
         }
     }

@@ -111,7 +111,7 @@ pub enum RigFormError {
     #[error("{0}")]
     Columns(#[from] SourceUrlError),
     /// A file exists already.
-    #[error("{path} is there already")]
+    #[error("{path} exists already")]
     Exists {
         /// The file.
         path: String,
@@ -288,7 +288,7 @@ fn check_numbers(form: &RigForm) -> Result<(), RigFormError> {
     if form.force_is_known && form.force_n.is_none() {
         return refuse(
             "force_n",
-            "contacts in use have the force of the presses, which is not said".to_owned(),
+            "contacts in use have the force of the presses, which is not given".to_owned(),
         );
     }
     check_sensor_places(form, &sides_mm)
@@ -399,7 +399,7 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
     if let Some(width_mm) = form.width_mm {
         line(format!("width = {}", mm(width_mm)));
     }
-    line("\n[sensors]\nmeasure = \"raw\"  # whatever the channels read: counts, volts".to_owned());
+    line("\n[sensors]\nmeasure = \"raw\"  # in the unit of the channels: counts, volts".to_owned());
     if let Some(places) = &form.sensor_places_mm {
         let used = places.iter().zip(&form.channels).filter(|(_, channel)| !channel.is_empty());
         let places: Vec<String> = used.map(|(place_mm, _)| point(place_mm)).collect();
@@ -427,7 +427,10 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
         line(format!("force = {force}  # of every press"));
     }
     if let Some(placement_mm) = form.placement_mm {
-        line(format!("placement = {}  # how far off the asked place a person presses", mm(placement_mm)));
+        line(format!(
+            "placement = {}  # standard deviation between requested and pressed position",
+            mm(placement_mm)
+        ));
     }
     line("\n[estimator]\nkind = \"influence\"".to_owned());
     Ok(text)

@@ -85,8 +85,9 @@ struct Mark {
 async fn mark(State(live): State<Arc<Live>>, JsonBody(Mark { text }): JsonBody<Mark>) -> Answer {
     let length = text.chars().count();
     if length == 0 || length > MOST_OF_A_MARK || text.chars().any(char::is_control) {
-        let error =
-            format!("a mark of {length} characters; it may have 1 to {MOST_OF_A_MARK}, none of control");
+        let error = format!(
+            "a mark has {length} characters; it must have 1 to {MOST_OF_A_MARK}, without control characters"
+        );
         return Err(Refusal::new(StatusCode::BAD_REQUEST, error, "write less, on one line"));
     }
     done(live.command(Command::Mark(text)))
@@ -302,12 +303,12 @@ fn refusal(error: &LiveError) -> Refusal {
         LiveError::Calibrator(CalibratorError::NoSuchPress { .. }) => {
             (StatusCode::BAD_REQUEST, "GET /api/calibration/presses lists them")
         }
-        LiveError::Calibrator(_) => (StatusCode::CONFLICT, "GET /api/calibration says how far it is"),
+        LiveError::Calibrator(_) => (StatusCode::CONFLICT, "GET /api/calibration reports its progress"),
         LiveError::NoSession => (StatusCode::CONFLICT, "choose a source first"),
         LiveError::Behind => (StatusCode::SERVICE_UNAVAILABLE, "try it again"),
         LiveError::Calibrates { .. } => (
             StatusCode::CONFLICT,
-            "start `palpate serve RIG --calibrate` with another --from URL, or leave --calibrate out",
+            "start `palpate serve RIG --calibrate` with another --from URL, or omit --calibrate",
         ),
         LiveError::NotSimulated => (StatusCode::CONFLICT, "start `palpate serve` with a rig"),
         LiveError::Source(_) | LiveError::Columns(_) | LiveError::Pace(_) | LiveError::OneWay(_) => {
@@ -326,13 +327,13 @@ fn refusal(error: &LiveError) -> Refusal {
         }
         LiveError::RigForm(RigFormError::Presses { .. }) => (StatusCode::CONFLICT, "choose another name"),
         LiveError::RigForm(RigFormError::Write { .. }) => {
-            (StatusCode::INTERNAL_SERVER_ERROR, "see that the folder takes files")
+            (StatusCode::INTERNAL_SERVER_ERROR, "check that the folder is writable")
         }
         LiveError::RigForm(_) => (StatusCode::BAD_REQUEST, "correct it and try again"),
         LiveError::AlarmFile { .. } => {
-            (StatusCode::INTERNAL_SERVER_ERROR, "see that the folder takes files; the alarms are as before")
+            (StatusCode::INTERNAL_SERVER_ERROR, "check that the folder is writable; the alarms are unchanged")
         }
-        LiveError::Rule(_) => (StatusCode::BAD_REQUEST, "docs/how-to/react-by-rules.md says what a rule has"),
+        LiveError::Rule(_) => (StatusCode::BAD_REQUEST, "docs/how-to/react-by-rules.md describes rules"),
         LiveError::Session(_) => (StatusCode::CONFLICT, "start `palpate serve` without --track"),
         LiveError::Thread(_) => (StatusCode::INTERNAL_SERVER_ERROR, "start palpate again"),
         LiveError::NoFolder => (StatusCode::CONFLICT, "start `palpate serve` with --record FOLDER"),
@@ -342,7 +343,7 @@ fn refusal(error: &LiveError) -> Refusal {
             (StatusCode::NOT_FOUND, "GET /api/recordings lists them")
         }
         LiveError::Recording(RecordingError::GoesOn { .. }) => {
-            (StatusCode::CONFLICT, "end the recording that goes on first")
+            (StatusCode::CONFLICT, "end the current recording first")
         }
         LiveError::Recording(_) => (StatusCode::BAD_REQUEST, "GET /api/recordings lists recordings"),
     };
@@ -447,13 +448,13 @@ async fn blocking<T: Send + 'static>(
 }
 
 async fn unknown() -> Refusal {
-    Refusal::new(StatusCode::NOT_FOUND, "there is no such request", "docs/reference/server.md lists them")
+    Refusal::new(StatusCode::NOT_FOUND, "the request does not exist", "docs/reference/server.md lists them")
 }
 
 /// A path that is there, asked by a method that it has not; those that it has are in the header `Allow`.
 async fn other_method(method: Method) -> Refusal {
-    let error = format!("{method} is no method of this request");
-    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, error, "docs/reference/server.md says GET or POST")
+    let error = format!("{method} is not a method of this request");
+    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, error, "docs/reference/server.md lists the methods")
 }
 
 /// The name of a recording in a path.

@@ -58,7 +58,7 @@ impl SessionInfo {
     /// The description of a bench without a locator.
     pub fn of_setup(setup: &Setup) -> Self {
         let known_n = setup.force_n();
-        let why = "there is no locator yet: the calibration has not ended";
+        let why = "the locator does not exist yet: the calibration has not ended";
         Self {
             version: env!("CARGO_PKG_VERSION"),
             locator: None,
@@ -84,7 +84,7 @@ impl SessionInfo {
             surface: None,
             channels: Vec::new(),
             force: json!({ "known_n": null, "unknown": true }),
-            tare: json!({ "available": false, "follows": false, "why": "there is no rig yet" }),
+            tare: json!({ "available": false, "follows": false, "why": "the rig does not exist yet" }),
             limit: None,
             estimation: Estimation::default(),
             source: None,

@@ -59,9 +59,9 @@ impl Shared {
             }
             Note::Replaced => {
                 self.last_percent = last_deviation_percent(self.calibration.journal().rows());
-                self.hint = Some("The reading grew: the press was taken anew.".to_owned());
+                self.hint = Some("The reading grew: the press was recorded again.".to_owned());
             }
-            Note::AskedAgain(doubt) => self.hint = Some(format!("Not taken: {doubt}. Press again.")),
+            Note::AskedAgain(reason) => self.hint = Some(format!("Press rejected: {reason}. Press again.")),
             Note::StillWaiting(words) => self.hint = Some(words),
             Note::Saturated(name) => {
                 self.problem = Some(format!("channel {name} reads the end of its range: press less, redo"));

@@ -150,7 +150,7 @@ impl Finger {
             ["finger", numbers @ ..] => {
                 let numbers: Option<Vec<f64>> = numbers.iter().map(|word| word.parse().ok()).collect();
                 let Some(&[x_mm, y_mm, force_n]) = numbers.as_deref() else {
-                    return Err("`finger` wants three numbers: x and y in mm, force in N");
+                    return Err("`finger` needs three numbers: x and y in mm, force in N");
                 };
                 self.held = Some(self.contact(x_mm, y_mm, force_n)?);
             }

@@ -82,7 +82,7 @@ mod tests {
         let batch =
             |event| Arc::new(Batch { outputs: vec![Output::Event(EventRecord { time_s: 0.0, event })] });
         sink.batch(&batch(Event::Tared));
-        assert!(told.try_recv().is_err(), "there are no rules");
+        assert!(told.try_recv().is_err(), "no rules are set");
         alarms.set(rules("tared"));
         sink.batch(&batch(Event::Tared));
         let expected = Command::Alarm { name: "r".to_owned(), text: "look".to_owned() };

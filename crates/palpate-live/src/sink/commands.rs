@@ -29,7 +29,7 @@ pub struct CommandSink {
 enum Unsent {
     #[error(transparent)]
     Device(SendError),
-    #[error("rules have sent {MOST} commands within {} s, which is the most; `hold` makes them act less often", STRETCH.as_secs())]
+    #[error("rules have sent {MOST} commands within {} s, the maximum; increase `hold` so that they act less often", STRETCH.as_secs())]
     TooMany,
 }
 

@@ -57,7 +57,7 @@ impl<W: Write + Send> Sink for JsonLines<W> {
         if let Err(error) = self.write(batch) {
             // It is not a problem if the reader has gone.
             if error.kind() != io::ErrorKind::BrokenPipe {
-                let text = format!("samples are printed no more: {error}");
+                let text = format!("samples are not printed any longer: {error}");
                 let _ = self.reports.try_send(Input::Command(Command::Trouble(text)));
             }
             let _ = self.failed.set(error);

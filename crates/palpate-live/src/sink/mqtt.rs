@@ -33,7 +33,7 @@ pub struct MqttUrl {
 
 /// Text that is not the URL of a broker with a topic.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{text}` is no broker with a topic, as in `mqtt://user@host:1883/bench/contact`: {problem}")]
+#[error("`{text}` is not a broker with a topic, as in `mqtt://user@host:1883/bench/contact`: {problem}")]
 pub struct MqttUrlError {
     /// The text.
     pub text: String,
@@ -52,7 +52,7 @@ impl FromStr for MqttUrl {
         let (server, topic) = rest.split_once('/').ok_or_else(|| error("it has no topic"))?;
         let topic = topic.trim_end_matches('/');
         if topic.is_empty() || topic.len() > 1000 || topic.contains(['+', '#', '\0']) {
-            return Err(error("a topic has 1 to 1000 bytes, and none of + and #"));
+            return Err(error("a topic has 1 to 1000 bytes, without + and #"));
         }
         let file = match query.strip_prefix("password-file=") {
             _ if query.is_empty() => None,

@@ -76,7 +76,7 @@ const FASTEST: f64 = 1e6;
 pub enum SourceUrlError {
     /// A scheme that no source has.
     #[error(
-        "`{text}` is no source; sources are `-`, `serial:///dev/ttyACM0?baud=115200`, `tcp://host:port`, `udp://:port`, \
+        "`{text}` is not a source; sources are `-`, `serial:///dev/ttyACM0?baud=115200`, `tcp://host:port`, `udp://:port`, \
          `mqtt://user@host/topic`, `file:recording.mcap?speed=1` and `simulated:rig.toml?rate=1000`"
     )]
     Scheme {
@@ -222,7 +222,7 @@ impl<'a> Query<'a> {
 
     fn end(&self, url: &SourceUrl) -> Result<(), String> {
         let known = url.parameters();
-        self.0.first().map_or(Ok(()), |pair| Err(format!("`{pair}` is no parameter; known are {known}")))
+        self.0.first().map_or(Ok(()), |pair| Err(format!("`{pair}` is not a parameter; known are {known}")))
     }
 }
 
@@ -309,7 +309,7 @@ mod tests {
             ("serial://", "write `serial:///dev/ttyACM0`"),
             ("serial:///dev/x?baud=0", "baud `0` must be a whole number of 1 to 20000000"),
             ("serial:///dev/x?baud=1&baud=2", "baud is given twice"),
-            ("serial:///dev/x?parity=odd", "`parity=odd` is no parameter; known are `baud` and `columns`"),
+            ("serial:///dev/x?parity=odd", "`parity=odd` is not a parameter; known are `baud` and `columns`"),
             ("tcp://host", "`host` has no port; write `host:5000`"),
             ("tcp://:5000", "the host is missing; write `tcp://"),
             ("tcp://host:70000", "port `70000` must be a whole number of 1 to 65535"),

@@ -12,7 +12,7 @@ pub enum StageError {
     Line(#[from] io::Error),
     /// The firmware is unknown.
     #[error(
-        "the machine says neither that it is Marlin nor that it is GRBL; it said: {}. Is the baud rate right?",
+        "the machine identifies itself neither as Marlin nor as GRBL; its answer is {}; check the baud rate",
         quoted(said)
     )]
     Unknown {
@@ -108,7 +108,7 @@ pub enum Finger {
 impl fmt::Display for Finger {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Unmoved => "nothing was moved",
+            Self::Unmoved => "the machine did not move",
             Self::Lifted => "it was stopped, and its finger is lifted",
             Self::Up => "it was stopped with its finger up",
             Self::Unknown => {

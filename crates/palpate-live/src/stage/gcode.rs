@@ -33,7 +33,7 @@ impl fmt::Display for Stopping {
         match self {
             Self::AtOnce => f.write_str("a stop acts at once"),
             Self::ByReset => f.write_str(
-                "its firmware has no emergency parser: a stop resets the board by DTR, and the motors lose their hold",
+                "its firmware has no emergency parser: a stop resets the board by DTR, and the motors lose their holding torque",
             ),
             Self::BetweenMoves => write!(
                 f,

@@ -22,7 +22,7 @@ pub enum StageUrl {
 /// Error of a text that is not the address of a machine.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{text}` is no machine{problem}; machines are `gcode:serial:///dev/ttyUSB0?baud=115200` and `gcode:tcp://host:port`"
+    "`{text}` is not a machine{problem}; machines are `gcode:serial:///dev/ttyUSB0?baud=115200` and `gcode:tcp://host:port`"
 )]
 pub struct StageUrlError {
     /// The text.
@@ -76,9 +76,9 @@ mod tests {
     fn others_are_refused_with_the_reason() {
         for (text, words) in [
             ("serial:///dev/ttyUSB0", "machines are `gcode:serial:///dev/ttyUSB0?baud=115200`"),
-            ("gcode:udp://:5000", "is no machine"),
+            ("gcode:udp://:5000", "is not a machine"),
             ("gcode:tcp://host", "`host` has no port"),
-            ("gcode:serial:///dev/x?columns=a", "is no machine"),
+            ("gcode:serial:///dev/x?columns=a", "is not a machine"),
         ] {
             let error = text.parse::<StageUrl>().unwrap_err().to_string();
             assert!(error.contains(words), "{text}: {error}");

@@ -104,7 +104,7 @@ fn a_board_without_a_rig_is_seen_and_gets_one() {
 
     std::fs::write(folder.path().join("strip.toml"), "mine").unwrap();
     let (status, refusal) = post(&server, "/api/rig", &form(&json!({})));
-    assert!(status == 409 && refusal["error"].as_str().unwrap().contains("is there already"), "{refusal}");
+    assert!(status == 409 && refusal["error"].as_str().unwrap().contains("exists already"), "{refusal}");
     assert_eq!(std::fs::read_to_string(folder.path().join("strip.toml")).unwrap(), "mine");
     let whole = json!({
         "overwrite": true, "second_force_n": 4, "placement_mm": 2, "sensor_places_mm": [[50], [], [250]],

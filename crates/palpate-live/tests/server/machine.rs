@@ -232,7 +232,7 @@ fn a_machine_that_nobody_watches_lifts_its_finger_and_ends() {
     std::thread::sleep(ABSENCE);
     let state = get(&server, "/api/calibration").1;
     assert_eq!((&state["phase"], &state["machine"]["runs"]), (&json!("ready"), &json!(false)));
-    assert!(state["problem"].as_str().unwrap().contains("nobody has watched the machine for 5 s"), "{state}");
+    assert!(state["problem"].as_str().unwrap().contains("no page has been open for 5 s"), "{state}");
     assert!((1..160).contains(&state["taken"].as_u64().unwrap()), "{state}");
     assert!(!bench.machine.is_stopped() && bench.machine.contact().is_none());
     live.end();
@@ -475,7 +475,7 @@ fn a_machine_that_is_set_up_stops_as_one_that_presses() {
         let (_folder, bench, live, server) = down("");
         std::thread::sleep(ABSENCE);
         let ended = get(&server, "/api/calibration").1;
-        assert!(ended["problem"].as_str().unwrap().contains("nobody has watched the machine"), "{ended}");
+        assert!(ended["problem"].as_str().unwrap().contains("no page has been open"), "{ended}");
         assert!(!bench.machine.is_stopped() && bench.machine.contact().is_none());
         live.end();
     });
@@ -500,7 +500,7 @@ fn what_cannot_be_done_is_told_with_a_remedy() {
     let failed = waited(&server, |state| state["machine"]["runs"] == false);
     let problem = failed["problem"].as_str().unwrap();
     assert!(
-        problem.contains("the line to the machine is broken") && problem.contains("see that it is on"),
+        problem.contains("the line to the machine is broken") && problem.contains("check that it is on"),
         "{problem}"
     );
     live.end();

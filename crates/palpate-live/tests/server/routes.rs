@@ -291,7 +291,7 @@ fn only_regular_files_are_recordings() {
         for path in [format!("/api/recordings/{name}.mcap"), format!("/api/recordings/{name}.mcap/file")] {
             let (status, _, body) = ask(&server, "GET", &path, &[], "");
             assert_eq!(status, 400, "{path}: {body}");
-            assert!(body.contains("no regular file") && !body.contains("secret"), "{path}: {body}");
+            assert!(body.contains("not a regular file") && !body.contains("secret"), "{path}: {body}");
         }
     }
 }

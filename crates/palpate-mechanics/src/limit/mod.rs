@@ -279,7 +279,7 @@ struct Columns {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LimitError {
     /// The surface has no model.
-    #[error("a measured surface has no model, and without influence functions there is no limit to compute")]
+    #[error("a measured surface has no model, and the limit needs influence functions")]
     NoModel,
     /// The noise is singular, and the limit would be 0; or no sensor is active.
     #[error(transparent)]
@@ -294,7 +294,7 @@ pub enum LimitError {
     #[error("the limit depends on the contact force, and none is given")]
     NoForce,
     /// Too few or too many positions.
-    #[error("the limit is asked for at {count} positions; there must be at least 1 and at most {most}")]
+    #[error("the limit is requested at {count} positions; expected 1 to {most}")]
     Positions {
         /// Requested number.
         count: f64,

@@ -277,7 +277,7 @@ impl LimitWarning {
                 "a sensor that breaks the symmetry; less noise does not help".to_owned()
             }
             Self::Mirror { distance, .. } => {
-                format!("{}, or a sensor that tells the two apart", less_noise(bound / distance))
+                format!("{}, or a sensor that distinguishes the two", less_noise(bound / distance))
             }
             // Over a rigid support the surface does not move, even with quiet sensors and a large force.
             Self::Faint { signal_to_noise, reactions_would_help, .. } if *signal_to_noise < NO_SIGNAL => {
@@ -286,11 +286,11 @@ impl LimitWarning {
                 } else {
                     "a sensor that notices a contact there"
                 };
-                format!("{sensor}; less noise or a harder touch does not help")
+                format!("{sensor}; less noise or a larger force does not help")
             }
             Self::Faint { signal_to_noise, .. } => {
                 let factor = bound / signal_to_noise;
-                format!("{}, a harder touch, or a sensor that is nearer", less_noise(factor))
+                format!("{}, a larger force, or a nearer sensor", less_noise(factor))
             }
         }
     }
@@ -318,7 +318,7 @@ impl fmt::Display for LimitWarning {
             Self::Blind { zone, force, sd_m: None, .. } => {
                 write!(
                     f,
-                    "blind at {zone} with {} force: the readings do not tell the position",
+                    "blind at {zone} with {} force: the readings do not determine the position",
                     force.name()
                 )
             }

@@ -212,7 +212,7 @@ pub enum InsensitiveSensor {
         kind: SensorKind,
     },
     /// The edge of a plate fixes the measured quantity.
-    #[error("the {edge} edge, which is {held}, has no {kind} wherever the plate is touched")]
+    #[error("the {edge} edge, which is {held}, has no {kind} for any contact")]
     AtEdge {
         /// Name of the edge.
         edge: &'static str,
@@ -232,10 +232,10 @@ pub enum InsensitiveSensor {
 /// Text of the reason for which a beam's sensor of this kind reads 0.
 fn held(kind: SensorKind) -> &'static str {
     match kind {
-        SensorKind::Deflection => "a support holds the surface",
-        SensorKind::Slope => "a support holds the slope",
-        SensorKind::Strain => "nothing bends the surface",
-        SensorKind::Reaction | SensorKind::Raw => "nothing acts",
+        SensorKind::Deflection => "a support fixes the surface",
+        SensorKind::Slope => "a support fixes the slope",
+        SensorKind::Strain => "the surface does not bend",
+        SensorKind::Reaction | SensorKind::Raw => "no force acts",
     }
 }
 

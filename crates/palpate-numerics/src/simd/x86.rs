@@ -5,7 +5,7 @@
 #![allow(unsafe_code, reason = "instructions that the machine was asked for")]
 #![allow(
     clippy::missing_transmute_annotations,
-    reason = "the registers of a macro, whose types its uses name"
+    reason = "the registers of a macro have the types of its callers"
 )]
 
 use super::{Arithmetic, Eight, LOOK_UP, Number, Vector};

@@ -70,7 +70,7 @@ impl Paper<'_> {
                 .table(self.published_table()),
             Section::new("claims", "The paper's claims").text(self.about_claims()).table(self.claims_table()),
             Section::new("not-replicated", "What does not replicate").text(self.not_replicated()),
-            Section::new("open", "What the paper leaves open")
+            Section::new("open", "What the paper does not specify")
                 .text(self.about_open())
                 .table(self.open_table()),
             Section::new("arms", "All arms").table(arms_table(self.report)),
@@ -105,7 +105,7 @@ impl Paper<'_> {
         let Agreement { agreeing, within_seeds, compared } = Agreement::new(&self.published);
         html! {
             @if compared == 0 {
-                "No arm with a published figure was run, so nothing is compared."
+                "No arm with a published figure was run, so no figure is compared."
             } @else if agreeing == compared {
                 "All of the " a href="#published" { (counted(compared, "published figure", "published figures")) }
                 " with an arm here agree with the medians found here, as far as was fixed beforehand; " (within_seeds)
@@ -114,7 +114,7 @@ impl Paper<'_> {
                 b { (agreeing) " of " (counted(compared, "published figure", "published figures")) } " "
                 a href="#published" { "agree with the medians found here" } ", as far as was fixed beforehand; " b { (within_seeds) }
                 " lie within 5–95 % of the seeds. "
-                a href="#not-replicated" { "Those that do not agree are listed" } "."
+                a href="#not-replicated" { "The figures that do not agree are listed" } "."
             }
         }
     }
@@ -126,11 +126,11 @@ impl Paper<'_> {
         let (held, failed) = (ids(true), ids(false));
         html! {
             @if self.claims.is_empty() {
-                "The arms that the paper's claims are about were not all run, so no claim is judged."
+                "The arms that the paper's claims are about were not all run, so no claim is tested."
             } @else if failed.is_empty() {
-                "Every " a href="#claims" { "claim that could be judged" } " holds in the medians: " (listed(&held)) "."
+                "Every " a href="#claims" { "claim that could be tested" } " holds in the medians: " (listed(&held)) "."
             } @else if held.is_empty() {
-                "No " a href="#claims" { "claim that could be judged" } " holds in the medians as it is worded: "
+                "No " a href="#claims" { "claim that could be tested" } " holds in the medians as it is worded: "
                 (listed(&failed)) "."
             } @else {
                 "Of the paper's " a href="#claims" { "claims" } ", " (listed(&held))
@@ -167,10 +167,9 @@ impl Paper<'_> {
         html! {
             p {
                 "A distributive tactile sensor has few sensors and they all stand under one elastic surface. Wherever the \
-                 surface is touched, all of it bends, and every sensor notices. No sensor is in charge of a place of its \
-                 own: the place is in the pattern across all of them. How finely it can be told is therefore a matter of \
-                 how the pattern is interpreted more than of how many sensors there are, and there is no dead area between \
-                 two of them."
+                 surface is touched, all of it bends, and every sensor notices. No sensor covers a place of its own: the place \
+                 is in the pattern across all of them. The accuracy therefore depends on the interpretation of the pattern \
+                 more than on the number of sensors, and two sensors have no dead area between them."
             }
             @if let Some((rig, beam, force_n)) = self.setup() { (bench_in_words(rig, beam, force_n)) }
         }
@@ -189,7 +188,7 @@ impl Paper<'_> {
 fn lead() -> Markup {
     html! {
         p.lead {
-            "A bent beam can tell where it is touched. This page repeats, in simulation, the study with which P. \
+            "A bent beam reveals where it is touched. This page repeats, in simulation, the study with which P. \
              Tongpadungrod showed how to train a small neural network to do so, and sets every figure that the paper \
              prints beside the same figure found here: "
             cite { "Neural network training techniques for improving the performance of a distributive tactile sensor" }
@@ -201,11 +200,10 @@ fn lead() -> Markup {
 fn training() -> Markup {
     html! {
         p {
-            "The interpreter is a small feed-forward network. Its inputs are the sensors' readings; its single output \
-             stands for the position of the load. It is trained by back-propagation: a load is put at a few known "
+            "The interpreter is a small feed-forward network. The inputs are the sensors' readings; the single output stands \
+             for the position of the load. It is trained by back-propagation: a load is put at a few known "
             b { "training positions" } ", the network is shown the readings again and again, and each time its weights \
-             move so that its output comes nearer to the known position. After that it has to locate loads at places \
-             that it never saw."
+             move so that its output comes nearer to the known position. It then has to locate loads at other places."
         }
         p {
             "The paper asks three things. What should the output stand for: the plain position in metres, or the \
@@ -216,7 +214,7 @@ fn training() -> Markup {
             "Each way to train is an " b { "arm" } " of the study, named after what the output stands for or where the \
              training positions are, and after their number: " code { "position-10" } " has the plain position as its output \
              and ten training positions, " code { "normalized-20" } " the position divided by the length and twenty, "
-            code { "middle4-30" } " thirty, four of which lie in the middle portion, and again a normalized output."
+            code { "middle4-30" } " thirty, with four in the middle portion, and again a normalized output."
         }
     }
 }
@@ -239,7 +237,7 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
             (mm(beam.thickness_m())) " mm thick, with a Young's modulus of " (stated(beam.youngs_modulus_pa() / 1e9))
             " GPa, on two wedges at its ends. "
             (counted(rig.setup.layout().len(), "sensor measures", "sensors measure")) " its " (kinds(rig)) " while a load of "
-            (stated(force_n)) " N, whose force is known, stands on it. With the load in the middle the beam sags by "
+            (stated(force_n)) " N, which is known, stands on it. With the load in the middle the beam sags by "
             (number(sag_mm)) " mm there."
         }
     }

@@ -219,8 +219,8 @@ impl Paper<'_> {
 
     pub(super) fn claims_table(&self) -> Table {
         let caption = html! {
-            "The paper's claims in our words, each parted into what a program can check. A claim holds when every part of \
-             it holds in the medians. ✓ and ✗ say whether a part does; beside them is the share of the seeds for which it \
+            "The paper's claims in our words, each divided into parts that a program can check. A claim holds when every part \
+             of it holds in the medians. ✓ and ✗ mark whether a part does; beside them is the share of the seeds for which it \
              holds, each seed of one arm beside the same seed of another, and in the last column the share of those for \
              which every part holds."
         };
@@ -244,7 +244,7 @@ impl Paper<'_> {
             @if self.published.is_empty() && self.claims.is_empty() {
                 p { "Nothing was compared." }
             } @else if figures.is_empty() && failed.is_empty() {
-                p { "Every published figure that was compared agrees, and every claim that was judged holds in the medians." }
+                p { "Every published figure that was compared agrees, and every claim that was tested holds in the medians." }
             }
             @if !figures.is_empty() {
                 h3 { "Figures" }
@@ -299,8 +299,8 @@ fn difference(figure: &PublishedFigure) -> Markup {
 fn failure(claim: &Claim) -> Markup {
     let failed: Vec<&ClaimPart> = claim.parts.iter().filter(|part| !part.holds).collect();
     html! {
-        b { (claim.id) } " says: " (claim.claim) ". "
-        @if failed.len() == claim.parts.len() { "None of its parts holds in the medians:" }
+        b { (claim.id) } " states: " (claim.claim) ". "
+        @if failed.len() == claim.parts.len() { "In the medians, every part fails:" }
         @else { "In the medians, " (failed.len()) " of its " (claim.parts.len()) " parts " (fails(failed.len())) ":" }
         ul { @for part in &failed { li { (part.what) " (holds for " (share(part.share_of_seeds)) " of the seeds)" } } }
     }
@@ -347,8 +347,8 @@ impl Paper<'_> {
     pub(super) fn about_open(&self) -> Markup {
         html! {
             p {
-                "The paper does not say everything that a replication has to know. Where it is silent, the study's file decides; \
-                 the table lists its decisions as they were in this run."
+                "The paper does not specify everything that a replication needs. The study's file specifies the rest; the \
+                 table lists the settings of this run."
             }
             (self.why_not_the_printed_modulus())
         }
@@ -358,7 +358,7 @@ impl Paper<'_> {
         let mut rows: Vec<[String; 3]> = Vec::new();
         if let Some((rig, beam, force_n)) = self.setup() {
             let modulus = format!("{} GPa", stated(beam.youngs_modulus_pa() / 1e9));
-            rows.push(row("Young's modulus", "200 MPa, taken for a slip", modulus));
+            rows.push(row("Young's modulus", "200 MPa, treated as a misprint", modulus));
             rows.push(row("sensor noise", "none: readings are computed", noise_in_words(rig)));
             rows.push(row("force", "3 N, known", format!("{} N, known", stated(force_n))));
         }
@@ -369,7 +369,7 @@ impl Paper<'_> {
             .words("setting", |[setting, ..]| setting.clone())
             .words("the paper", |[_, paper, _]| paper.clone())
             .words("this study", |[.., study]| study.clone())
-            .caption(html! { "Settings of this study, beside what the paper says of them." })
+            .caption(html! { "Settings of this study and of the paper." })
     }
 
     /// Remark on the deflection with the modulus as printed, unless the study uses that modulus.
@@ -386,8 +386,8 @@ impl Paper<'_> {
             p {
                 "One value is not followed: the paper prints a Young's modulus of 200 MPa. With it, the load in the middle would \
                  bend this " (stated(beam.length_m() * 1e3)) " mm beam by " (number(sag_m(PRINTED_MODULUS_PA)))
-                " m, far outside the small deflections that the beam equation is made for. Steel has 200 GPa, so the print is \
-                 taken for a slip. With " (stated(beam.youngs_modulus_pa() / 1e9)) " GPa, as here, it bends by "
+                " m, far outside the small deflections that the beam equation is made for. Steel has 200 GPa, so the value is \
+                 treated as a misprint. With " (stated(beam.youngs_modulus_pa() / 1e9)) " GPa, as here, it bends by "
                 (number(sag_m(beam.youngs_modulus_pa()) * 1e3)) " mm."
             }
         }

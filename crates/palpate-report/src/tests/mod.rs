@@ -47,7 +47,7 @@ fn see(svg: &str) -> Drawing {
 
 fn number(element: roxmltree::Node, name: &str) -> f64 {
     let text = element.attribute(name).unwrap_or_else(|| panic!("{element:?} has no {name}"));
-    text.parse().unwrap_or_else(|_| panic!("{name} of {element:?} is no number"))
+    text.parse().unwrap_or_else(|_| panic!("{name} of {element:?} is not a number"))
 }
 
 fn text_box(element: roxmltree::Node) -> Rect {

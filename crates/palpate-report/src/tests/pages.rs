@@ -97,7 +97,7 @@ fn assert_sound(files: &[ReportFile], figures: usize) {
     let text = shown_text(html);
     let bare = |word: &str| word.trim_matches(|c: char| !c.is_alphanumeric()).to_owned();
     let no_number = |word: String| word == "inf" || word.contains("NaN");
-    assert!(!text.split_whitespace().map(bare).any(no_number), "the page shows what is no number");
+    assert!(!text.split_whitespace().map(bare).any(no_number), "the page shows what is not a number");
     let mut names: Vec<String> = (1..=figures).map(|number| format!("figure-{number}.svg")).collect();
     names.insert(0, "report.html".to_owned());
     assert_eq!(files.iter().map(|file| &file.name).collect::<Vec<_>>(), names.iter().collect::<Vec<_>>());
@@ -221,7 +221,7 @@ fn an_evaluation_says_whose_answers_it_holds() {
     let other = simulate_at(&rig.setup, &positions, 3, 1).unwrap();
     let portions = [Portion { from_m: 0.02, to_m: 0.38 }];
     for (recording, judged, said) in [
-        (&recording, Judged::Locator(&locator), "this very recording"),
+        (&recording, Judged::Locator(&locator), "this recording"),
         (&other, Judged::Locator(&locator), "another recording"),
         (
             &other,
@@ -290,7 +290,7 @@ fn a_limit_is_drawn_and_told() {
         (deflections(8), Force::Known, "7.7 %"),
         (deflections(8), Force::Unknown, "reaction sensors at the supports"),
         (reactions, Force::Unknown, "Nothing to warn of"),
-        (deflections(1), Force::Unknown, "do not tell the position anywhere"),
+        (deflections(1), Force::Unknown, "is unidentifiable everywhere"),
     ];
     for (sensors, force, said) in cases {
         let files = limits(sensors, force);

@@ -77,7 +77,7 @@ pub enum FirstRigError {
         columns: String,
     },
     /// A hint names a column that is not there, or not the only one.
-    #[error("{flag}: there is no one column `{name}`; the columns are {columns}")]
+    #[error("{flag}: column `{name}` is missing or not unique; the columns are {columns}")]
     NoSuchColumn {
         /// The flag of the hint.
         flag: &'static str,
@@ -93,15 +93,13 @@ pub enum FirstRigError {
         flag: &'static str,
         /// The heading.
         column: String,
-        /// The first field that is no number.
+        /// The first field that is not a number.
         text: String,
         /// Line.
         line: usize,
     },
     /// A hint names a column that marks no rows.
-    #[error(
-        "--untouched: column `{column}` must say 1, true or yes, or 0, false, no or nothing, in every row"
-    )]
+    #[error("--untouched: every row of column `{column}` must be 1, true or yes, or 0, false, no or empty")]
     NotMarks {
         /// The heading.
         column: String,
@@ -152,16 +150,16 @@ impl FirstRigError {
             Self::NoChannels { .. } => Some("name the channels, each with --channel NAME"),
             Self::ForeignUnit { .. } => Some("convert the column, or name another one"),
             Self::Csv(CsvError { problem: CsvProblem::ManySeparators { .. }, .. }) => {
-                Some("--separator says which")
+                Some("choose it with --separator")
             }
             Self::Csv(CsvError { problem: CsvProblem::DoubtfulNumber { .. }, .. }) => {
-                Some("--decimal comma takes it for the second")
+                Some("--decimal comma selects the second")
             }
             Self::Csv(CsvError { problem: CsvProblem::DoubtfulThousands { text, .. }, .. }) => {
                 Some(if text.contains(',') {
-                    "--decimal comma takes it for the second"
+                    "--decimal comma selects the second"
                 } else {
-                    "--decimal point takes it for the second"
+                    "--decimal point selects the second"
                 })
             }
             _ => None,
@@ -287,7 +285,7 @@ impl FirstRig {
         self.warnings.iter().for_each(|warning| toml.comment(&format!("Warning: {warning}")));
         self.write_surface(&mut toml);
         toml.section("sensors");
-        toml.line("measure = \"raw\"", "whatever the channels read: counts, volts");
+        toml.line("measure = \"raw\"", "in the unit of the channels: counts, volts");
         self.write_recording(&mut toml);
         toml.section("estimator");
         let Auto { only } = Auto::quick();
@@ -327,10 +325,10 @@ impl FirstRig {
             toml.line("header = false", "columns by their numbers");
         }
         if let Some(separator) = self.hints.separator {
-            toml.line(&format!("separator = \"{}\"", separator.name()), "as was said");
+            toml.line(&format!("separator = \"{}\"", separator.name()), "as given");
         }
         if let Some(decimal) = self.hints.decimal {
-            toml.line(&format!("decimal = \"{}\"", decimal.name()), "as was said");
+            toml.line(&format!("decimal = \"{}\"", decimal.name()), "as given");
         }
         let keys: &[&str] = match roles.position {
             PositionRole::Along(_) => &["position"],
@@ -371,7 +369,7 @@ impl FirstRig {
         if let Some(untouched) = roles.untouched {
             let marks = self.table.columns[untouched].marks().unwrap_or_default();
             let count = marks.iter().filter(|mark| **mark).count();
-            let marked = format!("{count} of {} rows, in which nothing touched", marks.len());
+            let marked = format!("{count} of {} rows, recorded untouched", marks.len());
             let comment = match self.hints.untouched {
                 Some(_) => marked,
                 None => format!("a guess by its name: it marks {marked}"),
@@ -395,7 +393,7 @@ impl FirstRig {
 
     fn write_unit(&self, toml: &mut Toml, key: &str, column: usize, wanted: Dimension) {
         let unit = own_unit(&self.table.columns[column]);
-        let comment = if unit.is_some() { "" } else { "a guess: the header does not say" };
+        let comment = if unit.is_some() { "" } else { "a guess: the header has no unit" };
         let unit = unit.unwrap_or_else(|| usual_unit(wanted));
         toml.line(&format!("{key} = \"{unit}\""), comment);
     }
@@ -422,30 +420,30 @@ impl FirstRig {
     fn left_in_words(&self, column: usize, left: &Left) -> String {
         let heading = &self.table.columns[column].heading;
         let reason = match left {
-            Left::Empty => "there is nothing in it".to_owned(),
-            Left::Words => "there are words in it".to_owned(),
-            Left::Word { line, text } => format!("`{text}` on line {line} is no number"),
-            Left::Gap { line } => format!("there is nothing in it on line {line}"),
+            Left::Empty => "it is empty".to_owned(),
+            Left::Words => "it contains words".to_owned(),
+            Left::Word { line, text } => format!("`{text}` on line {line} is not a number"),
+            Left::Gap { line } => format!("it is empty on line {line}"),
             Left::Unnamed => format!("column {} has no heading", column + 1),
             Left::Constant(value) => format!("it is {value} in every row"),
-            Left::Dead(value) => format!("it is {value} in every row, which teaches a channel nothing"),
+            Left::Dead(value) => format!("it is {value} in every row, so it carries no information"),
             Left::Counter => "it numbers the rows".to_owned(),
             Left::Circumstance => {
                 let unit = own_unit(&self.table.columns[column]);
                 let unit = unit.map_or(String::new(), |unit| format!(" and nuisance_unit = \"{unit}\""));
                 format!(
-                    "if readings depend on it and it is unknown in use, say nuisance = {}{unit}",
+                    "if readings depend on it and it is unknown in use, set nuisance = {}{unit}",
                     self.key(column)
                 )
             }
             Left::Single => {
-                "if it is a channel, add it to them; if readings depend on it, say it as `nuisance`"
+                "if it is a channel, add it to `channels`; if readings depend on it, set it as `nuisance`"
                     .to_owned()
             }
             Left::OneOfForces => {
-                format!("it may be the force, as others may: say force = {}", self.key(column))
+                format!("it is one of several possible forces: set force = {}", self.key(column))
             }
-            Left::Second => "another column has the role that its name says".to_owned(),
+            Left::Second => "another column has the role that its name suggests".to_owned(),
             Left::Unit(unit) => format!("palpate does not read it in `{unit}`; convert it"),
         };
         format!("`{heading}`: {reason}.")
@@ -510,10 +508,10 @@ impl FirstRig {
                     "column `{heading}` is {value} in every row and was left out: is it a channel, and is it connected?"
                 )),
                 Left::Word { line, text } => {
-                    Some(format!("column `{heading}` was left out: `{text}` on line {line} is no number"))
+                    Some(format!("column `{heading}` was left out: `{text}` on line {line} is not a number"))
                 }
                 Left::Gap { line } => {
-                    Some(format!("column `{heading}` was left out: there is nothing in it on line {line}"))
+                    Some(format!("column `{heading}` was left out: it is empty on line {line}"))
                 }
                 Left::Unit(unit) => Some(format!(
                     "column `{heading}` was left out: palpate does not read it in `{unit}`; convert it"
@@ -533,7 +531,7 @@ impl FirstRig {
         let enough = if self.sides.len() == 1 { 5 } else { 9 };
         if positions < enough {
             warnings.push(format!(
-                "there are presses at {positions} positions only; between them an estimator can but guess: press at {enough} or more"
+                "the presses are at only {positions} positions; an estimator cannot interpolate reliably between them: press at {enough} or more"
             ));
         }
         warnings
@@ -573,7 +571,7 @@ impl FirstRig {
         if !self.roles.many_forces.is_empty() {
             let forces: Vec<String> = self.roles.many_forces.iter().map(|column| self.key(*column)).collect();
             warnings.push(format!(
-                "columns {} may all be the force, and none was taken; say which with --force",
+                "columns {} may all be the force, and none was chosen; choose one with --force",
                 forces.join(", ")
             ));
         }

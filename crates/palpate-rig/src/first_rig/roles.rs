@@ -348,7 +348,7 @@ pub(super) fn described(table: &Table) -> String {
                 let (low, high) = range(numbers);
                 format!("{low} to {high}")
             }
-            Content::Gaps { line, .. } => format!("numbers, but nothing on line {line}"),
+            Content::Gaps { line, .. } => format!("numbers, but empty on line {line}"),
             Content::Other { numbers: 0, .. } | Content::Marks(_) => "words".to_owned(),
             Content::Other { line, text, .. } => format!("numbers, but `{text}` on line {line}"),
         };

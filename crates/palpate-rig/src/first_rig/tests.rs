@@ -268,5 +268,5 @@ fn tables_below_a_preamble_become_rigs() {
     assert_eq!((recording.rows.len(), recording.rows[0].position.x_m), (30, 0.01));
     let thousands = presses("Ort;S1;S2", |x, _, i| format!("{x};{};1.{:03}", 503 + i, 3 + i)) + "10;5;900\n";
     let error = guess(&thousands, &Hints::default()).unwrap_err();
-    assert_eq!(error.help(), Some("--decimal point takes it for the second"), "{error}");
+    assert_eq!(error.help(), Some("--decimal point selects the second"), "{error}");
 }

@@ -255,13 +255,13 @@ fn rows_that_are_wrong_are_refused_with_their_line_and_cell() {
         evaluations(&move |cells| cells[i] = text.clone())
     };
     assert_eq!(cell(0, "nobody"), "the study has no arm `nobody`");
-    assert_eq!(cell(0, "lanes"), "arm `lanes` is of networks, of which networks.csv keeps all");
+    assert_eq!(cell(0, "lanes"), "arm `lanes` consists of networks, and networks.csv contains them");
     assert_eq!(cell(1, "-1"), "seed: `-1` is not a whole number");
-    assert_eq!(cell(2, "0.1 0.2"), "estimates_m: there are 2 values; the arm is judged by 20 readings");
+    assert_eq!(cell(2, "0.1 0.2"), "estimates_m: found 2 values; the arm is evaluated with 20 readings");
     assert_eq!(cell(2, "0.1 NaN"), "estimates_m: `NaN` is not a finite number");
     assert_eq!(cell(2, &["-"; 20].join(" ")), "estimates_m: `-` is not a finite number");
     assert_eq!(cell(3, "01x"), "held: `x` is not 1, 0 or -");
-    assert_eq!(cell(3, "01"), "held: there are 2 values; the arm is judged by 20 readings");
+    assert_eq!(cell(3, "01"), "held: found 2 values; the arm is evaluated with 20 readings");
     assert_eq!(cell(4, "1e999"), "interval_scores_m: `1e999` is not a finite number");
     assert_eq!(cell(4, ""), "interval_scores_m: `` is not a finite number");
     assert_eq!(evaluations(&|cells| cells.truncate(4)), "the row has 4 cells; it must have 5");
@@ -275,7 +275,7 @@ fn rows_that_are_wrong_are_refused_with_their_line_and_cell() {
     };
     assert_eq!(networks("capped", "tired"), "status: `tired` is not `converged`, `capped` or `diverged`");
     assert_eq!(networks(",60,", ",6o,"), "epochs: `6o` is not a whole number");
-    assert_eq!(networks(" ", " 0 "), "weights: there are 102, which is not the network's number");
+    assert_eq!(networks(" ", " 0 "), "weights: found 102, which is not the network's number");
     assert_eq!(networks(",", ",,"), "the row has 14 cells; it must have 13");
 }
 

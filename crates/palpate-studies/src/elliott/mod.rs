@@ -132,7 +132,7 @@ pub enum ElliottError {
     Noise(#[from] NoiseError),
     /// A number of components outside the range.
     #[error(
-        "{components} components are asked of {sensors} sensors; there are as many as sensors, and at least 1"
+        "{components} components are requested of {sensors} sensors; expected 1 to the number of sensors"
     )]
     Components {
         /// The number of components.
@@ -141,7 +141,7 @@ pub enum ElliottError {
         sensors: usize,
     },
     /// The number of calibrations is 0.
-    #[error("no calibration is asked for; there must be at least 1")]
+    #[error("0 calibrations are requested; expected at least 1")]
     NoCalibration,
     /// The tracker did not detect the moving load.
     #[error("the tracker never found the moving load")]

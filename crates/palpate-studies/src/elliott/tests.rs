@@ -81,5 +81,5 @@ fn a_stopped_study_finds_nothing_and_components_must_be_there() {
     let stopped = study(&[2], 1_000).run(Watch::new(&|_| false)).unwrap_err();
     assert!(Cancelled::caused(&stopped), "{stopped}");
     let told = study(&[26], 1_000).run(Watch::NONE).unwrap_err().to_string();
-    assert_eq!(told, "26 components are asked of 25 sensors; there are as many as sensors, and at least 1");
+    assert_eq!(told, "26 components are requested of 25 sensors; expected 1 to the number of sensors");
 }

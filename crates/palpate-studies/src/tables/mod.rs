@@ -158,13 +158,13 @@ pub enum RowProblem {
         wanted: &'static str,
     },
     /// Weights for another network.
-    #[error("weights: there are {found}, which is not the network's number")]
+    #[error("weights: found {found}, which is not the network's number")]
     Weights {
         /// Number of weights.
         found: usize,
     },
     /// Values for another number of readings.
-    #[error("{column}: there are {found} values; the arm is judged by {wanted} readings")]
+    #[error("{column}: found {found} values; the arm is evaluated with {wanted} readings")]
     Readings {
         /// The column.
         column: &'static str,
@@ -174,7 +174,7 @@ pub enum RowProblem {
         wanted: usize,
     },
     /// A row of a network in `evaluations.csv`, which has none.
-    #[error("arm `{arm}` is of networks, of which networks.csv keeps all")]
+    #[error("arm `{arm}` consists of networks, and networks.csv contains them")]
     Network {
         /// The arm.
         arm: String,

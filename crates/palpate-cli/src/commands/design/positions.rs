@@ -165,7 +165,7 @@ fn help(error: &PositionError) -> &'static str {
         PositionError::NoForce => {
             "add `force = \"3 N\"` to [contact], or to [training] where it is not known afterwards"
         }
-        PositionError::Auto => "say which: `kind = \"influence\"` in [estimator]",
+        PositionError::Auto => "choose one: `kind = \"influence\"` in [estimator]",
         PositionError::TooFew { .. } => "--count takes a larger number",
         PositionError::Arrangement(_) | PositionError::Calibration(_) | PositionError::Regression(_) => {
             "check [training], [sensors] and [estimator] of the rig"
@@ -174,7 +174,9 @@ fn help(error: &PositionError) -> &'static str {
         PositionError::Channels { .. } => "check `channels` in [recording], or the rig's sensors",
         PositionError::TooFewPresses { .. } => "begin with evenly spaced presses, ends included",
         PositionError::SmallPart { .. } => "begin with evenly spaced presses, ends included",
-        PositionError::NothingTold => "press harder, or look at the recording with `palpate init`",
+        PositionError::NothingTold => {
+            "press with a larger force, or inspect the recording with `palpate init`"
+        }
         PositionError::NoOffset => "add untouched rows, of force 0, or press some position with two forces",
         PositionError::NoNoise { .. } => "press some positions twice, or add `noise = \"5 um\"` to [sensors]",
     }

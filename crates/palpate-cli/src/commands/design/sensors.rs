@@ -155,7 +155,7 @@ fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesi
         design = adding.map_err(|error| complaint(&error, &arguments.rig))?;
         let dead = rig.setup.layout().len() - design.kept.len();
         if dead > 0 {
-            remark!("palpate: {dead} of today's sensors are dead, and are not kept");
+            remark!("palpate: {dead} existing sensors are dead, and are not kept");
         }
     }
     Ok((setup, design))
@@ -218,12 +218,12 @@ const MOST_COUNT: usize = 200;
 
 /// "2..16" as a range, both ends included.
 fn counts(text: &str) -> Result<RangeInclusive<usize>, String> {
-    let form = || format!("`{text}` is no range; write the least and the most, as in 2..16");
+    let form = || format!("`{text}` is not a range; write the smallest and the largest number, as in 2..16");
     let (from, to) = text.split_once("..").ok_or_else(form)?;
     let number = |text: &str| text.trim_start_matches('=').trim().parse::<usize>().map_err(|_| form());
     let (from, to) = (number(from)?, number(to)?);
     if from < 1 || to > MOST_COUNT || from > to {
-        return Err(format!("`{text}` must go from at least 1 to at most {MOST_COUNT}, the lesser first"));
+        return Err(format!("`{text}` must be a range from 1 to {MOST_COUNT}, the smaller number first"));
     }
     Ok(from..=to)
 }
@@ -251,10 +251,10 @@ pub fn help(error: &DesignError) -> &'static str {
         DesignError::NoMirror { .. } => "lower `count`, bring `sites` closer together, or allow symmetry",
         DesignError::Budget { .. } => "raise `budget`, lower `count`, or offer cheaper `kinds`",
         DesignError::TooManyMustHaves { .. } => "raise `count`, or take some from `must_have`",
-        DesignError::MustHaveReadsNothing { .. } => "move it, or leave it out",
+        DesignError::MustHaveReadsNothing { .. } => "move it, or remove it",
         DesignError::MustHaveKeptOut { .. } => "move it, or change the zone",
         DesignError::MustHavesExclude { .. } => "move one of them, or relax the constraint",
-        DesignError::MustHaveWithoutTwin { .. } => "move it, or leave `symmetry` out",
+        DesignError::MustHaveWithoutTwin { .. } => "move it, or remove `symmetry`",
         DesignError::KeptDiffers { .. } => {
             "give the kind that noise in [design] `kinds`, or give every sensor of the kind the same in [sensors]"
         }
@@ -262,7 +262,7 @@ pub fn help(error: &DesignError) -> &'static str {
             "choose `sites` that mirror each other, such as a distance that divides the length, or an even `count`"
         }
         DesignError::NoLayout { .. } => {
-            "ask for another method, relax the constraints, or offer sensors other than reactions"
+            "choose another method, relax the constraints, or allow sensors other than reactions"
         }
         DesignError::TooLarge { .. } => "set `sites` or the contacts' `every` wider apart",
     }
@@ -304,7 +304,7 @@ fn print(outcome: &Outcome) -> Result<(), Failure> {
 /// "1 contact, at 12000 mm, is over a support …": the excluded contacts; `None` if there are none.
 fn left_out_in_words(problem: &SensorProblem) -> Option<String> {
     let places = problem.contacts_over_supports();
-    let reason = "where no layout tells a force that is not known: left out of scores and limits";
+    let reason = "where an unknown force is unidentifiable: excluded from scores and limits";
     match places.as_slice() {
         [] => None,
         [place] => Some(format!(

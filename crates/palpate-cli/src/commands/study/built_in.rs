@@ -68,10 +68,8 @@ fn folder(arguments: &Arguments, study: &str) -> Result<TargetFolder, Failure> {
     }
     if arguments.earlier_run() == EarlierRun::Resume {
         let complaint =
-            Complaint::new(format!("--resume: the study `{study}` keeps no networks to go on from"));
-        return Err(complaint
-            .help("--overwrite throws an earlier run away, --out names another folder")
-            .into());
+            Complaint::new(format!("--resume: the study `{study}` keeps no networks to continue from"));
+        return Err(complaint.help("--overwrite deletes an earlier run, --out names another folder").into());
     }
     arguments.folder(study)
 }
@@ -115,7 +113,7 @@ fn tell_dead_areas(findings: &DeadAreaResults) -> String {
         .column("dead between, %", |row| format!("{:.1}", row.folded.dead_percent))
         .to_string();
     for (sensing, estimator, sensors, why) in &findings.left_out {
-        told += &format!("\n{sensing}, {estimator}, {sensors} sensors: left out: {why}");
+        told += &format!("\n{sensing}, {estimator}, {sensors} sensors: skipped: {why}");
     }
     told
 }

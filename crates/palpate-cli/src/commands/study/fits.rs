@@ -74,7 +74,7 @@ pub fn read(out: &TargetFolder, tables: &StudyTables) -> Result<Checkpoint, Fail
         let complaint = Complaint::new(format!("{name}: {error}"));
         match &error {
             CheckpointError::Heading { .. } => {
-                complaint.help("--overwrite starts anew, --out names another folder")
+                complaint.help("--overwrite starts again, --out names another folder")
             }
             CheckpointError::Row { .. } => at_row(complaint, &name, &texts, &error),
         }

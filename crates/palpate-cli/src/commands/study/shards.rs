@@ -58,7 +58,7 @@ pub fn merge(asked: &Asked, study: Study) -> Result<(), Failure> {
 fn read_tables(folder: &Path) -> Result<ShardTables, Failure> {
     let networks = folder.join(NETWORKS_CSV);
     if !networks.exists() {
-        let complaint = Complaint::new(format!("{}: there is no {NETWORKS_CSV}", folder.display()));
+        let complaint = Complaint::new(format!("{}: {NETWORKS_CSV} is missing", folder.display()));
         return Err(complaint.help("--merge takes the folders that --shard K/N wrote").into());
     }
     Ok(ShardTables { place: folder.display().to_string(), texts: fits::read_texts(folder)? })
@@ -67,12 +67,12 @@ fn read_tables(folder: &Path) -> Result<ShardTables, Failure> {
 fn read_facts(folder: &Path) -> Result<RunFacts, Failure> {
     let path = folder.join(SHARD_JSON);
     if !path.exists() {
-        let complaint = Complaint::new(format!("{}: there is no {SHARD_JSON}", folder.display()));
+        let complaint = Complaint::new(format!("{}: {SHARD_JSON} is missing", folder.display()));
         return Err(complaint.help("run the shard again with --resume, which writes it").into());
     }
     let file: Result<ShardFile, _> = serde_json::from_str(&input::read_text(&path)?);
     let file = file.map_err(|error| {
-        Complaint::about(&path, error).help("run the shard again with --resume, which writes it anew")
+        Complaint::about(&path, error).help("run the shard again with --resume, which writes it again")
     })?;
     Ok(file.run)
 }
@@ -96,7 +96,7 @@ fn complaint(error: &AssemblyError, shards: &[ShardTables]) -> Complaint {
         AssemblyError::Split { .. } => complaint.help("leave out those of the other split"),
         AssemblyError::TwoOfAShard { .. } => complaint.help("name one of the two"),
         AssemblyError::Unfinished { place, shard, .. } => {
-            complaint.help(format!("--shard {shard} --out {place} --resume goes on from them"))
+            complaint.help(format!("--shard {shard} --out {place} --resume continues from them"))
         }
         AssemblyError::MissingShards { missing, of } => {
             let first = missing.first().copied().unwrap_or(1);

@@ -27,7 +27,7 @@ impl Toml {
         let (table, key) = self.place(path);
         let table = table.as_table_like_mut().unwrap_or_else(|| panic!("{path} is in no table"));
         let before = table.insert(key, Item::Value(value.into()));
-        assert!(before.is_none(), "{path} is there already");
+        assert!(before.is_none(), "{path} exists already");
         self
     }
 

@@ -59,7 +59,7 @@ pub enum MeasuredError {
     },
     /// Presses that leave no influence function and noise to be estimated beside the offset.
     #[error(
-        "{presses} presses tell no influence functions with a force: press at least 3 times, at two positions or more"
+        "{presses} presses do not determine influence functions and a force: press at least 3 times, at two positions or more"
     )]
     TooFewPresses {
         /// Number of presses.

@@ -22,7 +22,7 @@ use palpate_mechanics::contact::Position;
 /// Fits the influence functions of a plane with a model.
 pub(super) fn fit(config: Influence, task: FitTask) -> Result<PlaneLocator, InfluenceFitError> {
     if config.contacts > 1 {
-        return Err(InfluenceFitError::NotOnPlane { what: "telling several contacts apart" });
+        return Err(InfluenceFitError::NotOnPlane { what: "locating several contacts" });
     }
     let mut table = PlaneTable::empty(task.setup.layout().len(), task.setup.surface().extent());
     let places: Vec<Position> = (0..table.nodes()).map(|node| table.node(node)).collect();

@@ -362,7 +362,7 @@ fn what_a_plane_cannot_do_is_refused_in_words() {
     let several = refuse(Influence { contacts: 2, ..Influence::default() }, &recording);
     assert_eq!(
         several.to_string(),
-        "the surface is a plane: telling several contacts apart works on a line, such as a beam, only"
+        "the surface is a plane: locating several contacts works on a line, such as a beam, only"
     );
     recording.rows.truncate(25);
     let source = InfluenceSource::Recording;

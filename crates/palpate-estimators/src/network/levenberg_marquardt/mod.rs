@@ -74,11 +74,11 @@ pub enum LevenbergMarquardtFitError {
     Features(#[from] NoFeatures),
     /// Readings that differ by no more than noise.
     #[error(
-        "the recording's readings do not differ by more than noise; a network has nothing to tell positions by"
+        "the recording's readings differ by no more than noise, so a network cannot distinguish positions"
     )]
     Alike,
     /// Every training diverged to numbers that are not finite.
-    #[error("none of {trainings} trainings gave a network with finite weights")]
+    #[error("all {trainings} trainings diverged, and no network has finite weights")]
     Diverged {
         /// Number of trainings that were tried.
         trainings: usize,

@@ -33,7 +33,7 @@ pub enum LinkUrl {
 /// Text that is not a link.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{text}` is no place for a board; places are `pty`, `pty:PATH`, `tcp://:7000`, `udp://host:7000`, `mqtt://host/topic` and `-`"
+    "`{text}` is not a link of a board; links are `pty`, `pty:PATH`, `tcp://:7000`, `udp://host:7000`, `mqtt://host/topic` and `-`"
 )]
 pub struct LinkUrlError {
     /// The text.
@@ -284,7 +284,7 @@ fn open(url: &LinkUrl) -> std::io::Result<(Way, String)> {
             Ok((Way::Pty(pty), name))
         }
         #[cfg(not(unix))]
-        LinkUrl::Pty(_) => Err(std::io::Error::other("there are no pseudo-terminals here; use tcp")),
+        LinkUrl::Pty(_) => Err(std::io::Error::other("pseudo-terminals are not supported here; use tcp")),
         LinkUrl::Tcp(address) => {
             let listener = TcpListener::bind(address)?;
             listener.set_nonblocking(true)?;

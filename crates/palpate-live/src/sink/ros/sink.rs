@@ -111,7 +111,7 @@ impl Worker {
         let url = self.url.clone();
         match Node::new(&session, &url) {
             Ok(mut node) => self.publish(batches, &session, &mut node),
-            Err(_) => self.report("refuses the topics; nothing is published"),
+            Err(_) => self.report("refuses the topics; no message is published"),
         }
         // This informs other ROS nodes at once that this node has gone.
         let _ = session.close().wait();

@@ -19,7 +19,7 @@ pub struct RosUrl {
 /// Text that is no [`RosUrl`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{text}` is no Zenoh router with names of ROS, as in `tcp/host:7447?domain=0&name=palpate&frame=surface`: {problem}"
+    "`{text}` is not a Zenoh router with names of ROS, as in `tcp/host:7447?domain=0&name=palpate&frame=surface`: {problem}"
 )]
 pub struct RosUrlError {
     /// The text.
@@ -63,7 +63,7 @@ fn parse(text: &str) -> Result<RosUrl, &'static str> {
             _ => return Err("its parameters are domain, name and frame"),
         };
         if said_before {
-            return Err("a parameter is said twice");
+            return Err("a parameter is given twice");
         }
     }
     Ok(RosUrl {
@@ -78,9 +78,10 @@ fn router_of(text: &str) -> Result<String, &'static str> {
     let address = text.strip_prefix("tcp/").ok_or("it does not begin with tcp/")?;
     // The colons of an address of IPv6 are within brackets.
     let (host, port) = match address.rsplit_once(':') {
-        Some((host, port)) if !port.ends_with(']') => {
-            (host, port.parse().ok().filter(|&port| port > 0).ok_or("its port is no number of 1 to 65535")?)
-        }
+        Some((host, port)) if !port.ends_with(']') => (
+            host,
+            port.parse().ok().filter(|&port| port > 0).ok_or("its port is not a number from 1 to 65535")?,
+        ),
         _ => (address, PORT),
     };
     let bare = host.strip_prefix('[').and_then(|host| host.strip_suffix(']'));
@@ -95,7 +96,7 @@ fn router_of(text: &str) -> Result<String, &'static str> {
 
 fn domain_of(text: &str) -> Result<u8, &'static str> {
     let domain = text.parse().ok().filter(|domain| *domain <= GREATEST_DOMAIN);
-    domain.ok_or("its domain is no number of 0 to 232")
+    domain.ok_or("its domain is not a number from 0 to 232")
 }
 
 fn name_of(text: &str) -> Result<String, &'static str> {

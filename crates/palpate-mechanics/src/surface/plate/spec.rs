@@ -176,7 +176,7 @@ pub enum PlateError {
         value: f64,
     },
     /// A support on an edge that is already supported.
-    #[error("support {number} is on the {edge} edge, which is held already; leave it out")]
+    #[error("support {number} is on the {edge} edge, which is already supported; remove it")]
     SupportOnHeldEdge {
         /// Number of the support, from 1.
         number: usize,
@@ -212,18 +212,18 @@ pub enum PlateError {
     },
     /// A plate without supports.
     #[error(
-        "nothing holds the plate: it can move up and down and tilt every way; hold an edge, or three points"
+        "the plate has no supports: it can move up and down and tilt in every direction; support an edge, or three points"
     )]
     NotHeld,
     /// A plate with a single point support.
-    #[error("the plate is held at {} only: it can tilt about it every way; hold it at three points at least", Point(*at))]
+    #[error("the plate is supported only at {}: it can tilt about that point in every direction; support it at three points at least", Point(*at))]
     HeldAtOnePoint {
         /// The point.
         at: Position,
     },
     /// A plate with all its supports on one line.
     #[error(
-        "the plate can turn about the line through {} and {}, on which all its supports are; hold it beside that line",
+        "the plate can rotate about the line through {} and {}, on which all its supports are; support it beside that line",
         Point(*from), Point(*to)
     )]
     HeldOnALine {
@@ -250,7 +250,7 @@ pub enum Unsolvable {
     #[error(transparent)]
     Stiffness(#[from] palpate_numerics::SparseCholeskyError),
     /// The compliances of the simple supports have no factor.
-    #[error("what the supports at points do is not told: {0}")]
+    #[error("the forces of the point supports could not be computed: {0}")]
     Supports(#[from] palpate_numerics::NotPositiveDefinite),
     /// Supports and edges do not balance a force.
     #[error(

@@ -368,7 +368,7 @@ pub enum RigidMotion {
     #[error("no support takes up force or couple, so it can move up and down and turn freely")]
     Any,
     /// Translation up and down.
-    #[error("its supports hold the slope only, so it can move up and down freely")]
+    #[error("its supports fix the slope only, so it can move up and down freely")]
     UpAndDown,
     /// Rotation about the only support.
     #[error("only the support at {} takes up force, so it can turn about that freely", format_length_mm(*about_m))]
