@@ -16,7 +16,8 @@ pub fn findings(project: &Project) -> Vec<Finding> {
         let original = ORIGINALS.iter().find_map(|folder| project.file(&format!("{folder}{name}")));
         match original {
             None => {
-                findings.push(Finding::new(&sample.path, 1, "no file of this name in examples: add it there"))
+                let message = "no file of this name in examples: add it there";
+                findings.push(Finding::new(&sample.path, 1, message));
             }
             Some(original) if original.bytes != sample.bytes => {
                 let message = format!("differs from {}: copy it again", original.path);

@@ -49,10 +49,9 @@ fn add_names(value: &Value, names: &mut BTreeSet<String>) {
 /// Compares the JSON of a run with the row of `verb`.
 fn check(verb: &str, stdout: &str) {
     let mut names = BTreeSet::new();
-    let values = serde_json::Deserializer::from_str(stdout).into_iter::<Value>();
-    values.for_each(|value| {
-        add_names(&value.unwrap_or_else(|error| panic!("{verb}: {error}: {stdout}")), &mut names)
-    });
+    for value in serde_json::Deserializer::from_str(stdout).into_iter::<Value>() {
+        add_names(&value.unwrap_or_else(|error| panic!("{verb}: {error}: {stdout}")), &mut names);
+    }
     assert!(!names.is_empty(), "{verb} prints no JSON");
     let (all, required) = documented(verb);
     let unknown: Vec<_> = names.difference(&all).collect();
