@@ -17,7 +17,10 @@ use crate::skipped::{self, STRICT, Skipped, Skips};
 /// Most bytes of the dashboard's scripts and styles, as they are sent without compression.
 const MOST_BYTES: u64 = 150_000;
 
-/// Builds the dashboard into `web/dist`, from which `palpate serve` takes it when it is compiled.
+/// Folder of the built dashboard: in the crate that compiles it, so that the archive of the crate has it too.
+const BUILT: &str = "crates/palpate-live/dashboard";
+
+/// Builds the dashboard into [`BUILT`], from which `palpate serve` takes it when it is compiled.
 pub fn build(root: &Path) -> Result<bool> {
     if !NODE.is_there(root) {
         println!("{}", NODE.describe());
@@ -32,8 +35,8 @@ pub fn build(root: &Path) -> Result<bool> {
     touched
         .and_then(|file| file.set_modified(SystemTime::now()))
         .with_context(|| format!("cannot touch {}", holder.display()))?;
-    let bytes = size(&root.join("web/dist/assets"))?;
-    println!("web/dist: {bytes} bytes of scripts and styles; at most {MOST_BYTES}");
+    let bytes = size(&root.join(BUILT).join("assets"))?;
+    println!("{BUILT}: {bytes} bytes of scripts and styles; at most {MOST_BYTES}");
     Ok(bytes <= MOST_BYTES)
 }
 

@@ -1,10 +1,12 @@
-//! The features that the checks turn on.
+//! Features: those that the checks turn on, and a check of their combinations.
 
 use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
+
+use crate::run;
 
 /// Features with dependencies that take minutes to compile: `cargo xtask wire` checks them, `cargo xtask test` leaves them out.
 const SLOW: [&str; 2] = ["foxglove", "ros"];
@@ -17,6 +19,45 @@ pub fn all_but_slow(root: &Path) -> Result<[String; 3]> {
 /// Every crate with all features, as arguments of cargo.
 pub fn all(root: &Path) -> Result<[String; 3]> {
     arguments(&metadata(root)?, |_| true)
+}
+
+/// Checks every published crate without features, with each feature alone and with all; true when all of them compile.
+pub fn check(root: &Path) -> Result<bool> {
+    let combinations = combinations(&metadata(root)?)?;
+    let mut failed = Vec::new();
+    for (number, arguments) in combinations.iter().enumerate() {
+        let words = arguments.join(" ");
+        println!("\n=== {} of {}: cargo check {words}", number + 1, combinations.len());
+        let mut cargo = Command::new("cargo");
+        if !run::shown(cargo.args(["check", "--quiet"]).args(arguments).current_dir(root))? {
+            failed.push(words);
+        }
+    }
+    println!("\n{} combinations, {} failed", combinations.len(), failed.len());
+    failed.iter().for_each(|words| println!("failed: cargo check {words}"));
+    Ok(failed.is_empty())
+}
+
+/// Arguments of cargo for each combination of features of each crate that is published.
+fn combinations(metadata: &Value) -> Result<Vec<Vec<String>>> {
+    let packages = metadata["packages"].as_array().context("`cargo metadata` lists no packages")?;
+    let mut combinations = Vec::new();
+    // `publish` lists the allowed registries; null is any, and an empty list none.
+    for package in packages.iter().filter(|package| package["publish"].is_null()) {
+        let name = package["name"].as_str().context("`cargo metadata` has a package without a name")?;
+        let features = package["features"].as_object().into_iter().flat_map(|features| features.keys());
+        let features: Vec<&String> = features.filter(|feature| *feature != "default").collect();
+        let mut add = |more: &[&str]| {
+            let arguments = ["--package", name, "--no-default-features"].into_iter();
+            combinations.push(arguments.chain(more.iter().copied()).map(str::to_owned).collect());
+        };
+        add(&[]);
+        features.iter().for_each(|feature| add(&["--features", feature]));
+        if features.len() > 1 {
+            add(&["--all-features"]);
+        }
+    }
+    Ok(combinations)
 }
 
 fn metadata(root: &Path) -> Result<Value> {
@@ -52,6 +93,27 @@ fn arguments(metadata: &Value, is_on: impl Fn(&str) -> bool) -> Result<[String; 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn published_crates_are_checked_in_every_combination() {
+        let metadata = serde_json::json!({"packages": [
+            {"name": "a", "publish": null, "features": {"default": ["x"], "x": [], "y": []}},
+            {"name": "b", "publish": null, "features": {}},
+            {"name": "c", "publish": [], "features": {"z": []}},
+        ]});
+        let combinations = combinations(&metadata).unwrap();
+        let words: Vec<String> = combinations.iter().map(|arguments| arguments.join(" ")).collect();
+        assert_eq!(
+            words,
+            [
+                "--package a --no-default-features",
+                "--package a --no-default-features --features x",
+                "--package a --no-default-features --features y",
+                "--package a --no-default-features --all-features",
+                "--package b --no-default-features",
+            ]
+        );
+    }
 
     #[test]
     fn slow_features_are_left_out_and_all_others_are_on() {

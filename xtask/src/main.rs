@@ -1,6 +1,7 @@
-//! The project's chores: `cargo xtask test | validate | wire | web | wheel | tidy | rig-keys | bench | fuzz`.
+//! The project's chores: `cargo xtask test | validate | features | wire | web | wheel | tidy | rig-keys | bench | fuzz`.
 #![forbid(unsafe_code)]
 
+mod bench;
 mod counts;
 mod dashboard;
 mod features;
@@ -43,9 +44,11 @@ enum Chore {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
+    /// Check every published crate without features, with each feature alone and with all
+    Features,
     /// Build the sinks for ROS 2 and Foxglove, which take minutes to compile, and run their tests, clippy and docs
     Wire,
-    /// Build the dashboard of `palpate serve` into web/dist, from which compiling takes it; needs Node
+    /// Build the dashboard of `palpate serve` into crates/palpate-live/dashboard, from which compiling takes it; needs Node
     Web,
     /// Build the wheel of the Python package, and run its tests on it with the oldest and the newest of what it supports
     Wheel,
@@ -53,15 +56,8 @@ enum Chore {
     RigKeys,
     /// Check the rules that a program can check: dependencies, import circles, links
     Tidy,
-    /// Run the benchmarks of the whole workspace
-    Bench {
-        /// Handed on to `cargo bench`, such as --bench NAME
-        #[arg(allow_hyphen_values = true)]
-        for_cargo: Vec<String>,
-        /// Handed on to the benchmarks
-        #[arg(last = true)]
-        for_benches: Vec<String>,
-    },
+    /// Run the benchmarks of the whole workspace, or some of them; save their figures, and compare them with saved ones
+    Bench(bench::Arguments),
     /// Fuzz one target, or list the targets when none is named
     Fuzz {
         /// A file of fuzz/fuzz_targets, without .rs
@@ -83,16 +79,13 @@ fn main() -> ExitCode {
             experiment.args(["run", "--quiet", "--package", "palpate-validation", "--"]).args(arguments);
             run::shown(&mut experiment)
         }
+        Chore::Features => features::check(&root),
         Chore::Wire => wire::run(&root),
         Chore::Web => dashboard::build(&root),
         Chore::Wheel => python::wheel(&root),
         Chore::RigKeys => rig_keys::run(&root),
         Chore::Tidy => tidy::run(&root),
-        Chore::Bench { for_cargo, for_benches } => {
-            let mut bench = Command::new("cargo");
-            bench.args(["bench", "--workspace"]).args(for_cargo).arg("--").args(for_benches);
-            run::shown(bench.current_dir(&root))
-        }
+        Chore::Bench(arguments) => bench::run(&root, &arguments),
         Chore::Fuzz { target: None, .. } => fuzz::list(&root),
         Chore::Fuzz { target: Some(target), seconds } => fuzz::run(&root, &target, seconds),
     };

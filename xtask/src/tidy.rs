@@ -5,6 +5,7 @@
 mod binary;
 mod changelog;
 mod circles;
+mod copies;
 mod crates;
 mod links;
 mod places;
@@ -34,9 +35,10 @@ impl Finding {
 
 type Rule = fn(&Project) -> Vec<Finding>;
 
-const RULES: [(&str, Rule); 7] = [
+const RULES: [(&str, Rule); 8] = [
     ("crates depend one way", crates::findings),
     ("no import circle between sibling files", circles::findings),
+    ("copies equal their originals", copies::findings),
     ("documents name what exists", links::findings),
     ("no machine's paths or hosts", places::findings),
     ("nothing unfinished", unfinished::findings),

@@ -211,6 +211,7 @@ pub fn csv_complaint(error: &CsvError) -> Complaint {
 }
 
 /// A number from 0 to 1.
+#[cfg(feature = "live")]
 pub fn share(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
@@ -219,6 +220,7 @@ pub fn share(text: &str) -> Result<f64, String> {
 }
 
 /// A factor by which a clock runs fast.
+#[cfg(feature = "live")]
 pub fn clock_speed() -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(1..=100)
 }

@@ -21,7 +21,9 @@ mod lines;
 mod output;
 mod progress;
 mod remark;
+#[cfg(feature = "live")]
 mod rules;
+#[cfg(feature = "live")]
 mod session;
 mod tables;
 mod tare;
@@ -29,6 +31,7 @@ mod target;
 
 use crate::remark::remark;
 use clap::{Parser, Subcommand};
+#[cfg(feature = "live")]
 use palpate_live::login::without_passwords;
 use std::io::Write;
 use std::process::ExitCode;
@@ -52,16 +55,22 @@ enum Command {
     Evaluate(commands::evaluate::Arguments),
     Locate(commands::locate::Arguments),
     Track(commands::track::Arguments),
+    #[cfg(feature = "live")]
     Calibrate(commands::calibrate::Arguments),
     Compare(commands::compare::Arguments),
     Design(commands::design::Arguments),
     Limit(commands::limit::Arguments),
     Inspect(commands::inspect::Arguments),
     Profile(commands::profile::Arguments),
+    #[cfg(feature = "live")]
     Serve(commands::serve::Arguments),
+    #[cfg(feature = "live")]
     Record(commands::record::Arguments),
+    #[cfg(feature = "live")]
     Recover(commands::recover::Arguments),
+    #[cfg(feature = "live")]
     Replay(commands::replay::Arguments),
+    #[cfg(feature = "live")]
     SimulatedBoard(commands::simulated_board::Arguments),
 }
 
@@ -80,16 +89,22 @@ fn main() -> ExitCode {
         Command::Evaluate(arguments) => commands::evaluate::run(&arguments),
         Command::Locate(arguments) => commands::locate::run(&arguments),
         Command::Track(arguments) => commands::track::run(&arguments),
+        #[cfg(feature = "live")]
         Command::Calibrate(arguments) => commands::calibrate::run(&arguments),
         Command::Compare(arguments) => commands::compare::run(&arguments),
         Command::Design(arguments) => commands::design::run(&arguments),
         Command::Limit(arguments) => commands::limit::run(&arguments),
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
         Command::Profile(arguments) => commands::profile::run(&arguments),
+        #[cfg(feature = "live")]
         Command::Serve(arguments) => commands::serve::run(&arguments),
+        #[cfg(feature = "live")]
         Command::Record(arguments) => commands::record::run(&arguments),
+        #[cfg(feature = "live")]
         Command::Recover(arguments) => commands::recover::run(&arguments),
+        #[cfg(feature = "live")]
         Command::Replay(arguments) => commands::replay::run(&arguments),
+        #[cfg(feature = "live")]
         Command::SimulatedBoard(arguments) => commands::simulated_board::run(&arguments),
     };
     match result {
@@ -113,5 +128,35 @@ fn answer(error: &clap::Error) -> ExitCode {
         (true, _) => ExitCode::from(2),
         (false, Ok(())) => ExitCode::SUCCESS,
         (false, Err(error)) => output::unprinted(&error).report(),
+    }
+}
+
+/// The text, as a command without sources has no passwords.
+#[cfg(not(feature = "live"))]
+fn without_passwords(text: &str) -> String {
+    text.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn verbs_and_options_are_those_of_the_features() {
+        let command = Arguments::command();
+        command.clone().debug_assert();
+        let of_boards = ["calibrate", "record", "recover", "replay", "serve", "simulated-board"];
+        for verb in of_boards {
+            assert_eq!(command.find_subcommand(verb).is_some(), cfg!(feature = "live"), "{verb}");
+        }
+        for verb in of_boards.into_iter().filter_map(|verb| command.find_subcommand(verb)) {
+            let takes_machine = verb.get_arguments().any(|argument| argument.get_id() == "stage");
+            let may = ["calibrate", "serve", "simulated-board"].contains(&verb.get_name());
+            assert_eq!(takes_machine, may && cfg!(feature = "gcode"), "{}", verb.get_name());
+        }
+        for verb in ["fit", "locate", "track", "study"] {
+            assert!(command.find_subcommand(verb).is_some(), "{verb}");
+        }
     }
 }

@@ -81,7 +81,7 @@ fn begin_to_listen() -> Result<(), Box<dyn Error>> {
 }
 
 /// Sets a flag at once if a signal asks the process to end or to be suspended: a machine must not continue unwatched.
-#[cfg(unix)]
+#[cfg(all(feature = "live", unix))]
 pub fn set_at_signal(flag: &Arc<AtomicBool>) -> std::io::Result<()> {
     for signal in ends().into_iter().chain([signal_hook::consts::SIGTSTP]) {
         signal_hook::flag::register(signal, Arc::clone(flag))?;
@@ -90,12 +90,13 @@ pub fn set_at_signal(flag: &Arc<AtomicBool>) -> std::io::Result<()> {
 }
 
 /// Has no effect without signals: a caller of [`interrupted`] sets the flag.
-#[cfg(not(unix))]
+#[cfg(all(feature = "live", not(unix)))]
 pub fn set_at_signal(_: &Arc<AtomicBool>) -> std::io::Result<()> {
     Ok(())
 }
 
 /// Lets the command finish its work after a first signal: close a recording, lift a machine. A second signal ends the process.
+#[cfg(feature = "live")]
 pub fn finish_after_signal() {
     FINISHES.store(true, Ordering::Relaxed);
 }

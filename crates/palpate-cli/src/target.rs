@@ -1,7 +1,7 @@
 //! Files and folders that a command may write: overwriting of data is refused with a reason, and files appear complete.
 
 use crate::failure::{Complaint, Failure};
-use palpate_live::whole_file::{self, folder_of};
+use palpate_files::{self as whole_file, folder_of};
 use palpate_report::ReportFile;
 use std::fs::{self, Metadata};
 use std::io::{Error, ErrorKind};

@@ -7,6 +7,7 @@
 use cpu_time::ProcessTime;
 use palpate_live::frame::{Channel, Decoder, encode_into};
 use palpate_mechanics::units::Unit;
+use palpate_testing::figure::figure;
 use std::fmt::Write;
 
 const FRAMES: u32 = 200_000;
@@ -36,6 +37,7 @@ fn main() {
     for (form, bytes) in streams {
         let rate = million_a_second(|| decode(&channels, bytes));
         let found = million_a_second(|| find(bytes, form == "binary"));
+        figure(&format!("decoder: {form}"), rate, "M frames/s");
         println!(
             "{form:>8}: {rate:.2} million frames/s; search only {found:.2}, {:.1} times as many",
             found / rate

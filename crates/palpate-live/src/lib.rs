@@ -26,4 +26,3 @@ pub mod sink;
 pub mod source;
 pub mod stage;
 pub mod stamp;
-pub mod whole_file;

@@ -21,7 +21,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::{Rig, RigSimulationError};
 
 /// The bench of the study, as a rig.
-pub const RIG_TOML: &str = include_str!("../../../examples/dead-areas.toml");
+pub const RIG_TOML: &str = include_str!("dead-areas.toml");
 /// Sensor counts of the study.
 pub const COUNTS: [usize; 4] = [2, 4, 8, 16];
 /// Standard deviation of the array sensor's point spread in metres, for the arrays with the same spread at every count.

@@ -1,7 +1,8 @@
-//! Tools of the tests of any crate: real recordings, and a word when they are not there; work that is stopped; a strip that hands press.
+//! Tools of the tests and benchmarks of any crate: real recordings, and a message if they are missing; stopped work; a strip that hands press; figures.
 #![forbid(unsafe_code)]
 
 pub mod data;
+pub mod figure;
 pub mod json_numbers;
 pub mod skip;
 pub mod stopping;

@@ -11,6 +11,7 @@ use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
 use palpate_numerics::median;
 use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
+use palpate_testing::figure::figure;
 
 const SITES: usize = 100_000;
 const SENSORS: usize = 8;
@@ -49,6 +50,7 @@ fn by_limit(setup: &Setup, design: &SensorDesign) {
     let (rows_s, _) = timed(|| SensorProblem::new(setup, design, Watch::NONE).expect("a sound design"));
     let problem = SensorProblem::new(setup, design, Watch::NONE).expect("a sound design");
     let (search_s, designed) = timed(|| problem.greedy_exchange(0, Watch::NONE).expect("it is judged"));
+    figure("design: search by the limit", rows_s + search_s, "s");
     let limit_mm = designed.assessment.mean_limit_m.unwrap_or(f64::NAN) * 1e3;
     println!("{SENSORS} of {SITES} sites by the limit, {} contacts:", problem.contacts().len());
     println!(
@@ -60,6 +62,7 @@ fn by_limit(setup: &Setup, design: &SensorDesign) {
 
 fn by_pivoting(name: &str, modes: &[Vec<f64>]) {
     let (seconds, pivots) = timed(|| pivoted_columns(modes, SENSORS));
+    figure(&format!("design: QR with column pivoting, {name}"), seconds * 1e3, "ms");
     println!(
         "QR with column pivoting, {SENSORS} of {SITES} sites, {} modes ({name}): {:.2} ms, condition {:.4}",
         modes.len(),

@@ -6,6 +6,7 @@ use std::hint::black_box;
 use cpu_time::ThreadTime;
 use palpate_estimators::network::{Network, PreparedNetwork, Topology};
 use palpate_numerics::median;
+use palpate_testing::figure::figure;
 
 const ROUNDS: usize = 15;
 const READINGS: usize = 4096;
@@ -25,6 +26,7 @@ fn main() {
     println!("8-10-1");
     for (name, time) in ["one reading, f64, core", "one reading, f64, prepared"].into_iter().zip(&medians) {
         let (nanoseconds, millions) = (1e9 * time, 1e-6 / time);
+        figure(&format!("forward: {name}"), nanoseconds, "ns");
         println!(
             "    {name:<27} {nanoseconds:>6.1} ns  {millions:>6.1} M readings/s  {:>5.1} x",
             medians[0] / time

@@ -6,6 +6,7 @@ use ndarray::Array2;
 use palpate_numerics::regression::{Regression, Samples};
 use palpate_numerics::watch::Watch;
 use palpate_numerics::{Cholesky, median};
+use palpate_testing::figure::figure;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -26,6 +27,7 @@ fn main() {
         let fit_s = seconds(|| drop(std::hint::black_box(fit())));
         let factor_s =
             seconds(|| drop(std::hint::black_box(regression.condition(samples, &found, Watch::NONE))));
+        figure(&format!("gaussian_process: fit of {rows} presses"), fit_s, "s");
         println!("{rows} presses: fitted in {fit_s:.2} s, of which {factor_s:.2} s with all rows");
 
         let mut scratch = process.scratch();
@@ -43,6 +45,9 @@ fn main() {
             points.iter().for_each(|at| process.predict_into(at, &mut mean, &mut variance, &mut scratch));
         });
         let [mean_us, gradient_us, variance_us] = [mean_s, gradient_s, variance_s].map(|s| s * 1e4);
+        for (name, time_us) in [("mean", mean_us), ("gradient", gradient_us), ("variance", variance_us)] {
+            figure(&format!("gaussian_process: {name} of {rows} presses"), time_us, "us");
+        }
         println!(
             "    a prediction: mean {mean_us:.1} us, with gradient {gradient_us:.1} us, with variance {variance_us:.1} us"
         );
@@ -51,6 +56,7 @@ fn main() {
         let matrix = Array2::from_shape_fn((size, size), |(i, j)| (-(i as f64 - j as f64).abs()).exp());
         let seconds = seconds(|| drop(std::hint::black_box(Cholesky::factor(matrix.clone()))));
         let rate = (size as f64).powi(3) / 3.0 / seconds / 1e9;
+        figure(&format!("gaussian_process: Cholesky of {size}"), seconds * 1e3, "ms");
         println!("Cholesky of {size}: {:.1} ms, {rate:.1} Gflop/s", seconds * 1e3);
     }
 }

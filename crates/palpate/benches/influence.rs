@@ -13,6 +13,7 @@ use palpate_estimators::simulate::clean_reading;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::median;
 use palpate_rig::Rig;
+use palpate_testing::figure::figure;
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
@@ -32,13 +33,17 @@ fn main() {
                 start.elapsed().as_secs_f64()
             })
             .collect();
-        println!("fit of 10 × 10 presses, {source:?}: {:.2} ms", median(times).expect("rounds") * 1e3);
+        let time_ms = median(times).expect("rounds") * 1e3;
+        figure(&format!("influence: fit of 10 × 10 presses, {source:?}"), time_ms, "ms");
+        println!("fit of 10 × 10 presses, {source:?}: {time_ms:.2} ms");
     }
     for force_n in [Some(3.0), None] {
         let setup = rig.setup.clone().with_force(force_n).expect("a force is more than 0");
         let locator = fit(Influence::default(), &setup, &recording);
         let known = if force_n.is_some() { "known" } else { "unknown" };
         let Times { single, batch } = nanoseconds(&locator, &rig);
+        figure(&format!("influence: estimate, force {known}"), single, "ns");
+        figure(&format!("influence: estimate in a batch, force {known}"), batch, "ns");
         println!("estimate with uncertainty, force {known}: {single:.0} ns a reading");
         println!(
             "the same in batches of {READINGS}: {batch:.0} ns, {:.2} million readings/s, {:.2} times as fast",
@@ -65,6 +70,7 @@ fn million(rig: &Rig, recording: &Recording) {
             start.elapsed().as_secs_f64()
         });
         let seconds = median(times.collect()).expect("rounds");
+        figure(&format!("influence: a million readings, {threads} threads"), 1e3 * seconds, "ms");
         println!(
             "a million readings in blocks, {threads} threads: {:.1} ms, {:.2} million readings/s",
             1e3 * seconds,

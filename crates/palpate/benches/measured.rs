@@ -17,6 +17,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::median;
+use palpate_testing::figure::figure;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -258,6 +259,8 @@ fn report(bench: &Bench) {
     let fit_s = start.elapsed().as_secs_f64();
     let touches = bench.touches(&mut rng);
     let ours_us = microseconds(&touches, |reading| locator.locate(reading).contact);
+    figure(&format!("measured: {}, fit", bench.name), fit_s, "s");
+    figure(&format!("measured: {}, estimate", bench.name), ours_us, "us");
     let every = touches.iter().step_by(10).cloned().collect::<Vec<Row>>();
     let obvious_us = microseconds(&every, |reading| of_every_node(&locator, reading));
     let (median_mm, mean_mm) = errors_mm(&touches, |reading| locator.locate(reading).contact.position);

@@ -12,6 +12,7 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::median;
 use palpate_rig::Rig;
+use palpate_testing::figure::figure;
 
 const ROUNDS: usize = 51;
 
@@ -25,7 +26,9 @@ fn main() {
             start.elapsed().as_secs_f64()
         })
         .collect();
-    println!("fit of 36 × 5 presses: {:.0} ms", median(times).expect("rounds") * 1e3);
+    let time_ms = median(times).expect("rounds") * 1e3;
+    figure("plane: fit of 36 × 5 presses", time_ms, "ms");
+    println!("fit of 36 × 5 presses: {time_ms:.0} ms");
     let all =
         every(Extent::plane(0.3, 0.3).expect("it has sides"), 0.01).expect("a centimetre is a fair spacing");
     let middle = |at: &Position| [at.x_m, at.y_m].iter().all(|m| (0.075..=0.225).contains(m));
@@ -36,6 +39,7 @@ fn main() {
         let known = if force_n.is_some() { "known" } else { "unknown" };
         for (place, positions) in [("the middle, half as long and wide", &plain), ("the whole plate", &all)] {
             let time_us = microseconds(&locator, &rig, positions);
+            figure(&format!("plane: estimate, force {known}, {place}"), time_us, "us");
             println!("estimate with uncertainty, force {known}, {place}: {time_us:.2} µs a reading");
         }
     }

@@ -8,6 +8,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
 use palpate_mechanics::surface::{Plate, Surface};
+use palpate_testing::figure::figure;
 
 const SIDE_M: f64 = 0.3;
 const EVALUATIONS: usize = 4_000_000;
@@ -22,6 +23,7 @@ fn main() {
     let influences: Vec<_> =
         sensors.iter().map(|at| plate.influence_function(SensorKind::Deflection, *at)).collect();
     let seconds = start.elapsed().as_secs_f64();
+    figure("plate: 200 × 200 elements, 9 sensors", seconds, "s");
     println!("200 × 200 elements, 9 sensors: {seconds:.2} s, of them {factored_s:.2} s for the factor");
     println!(
         "peak memory {:.0} MiB, estimated {:.0} MiB",
@@ -35,12 +37,15 @@ fn main() {
         black_box(influences[i % 9].at(contacts[i % 1000]));
     }
     let each_s = start.elapsed().as_secs_f64() / EVALUATIONS as f64;
+    figure("plate: an influence", each_s * 1e9, "ns");
     println!("an influence: {:.1} ns, {:.1} million/s", each_s * 1e9, 1e-6 / each_s);
     let start = ProcessTime::now();
     for i in 0..EVALUATIONS {
         black_box(influences[i % 9].gradient(contacts[i % 1000]));
     }
-    println!("a gradient: {:.1} ns", start.elapsed().as_secs_f64() / EVALUATIONS as f64 * 1e9);
+    let gradient_ns = start.elapsed().as_secs_f64() / EVALUATIONS as f64 * 1e9;
+    figure("plate: a gradient", gradient_ns, "ns");
+    println!("a gradient: {gradient_ns:.1} ns");
 
     let solution_s = (seconds - factored_s) / 9.0;
     let naive = solution_s / (9.0 * each_s);

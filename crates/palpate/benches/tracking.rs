@@ -8,6 +8,7 @@ use palpate_estimators::recording::TimedRecording;
 use palpate_estimators::track_errors::{Followed, TrackErrors, follow};
 use palpate_numerics::median;
 use palpate_rig::Rig;
+use palpate_testing::figure::figure;
 
 const ROUNDS: usize = 7;
 /// Recordings of each motion, under noise of their own.
@@ -26,7 +27,8 @@ fn main() {
             for speed_m_per_s in [0.1, 0.2, 0.5, 1.0] {
                 let rig = Rig { motion: Some(moving.at_speed(speed_m_per_s).unwrap()), ..rig.clone() };
                 println!("  {speed_m_per_s} m/s");
-                measure(&locator, &rig);
+                let force = if force_n.is_some() { "known" } else { "unknown" };
+                measure(&format!("tracking: {name}, force {force}, {speed_m_per_s} m/s"), &locator, &rig);
             }
         }
     }
@@ -38,7 +40,7 @@ fn fit(rig: &Rig, force_n: Option<f64>) -> Locator {
     rig.estimator.fit(&setup, &recording).expect("the presses suit the bench")
 }
 
-fn measure(locator: &Locator, rig: &Rig) {
+fn measure(title: &str, locator: &Locator, rig: &Rig) {
     let seeds = 2..2 + RECORDINGS;
     let moving: Vec<TimedRecording> =
         seeds.map(|seed| rig.simulate_moving(seed).expect("the example can be moved")).collect();
@@ -49,6 +51,7 @@ fn measure(locator: &Locator, rig: &Rig) {
     for (name, swing) in ways.into_iter().flatten() {
         let config = TrackerConfig { swing, ..TrackerConfig::default() };
         let rate = readings_per_s(locator, config, &moving[0]);
+        figure(&format!("{title}, {name}"), rate / 1e3, "thousand readings/s");
         let followed: Vec<_> = moving
             .iter()
             .map(|timed| follow(locator, config, timed).expect("an influence locator"))

@@ -10,6 +10,7 @@ use palpate_estimators::network::{
 use palpate_numerics::median;
 use palpate_numerics::simd::InstructionSet;
 use palpate_numerics::watch::Watch;
+use palpate_testing::figure::figure;
 
 const ROUNDS: usize = 9;
 const EPOCHS: u32 = 400;
@@ -74,7 +75,13 @@ fn compare(count: usize, precision: Precision) {
     }
     let medians: Vec<f64> = rates.into_iter().map(|r| median(r).expect("rounds")).collect();
     println!("{count} patterns, {precision:?}: one after the other {:.2} M/s", medians[0] / 1e6);
+    figure(
+        &format!("training: {count} patterns, {precision:?}, one after the other"),
+        medians[0] / 1e6,
+        "M/s",
+    );
     for (set, rate) in sets.iter().zip(&medians[1..]) {
+        figure(&format!("training: {count} patterns, {precision:?}, {set}"), rate / 1e6, "M/s");
         println!("    {set:<12} {:>7.2} M/s  {:>5.2} x", rate / 1e6, rate / medians[0]);
     }
 }

@@ -4,8 +4,9 @@ use super::Finding;
 use super::project::{Crate, Project};
 
 /// Top to bottom: a crate may depend on those above it.
-const ORDER: [&str; 16] = [
+const ORDER: [&str; 17] = [
     "palpate-core",
+    "palpate-files",
     "palpate-numerics",
     "palpate-testing",
     "palpate-mechanics",

@@ -41,6 +41,7 @@ pub struct Arguments {
     /// Source of the readings: `serial:///dev/ttyACM0`, `tcp://host:port`, `udp://:port`, `mqtt://host/topic`, `file:recording.mcap`, `-` for stdin
     #[arg(long, value_name = "SOURCE")]
     from: SourceUrl,
+    #[cfg(feature = "gcode")]
     /// A machine that presses: `gcode:serial:///dev/ttyUSB0?baud=115200` or `gcode:tcp://host:port`, of Marlin or GRBL firmware
     #[arg(long, value_name = "MACHINE")]
     stage: Option<StageUrl>,
@@ -53,11 +54,13 @@ pub struct Arguments {
     /// Force of every press, as in `--force "2 N"` [default: the rig's, or unknown]
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     force: Option<f64>,
+    #[cfg(feature = "gcode")]
     /// Travel to every position at the height of travel without a press; no file is read or written but the rig
     #[arg(long, requires = "stage")]
     dry_run: bool,
     #[command(flatten)]
     operator: OperatorOptions,
+    #[cfg(feature = "gcode")]
     /// Jog the machine by hand before the presses, and find the height at which its finger touches
     #[arg(long, requires = "stage", conflicts_with = "dry_run")]
     jog: bool,
@@ -75,6 +78,37 @@ pub struct Arguments {
     clock_speed: u32,
 }
 
+#[cfg(feature = "gcode")]
+impl Arguments {
+    fn machine(&self) -> Option<&StageUrl> {
+        self.stage.as_ref()
+    }
+
+    fn is_dry_run(&self) -> bool {
+        self.dry_run
+    }
+
+    fn jogs(&self) -> bool {
+        self.jog
+    }
+}
+
+/// A command without machines.
+#[cfg(not(feature = "gcode"))]
+impl Arguments {
+    fn machine(&self) -> Option<&StageUrl> {
+        None
+    }
+
+    fn is_dry_run(&self) -> bool {
+        false
+    }
+
+    fn jogs(&self) -> bool {
+        false
+    }
+}
+
 /// Statements of the person who presses.
 #[derive(clap::Args)]
 pub struct OperatorOptions {
@@ -82,7 +116,8 @@ pub struct OperatorOptions {
     #[arg(long, value_name = "LENGTH", value_parser = input::length)]
     placement: Option<f64>,
     /// A second weight, by which every other place is pressed too [default: asked for where one weight is too few]
-    #[arg(long, value_name = "FORCE", value_parser = input::force, conflicts_with_all = ["force_is_known", "stage"])]
+    #[arg(long, value_name = "FORCE", value_parser = input::force, conflicts_with = "force_is_known")]
+    #[cfg_attr(feature = "gcode", arg(conflicts_with = "stage"))]
     second_force: Option<f64>,
     /// Contacts in use have the force of the presses
     #[arg(long)]
@@ -118,10 +153,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let out = Target::new(&arguments.out, &inputs)?;
     Target::new(&arguments.presses, &inputs)?;
     let rig = input::read_rig(&arguments.rig)?;
-    let machine = arguments.stage.as_ref();
+    let machine = arguments.machine();
     let mut stage = stage(&arguments.rig, &rig, machine, arguments.force)?;
     let clock = HostClock::with_speed(arguments.clock_speed);
-    if let (true, Some(stage)) = (arguments.dry_run, &stage) {
+    if let (true, Some(stage)) = (arguments.is_dry_run(), &stage) {
         return dry_run(arguments, &rig, stage.clone(), clock);
     }
     let depths = DepthKnowledge::for_stage(stage.as_ref());
@@ -139,7 +174,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let is_by_hand = stage.is_none() && !to_come(&known, &before)?.is_empty();
     let keys = (arguments.from != SourceUrl::Stdin).then(keys);
-    if let (true, Some(set_up)) = (arguments.jog, &mut stage) {
+    if let (true, Some(set_up)) = (arguments.jogs(), &mut stage) {
         let bench = Bench { arguments, rig: &rig, keys: keys.as_ref(), clock };
         if !bench.set_up(set_up)? {
             return Ok(());
@@ -269,7 +304,7 @@ impl Bench<'_> {
     /// Jogs and touch-offs by the keys; the stage gets the height that is found. False where the operator ends it.
     fn set_up(&self, stage: &mut Stage) -> Result<bool, Failure> {
         let Self { arguments, rig, clock, .. } = self;
-        let (Some(url), Some(keys)) = (&arguments.stage, self.keys) else {
+        let (Some(url), Some(keys)) = (arguments.machine(), self.keys) else {
             let complaint =
                 Complaint::new("--jog needs the keyboard, and --from - takes the readings from it");
             return Err(complaint.help("give the readings by another source").into());
@@ -412,7 +447,7 @@ fn machine(
     stage: Option<Stage>,
     clock: HostClock,
 ) -> Result<Option<Machine>, Failure> {
-    let (Some(url), Some(stage)) = (&arguments.stage, stage) else { return Ok(None) };
+    let (Some(url), Some(stage)) = (arguments.machine(), stage) else { return Ok(None) };
     let limit_n = stage.force_limit_n;
     let thread = open_stage(url, stage, clock)?;
     Ok(Some(Machine::new(thread, limit_n, clock.elapsed())))
@@ -441,7 +476,7 @@ fn open_stage(url: &StageUrl, stage: Stage, clock: HostClock) -> Result<StageThr
 
 /// Homes, and travels to every position at the height of travel.
 fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage, clock: HostClock) -> Result<(), Failure> {
-    let Some(url) = &arguments.stage else { return Ok(()) };
+    let Some(url) = arguments.machine() else { return Ok(()) };
     let weights = arguments.operator.statements().weights(arguments.force);
     let plan = calibration::plan(rig, weights, &stage.depths_m, &[])
         .map_err(|error| Complaint::about(&arguments.rig, error))?;

@@ -1,5 +1,6 @@
 //! One module per verb.
 
+#[cfg(feature = "live")]
 pub mod calibrate;
 pub mod compare;
 pub mod design;
@@ -7,18 +8,26 @@ pub mod evaluate;
 pub mod fit;
 pub mod init;
 pub mod inspect;
+#[cfg(feature = "live")]
 mod jog;
 mod learnt;
 pub mod limit;
 pub mod locate;
+#[cfg(feature = "live")]
 mod operator;
+#[cfg(feature = "live")]
 mod outlets;
 pub mod profile;
+#[cfg(feature = "live")]
 pub mod record;
+#[cfg(feature = "live")]
 pub mod recover;
+#[cfg(feature = "live")]
 pub mod replay;
+#[cfg(feature = "live")]
 pub mod serve;
 pub mod simulate;
+#[cfg(feature = "live")]
 pub mod simulated_board;
 pub mod study;
 pub mod track;

@@ -29,7 +29,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// The bench of the demonstration: the founding paper's, with noise.
-const DEMO: &str = include_str!("../../../../examples/noisy-beam.toml");
+const DEMO: &str = include_str!("noisy-beam.toml");
 /// The name of the demonstration's file.
 const DEMO_NAME: &str = "examples/noisy-beam.toml";
 /// Interval between two checks for Ctrl-C.
@@ -65,6 +65,7 @@ pub struct Arguments {
     force: Option<f64>,
     #[command(flatten)]
     operator: OperatorOptions,
+    #[cfg(feature = "gcode")]
     /// A machine that presses in the calibration: `gcode:serial:///dev/ttyUSB0?baud=115200` or `gcode:tcp://host:port`, of Marlin or GRBL firmware
     #[arg(long, value_name = "MACHINE", requires = "calibrate")]
     stage: Option<StageUrl>,
@@ -93,6 +94,19 @@ pub struct Arguments {
     /// Run the clock of a calibration so many times as fast, for a simulated board and machine of the same --clock-speed
     #[arg(long, value_name = "N", default_value_t = 1, hide = true, requires = "calibrate", value_parser = input::clock_speed())]
     clock_speed: u32,
+}
+
+impl Arguments {
+    #[cfg(feature = "gcode")]
+    fn machine(&self) -> Option<&StageUrl> {
+        self.stage.as_ref()
+    }
+
+    /// A command without machines.
+    #[cfg(not(feature = "gcode"))]
+    fn machine(&self) -> Option<&StageUrl> {
+        None
+    }
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -303,7 +317,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     Target::new(presses, &inputs)?;
     let rig = input::read_rig(path)?;
     // A calibration that is impossible is refused here, where the place in the file can be shown.
-    let stage = stage(path, &rig, arguments.stage.as_ref(), arguments.force)?;
+    let stage = stage(path, &rig, arguments.machine(), arguments.force)?;
     let depths = DepthKnowledge::for_stage(stage.as_ref());
     let (before, in_file_m) = pressed_before(path, &rig, presses, depths)?;
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
@@ -325,7 +339,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
         out: out.clone(),
         comment,
         force_n: arguments.force,
-        machine: arguments.stage.clone(),
+        machine: arguments.machine().cloned(),
         before,
         statements,
         seed: arguments.seed,

@@ -8,6 +8,7 @@ use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Rela
 use palpate_live::simulated_board::{
     BoardConfig, FaultConfig, Finger, FrameForm, Link, LinkUrl, LoadCell, SimulatedBoard,
 };
+#[cfg(feature = "gcode")]
 use palpate_live::stage::{Firmware, MachineConfig, SimulatedMachine};
 use palpate_live::stamp::HostClock;
 use palpate_mechanics::units::format_count;
@@ -71,12 +72,15 @@ pub struct Arguments {
     /// A script of the finger: CSV of time in s, x and y in mm, force in N [default: a random finger]
     #[arg(long, value_name = "FILE.csv")]
     finger: Option<PathBuf>,
+    #[cfg(feature = "gcode")]
     /// Plug of a machine that moves the finger by G-code, as the rig's [stage] says: pty, pty:PATH or tcp://:PORT
     #[arg(long, value_name = "LINK", conflicts_with = "finger")]
     stage: Option<LinkUrl>,
+    #[cfg(feature = "gcode")]
     /// Firmware of the machine
     #[arg(long, value_name = "FIRMWARE", default_value = "marlin", requires = "stage")]
     firmware: FirmwareName,
+    #[cfg(feature = "gcode")]
     /// Behaviour of the machine, in parts separated by commas: `no-greeting`, `greeting=12s`, `delay=500ms`, `no-emergency-parser`, `paced`, `homing=90s`, `soft-limit-x=200mm`, and faults as in `unknown@G1 Z:3`, at the third line that begins with `G1 Z`
     #[arg(long, value_name = "PARTS", requires = "stage")]
     machine: Option<MachineConfig>,
@@ -104,6 +108,7 @@ enum FrameName {
     Binary,
 }
 
+#[cfg(feature = "gcode")]
 /// Name of a firmware.
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum FirmwareName {
@@ -143,10 +148,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let board = SimulatedBoard::new(&rig.setup, &config, finger)
         .and_then(|board| board.with_faults(arguments.faults(&rig), arguments.seed))
         .map_err(|error| Complaint::about(&arguments.rig, error))?;
+    #[cfg(feature = "gcode")]
     let machine = machine(arguments, &rig)?;
     let link = Link::open(&arguments.to).map_err(Complaint::new)?;
     remark!("{}", link.name());
-    Plugged { board, link, machine, away_until: None, commands: 0 }.run(arguments)
+    Plugged {
+        board,
+        link,
+        #[cfg(feature = "gcode")]
+        machine,
+        away_until: None,
+        commands: 0,
+    }
+    .run(arguments)
 }
 
 /// Default time constants of a creep and of a residue, in seconds, if only the share is given.
@@ -197,6 +211,7 @@ fn load_cell(arguments: &Arguments, rig: &Rig) -> Result<Option<LoadCell>, Failu
     }
 }
 
+#[cfg(feature = "gcode")]
 /// The machine of the rig, at its own link.
 fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<PluggedMachine>, Failure> {
     let Some(url) = &arguments.stage else { return Ok(None) };
@@ -221,6 +236,7 @@ fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<PluggedMachine>, F
     Ok(Some(PluggedMachine { machine, link, was_there: false, was_stopped: false }))
 }
 
+#[cfg(feature = "gcode")]
 /// A machine at its link.
 struct PluggedMachine {
     machine: SimulatedMachine,
@@ -229,6 +245,7 @@ struct PluggedMachine {
     was_stopped: bool,
 }
 
+#[cfg(feature = "gcode")]
 impl PluggedMachine {
     /// Answers the requests of the other end, at a time since the start.
     fn work(&mut self, now: Duration) -> std::io::Result<()> {
@@ -258,6 +275,7 @@ impl PluggedMachine {
 struct Plugged<'a> {
     board: SimulatedBoard<'a>,
     link: Link,
+    #[cfg(feature = "gcode")]
     machine: Option<PluggedMachine>,
     away_until: Option<Duration>,
     /// Number of commands from the other end.
@@ -280,6 +298,7 @@ impl Plugged<'_> {
             while let Some(news) = self.link.news() {
                 remark!("{news}");
             }
+            #[cfg(feature = "gcode")]
             if let Some(machine) = &mut self.machine {
                 machine.work(now).map_err(Complaint::new)?;
                 self.board.finger_mut().hold(machine.machine.contact());

@@ -1,9 +1,9 @@
 //! The file of the presses of a calibration.
 
 use super::trace::Trace;
-use crate::whole_file;
 use palpate_estimators::recording::{self, Column, Columns, Recording, Row};
 use palpate_estimators::setup::Setup;
+use palpate_files as whole_file;
 use palpate_mechanics::units::{Dimension, Unit};
 use palpate_rig::Stage;
 use std::path::{Path, PathBuf};

@@ -2,9 +2,9 @@
 
 use super::recorder::{describe, options};
 use super::{PassedOver, Playback, RecordingError};
-use crate::whole_file;
 use mcap::McapError;
 use mcap::records::MessageHeader;
+use palpate_files as whole_file;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! The file that stores alarms between runs of the server.
 
-use crate::whole_file;
+use palpate_files as whole_file;
 use std::io::{ErrorKind, Result};
 use std::path::{Path, PathBuf};
 

@@ -6,7 +6,7 @@ use rust_embed::RustEmbed;
 
 /// The dashboard, which `cargo xtask web` builds.
 #[derive(RustEmbed)]
-#[folder = "$CARGO_MANIFEST_DIR/../../web/dist"]
+#[folder = "$CARGO_MANIFEST_DIR/dashboard"]
 #[allow_missing = true]
 struct Dashboard;
 

@@ -2,8 +2,8 @@
 
 use crate::calibration::{PlanError, Statements, Weights, plan};
 use crate::source::{SourceUrl, SourceUrlError};
-use crate::whole_file;
 use palpate_estimators::force_prior::ForceRange;
+use palpate_files as whole_file;
 use palpate_rig::{Rig, RigError};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;

@@ -28,7 +28,7 @@ use palpate_numerics::watch::Watch;
 use palpate_rig::{Rig, RigSimulationError};
 
 /// The bench of the study, as a rig.
-pub const RIG_TOML: &str = include_str!("../../../../examples/elliott.toml");
+pub const RIG_TOML: &str = include_str!("elliott.toml");
 /// Numbers of components of the study.
 pub const COMPONENTS: [usize; 9] = [2, 3, 4, 5, 6, 8, 10, 15, 25];
 /// Presentations after which a network of the study stops: its readings are noisy, so its error does not become 0.

@@ -8,7 +8,7 @@ pub use claims::{Claim, ClaimPart, claims};
 pub use published::{Agreement, PublishedFigure, Yardstick, published_figures};
 
 /// The study file, `studies/paper.toml`.
-pub const STUDY_TOML: &str = include_str!("../../../../studies/paper.toml");
+pub const STUDY_TOML: &str = include_str!("paper.toml");
 
 /// The paper's numbers of training positions.
 pub const COUNTS: [u32; 3] = [10, 20, 30];

@@ -1,4 +1,5 @@
 //! Files that are written whole: first under a temporary name, so readers never see an incomplete file.
+#![forbid(unsafe_code)]
 
 use std::fs::File;
 use std::io::{Error, Result, Write};
