@@ -28,7 +28,7 @@ pub fn worse_figures(stored: &Report, measured: &Report) -> Vec<String> {
     for table in &stored.tables {
         match measured.tables.iter().find(|other| other.title == table.title) {
             Some(other) => {
-                lines.extend(worse_in_table(table, other, measured.size).into_iter().map(of_experiment))
+                lines.extend(worse_in_table(table, other, measured.size).into_iter().map(of_experiment));
             }
             None if measured.size == Size::Quick => {}
             None => lines.push(of_experiment(format!("table not measured: {}", table.title))),

@@ -2,8 +2,8 @@
 
 use crate::table::Table;
 use crate::{
-    beam_ends, load_patches, load_profiles, measured_edges, one_weight, plate_edges, real_benches, strips,
-    weighed,
+    beam_ends, load_patches, load_profiles, measured_edges, one_weight, plate_edges, plate_limit,
+    real_benches, strips, weighed,
 };
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     load_patches::EXPERIMENT,
     beam_ends::EXPERIMENT,
     plate_edges::EXPERIMENT,
+    plate_limit::EXPERIMENT,
     measured_edges::BEAMS,
     measured_edges::PLATES,
     strips::STRIPS,

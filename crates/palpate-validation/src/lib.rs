@@ -15,6 +15,7 @@ mod measured_edges;
 mod one_weight;
 mod parallel;
 mod plate_edges;
+mod plate_limit;
 mod raw_bench;
 mod real_benches;
 mod regression;

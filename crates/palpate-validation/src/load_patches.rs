@@ -307,9 +307,9 @@ fn tables() -> [Table; 3] {
 
 fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
     let readings = |case: Case| match case {
-        Case::TwoPads { .. } => size.pick(200, 8),
-        Case::WholeBeam => size.pick(400, 8),
-        Case::Patches { .. } | Case::Totals { .. } => size.pick(1000, 8),
+        Case::TwoPads { .. } => size.pick(200, 6),
+        Case::WholeBeam => size.pick(400, 6),
+        Case::Patches { .. } | Case::Totals { .. } => size.pick(500, 4),
     };
     let cases = cases();
     let rows = in_parallel(&cases, |case| case.row(readings(*case)), |case| case.label(), progress);

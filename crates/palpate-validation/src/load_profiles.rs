@@ -228,7 +228,7 @@ fn in_mm((low_m, high_m): (f64, f64)) -> (f64, f64) {
 }
 
 fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
-    let readings = size.pick(200, 6);
+    let readings = size.pick(200, 4);
     let cases: Vec<Case> =
         SENSORS.into_iter().flat_map(|sensors| LOADS.map(|loads| Case { sensors, loads })).collect();
     let rows = in_parallel(&cases, |case| case.row(readings), |case| case.loads.1.to_owned(), progress);

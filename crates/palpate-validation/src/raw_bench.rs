@@ -173,7 +173,7 @@ impl RawBench {
 
 /// Readings per newton of gauges whose gains differ, in counts.
 fn raw_influences(
-    surface: impl Surface + Send + Sync + 'static,
+    surface: impl Surface + 'static,
     kind: SensorKind,
     gauges: Vec<Position>,
     rng: &mut Xoshiro256PlusPlus,

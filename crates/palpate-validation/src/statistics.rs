@@ -113,9 +113,54 @@ impl Share {
     }
 }
 
+/// Sums of numerators and denominators by calibration.
+#[derive(Clone, Debug, Default)]
+pub struct Ratio {
+    clusters: BTreeMap<u64, Vec<[f64; 2]>>,
+}
+
+impl Ratio {
+    /// Adds a case of a calibration.
+    pub fn add(&mut self, calibration: u64, numerator: f64, denominator: f64) {
+        self.clusters.entry(calibration).or_default().push([numerator, denominator]);
+    }
+
+    /// Ratio R = Σa/Σb. Its standard error is that of the sum of the residuals a − R·b, by the delta method, divided by Σb.
+    pub fn figure(&self) -> Option<Figure> {
+        let pairs = || self.clusters.values().flatten();
+        let [numerator, denominator] = pairs().fold([0.0; 2], |[a, b], pair| [a + pair[0], b + pair[1]]);
+        let value = numerator / denominator;
+        let mut residuals = Sample::default();
+        for (calibration, pairs) in &self.clusters {
+            pairs.iter().for_each(|[a, b]| residuals.add(*calibration, a - value * b));
+        }
+        let mean = residuals.mean()?;
+        let standard_error = mean.standard_error * residuals.len() as f64 / denominator;
+        (value.is_finite() && standard_error.is_finite()).then_some(Figure { value, standard_error })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn error_of_a_ratio_vanishes_with_its_residuals() {
+        let mut ratio = Ratio::default();
+        assert_eq!(ratio.figure(), None);
+        (1..=20).for_each(|i| ratio.add(i % 4, 2.0 * i as f64, i as f64));
+        let exact = ratio.figure().unwrap();
+        assert!((exact.value - 2.0).abs() < 1e-12 && exact.standard_error < 1e-12, "{exact:?}");
+        // With equal denominators the error is that of the mean of the numerators.
+        let (mut ratio, mut sample) = (Ratio::default(), Sample::default());
+        for i in 0..30_u64 {
+            let value = (i * 7 % 11) as f64;
+            ratio.add(i % 5, value, 4.0);
+            sample.add(i % 5, value);
+        }
+        let (ratio, mean) = (ratio.figure().unwrap(), sample.mean().unwrap());
+        assert!((4.0 * ratio.standard_error - mean.standard_error).abs() < 1e-12);
+    }
 
     fn sample(clusters: &[&[f64]]) -> Sample {
         let mut sample = Sample::default();

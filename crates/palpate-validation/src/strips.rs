@@ -380,7 +380,7 @@ fn run_drifting(size: Size, progress: Progress) -> Result<Vec<Table>> {
     if size == Size::Quick {
         cases.retain(|case| case.size == SIZES[0] && case.pace == Pace::Even);
     }
-    let benches = size.pick(30, 1);
+    let benches = size.pick(20, 1);
     let name = |case: &DriftCase| case.labels().join(", ");
     let rows = in_parallel(&cases, |case| case.row(benches), name, progress);
     let mut table =
@@ -419,7 +419,7 @@ fn run_scattered(size: Size, progress: Progress) -> Result<Vec<Table>> {
     let sizes = &SIZES[..size.pick(3, 1)];
     let cases: Vec<_> =
         sizes.iter().flat_map(|size| WRONG.map(|(wrong, name)| (*size, wrong, name))).collect();
-    let benches = size.pick(30, 1);
+    let benches = size.pick(20, 1);
     let row = |(size, wrong, name): &((usize, usize), Wrong, &str)| -> Result<TableRow> {
         let mut comparison = Comparison::default();
         for seed in 0..benches {

@@ -698,21 +698,53 @@ fn presses_of_the_same_places_are_condensed_without_loss() {
     }
 }
 
-/// The presses of plates have places of their own, so that cells of neighbours replace them.
+/// Mean errors in millimetres on a plate with presses anywhere, from all of them, and from fewer in their place.
+fn condensed_mm(presses: usize, condensed: usize, touches: usize) -> [f64; 2] {
+    let mut bench = Bench::plate(1);
+    bench.presses = bench.touches(presses);
+    let touches = bench.touches(touches);
+    let (setup, recording) = (bench.setup(), bench.recording());
+    let found = [usize::MAX, condensed].map(|most| {
+        let task = FitTask::new(&setup, &recording);
+        let locator = fit_condensed(task, Structure::ForceLinear, most).unwrap().unwrap();
+        assert!(most < presses || locator.presses() == presses);
+        mean(errors_mm(&locator, &touches).0)
+    });
+    eprintln!(
+        "plate, {presses} presses: mean {:.3} mm; {:.3} mm from {condensed} in their place",
+        found[0], found[1]
+    );
+    found
+}
+
 #[test]
 fn many_presses_all_over_a_plate_are_condensed_with_hardly_a_loss() {
-    let mut bench = Bench::plate(1);
-    bench.presses = bench.touches(300);
-    let touches = bench.touches(200);
-    let (setup, recording) = (bench.setup(), bench.recording());
-    let of = |most| {
-        fit_condensed(FitTask::new(&setup, &recording), Structure::ForceLinear, most).unwrap().unwrap()
-    };
-    let exact = of(usize::MAX);
-    assert_eq!(exact.presses(), 300);
-    let [exact_mm, condensed_mm] = [exact, of(100)].map(|locator| mean(errors_mm(&locator, &touches).0));
-    eprintln!("plate, 300 presses: mean {exact_mm:.3} mm; {condensed_mm:.3} mm from 100 in their place");
+    let [exact_mm, condensed_mm] = condensed_mm(300, 100, 200);
     assert!(condensed_mm < 1.05 * exact_mm, "{condensed_mm} mm, {exact_mm} mm");
+}
+
+#[test]
+#[ignore = "an exact fit of 900 places takes a minute"]
+fn nine_hundred_presses_all_over_a_plate_are_condensed_with_hardly_a_loss() {
+    let [exact_mm, condensed_mm] = condensed_mm(900, 300, 400);
+    assert!(condensed_mm < 1.03 * exact_mm, "{condensed_mm} mm, {exact_mm} mm");
+}
+
+/// `presses_that_nothing_explains_are_set_aside_among_many` has one of these plates.
+#[test]
+#[ignore = "fits of 90 plates take minutes"]
+fn presses_of_plates_that_are_right_are_kept() {
+    let excluded: Vec<u64> = (22..112)
+        .filter(|seed| {
+            let mut bench = Bench::plate(*seed);
+            bench.presses = bench.touches(450);
+            let (setup, recording) = (bench.setup(), bench.recording());
+            let task = FitTask::new(&setup, &recording);
+            let locator = fit_condensed(task, Structure::ForceLinear, 150).unwrap().unwrap();
+            !locator.set_aside().is_empty()
+        })
+        .collect();
+    assert!(excluded.len() <= 1, "{excluded:?}");
 }
 
 #[test]

@@ -106,11 +106,6 @@ fn drifting_strips_are_located_better_than_by_a_spline() {
         assert!(own_mm < still_mm || course == Course::Walk, "{course:?}: {own_mm} mm, {still_mm} mm");
         // Four standard deviations of 100 touches below 95 %.
         assert!(covered >= 0.86, "{course:?}: {covered}");
-        // A tare of the learnt offsets is as good as no drift.
-        let learnt = locator.offsets().unwrap();
-        let tare: Vec<f64> = learnt.iter().zip(&bench.offsets).map(|(a, b)| a - b).collect();
-        let tared_mm = mean(errors_mm(&locator, &moved(&touches, &tare)).0);
-        assert!(tared_mm < 1.2 * own_mm, "{course:?}: {tared_mm} mm, {own_mm} mm");
     }
 }
 
@@ -128,32 +123,62 @@ fn drift_is_found_where_there_is_any() {
     }
 }
 
-/// The largest loss is with a random walk and one pass along the strip, where a drift looks like a change of the offset with the position.
-#[test]
-fn many_presses_under_drift_are_condensed_with_hardly_a_loss() {
-    const PRESSES: usize = 160;
-    for (course, places) in [(Course::Walk, PRESSES), (Course::Ramp, 10)] {
-        let mut bench = Bench::strip(0, PRESSES, places);
+/// Mean error in millimetres, and share of the 95 % intervals that cover the contact, of strips of so many presses that drift: of locators
+/// from all presses, and from half as many in their place.
+fn condensed_under_drift(strips: u64, presses: usize, course: Course, places: usize) -> [[f64; 2]; 2] {
+    let mut sums = [[0.0; 2]; 2];
+    for seed in 0..strips {
+        let mut bench = Bench::strip(seed, presses, places);
         let touches = bench.touches(200);
         let (_, ends) = drift(&mut bench, course, Pace::Even);
         let (setup, recording) = (bench.setup(), bench.recording());
         let later = moved(&touches, &ends);
-        let [(all_mm, all_covered), (few_mm, few_covered)] = [usize::MAX, PRESSES / 2].map(|most| {
+        for (most, sums) in [usize::MAX, presses / 2].into_iter().zip(&mut sums) {
             let task = FitTask::new(&setup, &recording);
             let locator = fit_condensed(task, Structure::ForceLinear, most).unwrap().unwrap();
             assert_eq!(locator.drifts().len(), GAUGES);
             let (errors, covered) = errors_mm(&locator, &later);
-            (mean(errors), covered)
-        });
-        eprintln!(
-            "strip, {PRESSES} presses at {places} places, {course:?}: mean {all_mm:.3} mm, {:.1} % covered; {few_mm:.3} mm, {:.1} % from {} in their place",
-            100.0 * all_covered,
-            100.0 * few_covered,
-            PRESSES / 2
-        );
-        assert!(few_mm < 1.25 * all_mm, "{few_mm} mm, {all_mm} mm");
-        assert!(few_covered > all_covered - 0.04, "{few_covered}, {all_covered}");
+            sums[0] += mean(errors) / strips as f64;
+            sums[1] += covered / strips as f64;
+        }
     }
+    let [[all_mm, all_covered], [few_mm, few_covered]] = sums;
+    eprintln!(
+        "strip, {presses} presses at {places} places, {course:?}: mean {all_mm:.3} mm, {:.1} % covered; {few_mm:.3} mm, {:.1} % from half of them",
+        100.0 * all_covered,
+        100.0 * few_covered
+    );
+    sums
+}
+
+/// The largest loss is with a random walk and one pass along the strip, where a drift looks like a change of the offset with the position: 2.58 instead of
+/// 2.19 mm with 400 presses.
+#[test]
+fn many_presses_under_drift_are_condensed_with_hardly_a_loss() {
+    for (course, places) in [(Course::Walk, 160), (Course::Ramp, 10)] {
+        let [[all_mm, all_covered], [few_mm, few_covered]] = condensed_under_drift(1, 160, course, places);
+        assert!(few_mm < 1.25 * all_mm, "{course:?}: {few_mm} mm, {all_mm} mm");
+        assert!(few_covered > all_covered - 0.04, "{course:?}: {few_covered}, {all_covered}");
+    }
+}
+
+#[test]
+#[ignore = "fits of 400 presses on six strips in six cases take minutes"]
+fn four_hundred_presses_under_drift_are_condensed_with_hardly_a_loss() {
+    let mut sums = [[0.0; 2]; 2];
+    for course in [Course::Ramp, Course::Settling, Course::Walk] {
+        // One way along the strip, and many times.
+        for places in [400, 10] {
+            let found = condensed_under_drift(6, 400, course, places);
+            sums.iter_mut()
+                .flatten()
+                .zip(found.iter().flatten())
+                .for_each(|(sum, value)| *sum += value / 6.0);
+        }
+    }
+    let [[all_mm, all_covered], [few_mm, few_covered]] = sums;
+    assert!(few_mm < 1.12 * all_mm, "{few_mm} mm, {all_mm} mm");
+    assert!(few_covered > all_covered - 0.02, "{few_covered}, {all_covered}");
 }
 
 /// Places that a weight is put on, and times at each.
