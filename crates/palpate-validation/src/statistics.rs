@@ -44,7 +44,8 @@ impl Sample {
         let sorted = sorted(self.values());
         let median = median_of_sorted(&sorted)?;
         let (half, reach) = (0.5 * (sorted.len() - 1) as f64, 0.5 * (sorted.len() as f64).sqrt());
-        let [low, high] = [half - reach, half + reach].map(|rank| sorted[rank.round().max(0.0) as usize]);
+        let rank = |rank: f64| sorted[(rank.round().max(0.0) as usize).min(sorted.len() - 1)];
+        let [low, high] = [rank(half - reach), rank(half + reach)];
         let medians: Vec<f64> = self
             .clusters
             .values()
@@ -190,6 +191,8 @@ mod tests {
         assert!(median.value.abs() < 1e-9 && (median.standard_error / 0.1 - 1.0).abs() < 0.1, "{median:?}");
         assert_eq!(sample(&[&[1.0, f64::INFINITY]]).median(), None);
         assert_eq!(Sample::default().median(), None);
+        // One value has no order statistics around it.
+        assert_eq!(sample(&[&[3.0]]).median(), Some(Figure { value: 3.0, standard_error: 0.0 }));
     }
 
     #[test]
