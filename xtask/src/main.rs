@@ -40,9 +40,10 @@ enum Chore {
         #[arg(long)]
         strict: bool,
     },
-    /// Run an experiment of palpate-validation, such as `real-benches`; `validate help` lists them
+    /// Run experiments of palpate-validation, and write their tables to docs/validation
+    #[command(disable_help_flag = true)]
     Validate {
-        /// Handed on to the experiment
+        /// Handed on: [NAME…] [--quick] [--check] [--list] [--help]
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },

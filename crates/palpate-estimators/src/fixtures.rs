@@ -37,11 +37,6 @@ impl Example {
     }
 }
 
-/// Number of readings of a test: the value of PALPATE_READINGS, else `usual`.
-pub(crate) fn readings(usual: usize) -> usize {
-    std::env::var("PALPATE_READINGS").ok().and_then(|count| count.parse().ok()).unwrap_or(usual)
-}
-
 /// The founding paper's beam.
 pub(crate) fn beam() -> Beam {
     Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap()

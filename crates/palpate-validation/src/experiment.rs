@@ -1,282 +1,108 @@
-//! One experiment: a bench in a world is calibrated, and located afterwards.
+//! Experiments by name.
 
-use crate::tally::Tally;
-use anyhow::{Context, Result, ensure};
-use palpate::estimators::arrangement::cells;
-use palpate::estimators::estimator::Locator;
-use palpate::estimators::evaluation::Calibration;
-use palpate::estimators::imperfections::Imperfections;
-use palpate::estimators::simulate::{simulate_presses_watched, simulate_use_watched};
-use palpate::mechanics::sensing::SensorKind;
-use palpate::numerics::random_order;
-use palpate::prelude::{
-    Contact, Estimator, Evaluation, Extent, Fit, FitTask, Influence, Position, Recording, Rig, Row, Setup,
-    Watch,
+use crate::table::Table;
+use crate::{
+    beam_ends, load_patches, load_profiles, measured_edges, one_weight, plate_edges, plate_limit,
+    real_benches, strips, weighed,
 };
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
 
-/// World in which a bench is simulated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum World {
-    /// Noise and resolution alone.
-    Clean,
-    /// The imperfections of the rig, and the gain, offset and place errors of its sensors.
-    Imperfect,
+/// Number of repetitions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Size {
+    /// Repetitions of the tables in docs/validation.
+    Full,
+    /// Few repetitions: minutes for all experiments.
+    Quick,
 }
 
-/// Knowledge that the locator has of the surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Knowledge {
-    /// The model of the rig.
-    Model,
-    /// Readings of raw channels, pressed with several forces.
-    Measured,
-}
-
-/// Zero of the readings in use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Zero {
-    /// The untouched rows before the first contact.
-    Once,
-    /// The untouched rows before each contact.
-    Each,
-}
-
-/// Forces in turn, as multiples of the force of the rig's presses.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Forces {
-    /// Of the presses on raw channels; those of a surface with a model all have the force of the rig.
-    pub pressed: &'static [f64],
-    /// Of the contacts in use.
-    pub touched: &'static [f64],
-}
-
-impl Forces {
-    /// Once, half and twice the force, in calibration and in use.
-    pub const UNKNOWN: Self =
-        Self { pressed: &Calibration::UNKNOWN_FORCES, touched: &Calibration::UNKNOWN_FORCES };
-}
-
-/// A bench in a world, with what a locator is given of it.
-pub struct Bench<'a> {
-    pub rig: &'a Rig,
-    pub world: World,
-    pub knowledge: Knowledge,
-    pub forces: Forces,
-}
-
-/// Untouched rows of each rest in use: as many as a person tares with.
-const UNTOUCHED_ROWS: u32 = 10;
-/// Multiple of the smallest detectable force that has to be found.
-const LIGHT: f64 = 5.0;
-/// Of the contacts in use each so many-th is repeated lightly.
-const LIGHT_EACH: usize = 4;
-
-/// Recordings of one bench.
-pub struct Recordings {
-    /// The setup that the locator is given.
-    pub known: Setup,
-    pub calibration: Recording,
-    /// Contacts in use, with untouched rows between them.
-    pub touches: Recording,
-    /// Places of the contacts in use.
-    places: Vec<Position>,
-    /// The bench in use.
-    used: Setup,
-    seed: u64,
-}
-
-impl Bench<'_> {
-    /// Calibrates the bench, and touches it at about `contacts` places.
-    pub fn record(&self, contacts: usize, seed: u64) -> Result<Recordings> {
-        let setup = self.setup()?;
-        let mut training = self.rig.training()?.clone();
-        if self.world == World::Clean {
-            training.placement_sd_m = None;
-        }
-        let force_n = training.force_n.or(setup.force_n()).context("the rig has no force of its presses")?;
-        let calibration = match self.knowledge {
-            Knowledge::Model => setup.simulate(&training, seed)?,
-            Knowledge::Measured => {
-                let places = training.positions(setup.surface().extent())?;
-                let (pressed, presses) =
-                    (setup.pressed_by(&training)?, in_turn(&places, force_n, self.forces.pressed));
-                let (repeats, placement_sd_m) = (training.repeats, training.placement_sd_m);
-                simulate_presses_watched(&pressed, &presses, repeats, placement_sd_m, seed, Watch::NONE)?
-            }
-        };
-        let places = shuffled(&all_over(setup.surface().extent(), contacts), seed);
-        let touched = in_turn(&places, force_n, self.forces.touched);
-        let provenance = &calibration.provenance;
-        let used = setup.clone().with_imperfections(with_many_untouched_rows(&setup)?)?;
-        // Streams of noise of their own.
-        let touches = simulate_use_watched(&used, provenance, &touched, seed.wrapping_add(1), Watch::NONE)?;
-        let known = self.known(&setup)?;
-        let known_by = |recording: Recording| Recording { kinds: known.layout().kinds(), ..recording };
-        Ok(Recordings {
-            calibration: known_by(calibration),
-            touches: known_by(touches),
-            places,
-            used,
-            seed,
-            known,
-        })
-    }
-
-    /// The setup of the rig in the world.
-    fn setup(&self) -> Result<Setup> {
-        let mut setup = self.rig.setup.clone();
-        let of_rig = setup.imperfections().copied().context("the rig has no [imperfections]")?;
-        let imperfections = match self.world {
-            World::Imperfect => of_rig,
-            World::Clean => Imperfections { schedule: of_rig.schedule, ..Imperfections::default() },
-        };
-        if self.world == World::Clean {
-            setup.edit_sensors(|sensors| {
-                for channel in sensors.iter_mut().map(|sensor| &mut sensor.channel) {
-                    (channel.gain_error, channel.offset_error, channel.position_error_m) = (0.0, 0.0, 0.0);
-                }
-            })?;
-        }
-        Ok(setup.with_imperfections(imperfections)?)
-    }
-
-    /// The setup that the locator is given.
-    fn known(&self, setup: &Setup) -> Result<Setup> {
-        if self.knowledge == Knowledge::Model {
-            return Ok(setup.clone());
-        }
-        let names = setup.layout().names();
-        let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        let extent = setup.surface().extent();
-        Ok(match extent.width_m() {
-            None => Setup::measured(extent.length_m(), &names)?,
-            Some(width_m) => Setup::measured_plane(extent.length_m(), width_m, &names)?,
-        })
-    }
-}
-
-/// Imperfections of a setup with the untouched rows of use.
-fn with_many_untouched_rows(setup: &Setup) -> Result<Imperfections> {
-    let mut imperfections = setup.imperfections().copied().context("the setup has no imperfections")?;
-    imperfections.schedule.untouched_rows = UNTOUCHED_ROWS;
-    Ok(imperfections)
-}
-
-impl Recordings {
-    /// Fits an estimator, and locates by each zero; adds to as many tallies.
-    pub fn judge(
-        &self,
-        estimator: &Estimator,
-        seed: u64,
-        zeros: &[Zero],
-        tallies: &mut [Tally],
-    ) -> Result<()> {
-        let task = FitTask::new(&self.known, &self.calibration).seed(seed);
-        let locator = estimator.fit_task(task)?;
-        let light = self.light_touches(&locator)?;
-        for tally in &mut *tallies {
-            tally.add_interval_check(locator.interval_check.as_ref());
-        }
-        for (zero, tally) in zeros.iter().zip(tallies) {
-            let touches = tared(&locator, &self.touches, *zero)?;
-            for row in touches.rows.iter().filter(|row| !row.touches()) {
-                tally.add_untouched(&locator.locate(&row.reading)?);
-            }
-            tally.add_touches(Evaluation::new(&locator, &touches)?);
-            for row in tared(&locator, &light, *zero)?.rows.iter().filter(|row| row.touches()) {
-                tally.add_light_touch(&locator.locate(&row.reading)?);
-            }
-        }
-        Ok(())
-    }
-}
-
-impl Recordings {
-    /// Mean distance of the centre of force from the contact, in metres, where the sensors are load cells of known places: the formula of textbooks,
-    /// Σ r·x/Σ r over the cells' readings r, each less the rest before it.
-    pub fn centre_of_force_error_m(&self) -> Option<f64> {
-        let sensors = self.used.layout().sensors();
-        if sensors.iter().any(|sensor| sensor.kind != SensorKind::Reaction) {
-            return None;
-        }
-        let mut runs = self.touches.rows.chunk_by(|a, b| a.touches() == b.touches());
-        let mut errors_m = Vec::new();
-        let mut untouched = self.touches.mean_reading(&[0]);
-        for run in runs.by_ref() {
-            let indices: Vec<usize> = (0..run.len()).collect();
-            let mean = Recording { rows: run.to_vec(), ..self.touches.clone() }.mean_reading(&indices);
-            if !run[0].touches() {
-                untouched = mean;
-                continue;
-            }
-            for row in run {
-                let forces = row.reading.iter().zip(&untouched).map(|(value, zero)| value - zero);
-                let [mut total, mut x_m, mut y_m] = [0.0; 3];
-                for (force_n, sensor) in forces.zip(sensors) {
-                    total += force_n;
-                    x_m += force_n * sensor.position.x_m;
-                    y_m += force_n * sensor.position.y_m;
-                }
-                errors_m.push(row.position.distance_m(Position { x_m: x_m / total, y_m: y_m / total }));
-            }
-        }
-        (!errors_m.is_empty()).then(|| errors_m.iter().sum::<f64>() / errors_m.len() as f64)
-    }
-
-    /// Contacts of five times the force that the locator finds with a probability of 95 %, by the noise of the bench and the scatter of its
-    /// untouched rows, where there is one.
-    fn light_touches(&self, locator: &Locator) -> Result<Recording> {
-        let limit = self.used.cramer_rao_bound()?;
-        let touch = locator.beyond_scatter(Influence::default().lightest_touch(&limit));
-        let light = self.places.iter().step_by(LIGHT_EACH).filter_map(|position| {
-            let [_, surely_n] = touch.forces_at(*position);
-            Some(Contact { position: *position, force_n: LIGHT * surely_n? })
-        });
-        let (light, provenance): (Vec<Contact>, _) = (light.collect(), &self.calibration.provenance);
-        // A stream of noise of its own.
-        let seed = self.seed.wrapping_add(2);
-        let recording = simulate_use_watched(&self.used, provenance, &light, seed, Watch::NONE)?;
-        Ok(Recording { kinds: self.known.layout().kinds(), ..recording })
-    }
-}
-
-/// The rows after the first rest, tared. Untouched rows are tared by the rest before them.
-fn tared(locator: &Locator, recording: &Recording, zero: Zero) -> Result<Recording> {
-    let mut runs = recording.rows.chunk_by(|a, b| a.touches() == b.touches());
-    let rest = runs.next().filter(|rows| rows.iter().all(|row| !row.touches()));
-    let mut tare = locator.tare()?;
-    for row in rest.context("the recording does not begin untouched")? {
-        tare.add_untouched(&row.reading)?;
-    }
-    let mut rows: Vec<Row> = Vec::new();
-    for run in runs {
-        for row in run {
-            let mut reading = vec![0.0; row.reading.len()];
-            tare.apply(&row.reading, &mut reading)?;
-            rows.push(Row { reading, ..row.clone() });
-        }
-        if zero == Zero::Each && run.iter().all(|row| !row.touches()) {
-            tare = locator.tare()?;
-            run.iter().try_for_each(|row| tare.add_untouched(&row.reading))?;
+impl Size {
+    /// The number of repetitions of this size.
+    pub fn pick<T>(self, full: T, quick: T) -> T {
+        match self {
+            Self::Full => full,
+            Self::Quick => quick,
         }
     }
-    ensure!(!rows.is_empty(), "the recording has no rows after its first rest");
-    Ok(Recording { rows, ..recording.clone() })
 }
 
-/// Contacts at places with multiples of a force in turn.
-fn in_turn(places: &[Position], force_n: f64, shares: &[f64]) -> Vec<Contact> {
-    let shares = places.iter().zip(shares.iter().cycle());
-    shares.map(|(position, share)| Contact { position: *position, force_n: share * force_n }).collect()
+/// Receives the name of a finished case, the number of finished cases and of all.
+pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
+
+/// Experiment with fixed seeds.
+#[derive(Clone, Copy)]
+pub struct Experiment {
+    /// Name, which is that of its files too.
+    pub name: &'static str,
+    /// Title.
+    pub title: &'static str,
+    /// Method, in two sentences.
+    pub method: &'static str,
+    /// Smallest seed; the others follow it.
+    pub seed: u64,
+    /// Runs the experiment.
+    pub run: fn(Size, Progress) -> Result<Vec<Table>>,
 }
 
-/// About so many positions in the middles of equal cells, as square as they can be on a plane.
-fn all_over(extent: Extent, count: usize) -> Vec<Position> {
-    let Some(width_m) = extent.width_m() else { return cells(extent, count, 1) };
-    let side = |ratio: f64| (count as f64 * ratio).sqrt().round().max(1.0) as usize;
-    cells(extent, side(extent.length_m() / width_m), side(width_m / extent.length_m()))
+/// All experiments.
+pub const EXPERIMENTS: &[Experiment] = &[
+    real_benches::EXPERIMENT,
+    one_weight::EXPERIMENT,
+    load_profiles::EXPERIMENT,
+    load_patches::EXPERIMENT,
+    beam_ends::EXPERIMENT,
+    plate_edges::EXPERIMENT,
+    plate_limit::EXPERIMENT,
+    measured_edges::BEAMS,
+    measured_edges::PLATES,
+    strips::STRIPS,
+    strips::DRIFTING,
+    strips::SCATTERED,
+    strips::NOISE,
+    strips::FEW,
+    weighed::EXPERIMENT,
+];
+
+/// The experiments of these names; all of them without a name.
+///
+/// # Errors
+/// A name that no experiment has.
+pub fn by_names(names: &[String]) -> Result<Vec<Experiment>> {
+    if names.is_empty() {
+        return Ok(EXPERIMENTS.to_vec());
+    }
+    let by_name = |name: &String| {
+        let found = EXPERIMENTS.iter().find(|experiment| experiment.name == name).copied();
+        let known: Vec<&str> = EXPERIMENTS.iter().map(|experiment| experiment.name).collect();
+        found.with_context(|| format!("there is no experiment `{name}`; there are {}", known.join(", ")))
+    };
+    names.iter().map(by_name).collect()
 }
 
-fn shuffled(positions: &[Position], seed: u64) -> Vec<Position> {
-    random_order(positions.len(), seed).into_iter().map(|i| positions[i]).collect()
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn names_are_unique_and_methods_are_at_most_two_sentences() {
+        let names: BTreeSet<&str> = EXPERIMENTS.iter().map(|experiment| experiment.name).collect();
+        assert_eq!(names.len(), EXPERIMENTS.len());
+        for Experiment { name, method, .. } in EXPERIMENTS {
+            let sentences = method.matches(". ").count() + usize::from(method.ends_with('.'));
+            assert!((1..=2).contains(&sentences), "{name}: {sentences} sentences");
+        }
+    }
+
+    #[test]
+    fn an_unknown_name_is_refused_with_the_known_ones() {
+        let refused = by_names(&["bridge".to_owned()]).map(|_| ()).unwrap_err().to_string();
+        assert!(
+            refused.starts_with("there is no experiment `bridge`; there are real-benches, "),
+            "{refused}"
+        );
+        assert_eq!(by_names(&[]).unwrap().len(), EXPERIMENTS.len());
+    }
 }

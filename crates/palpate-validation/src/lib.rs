@@ -1,17 +1,27 @@
 //! Experiments over the public API of palpate, each a table of figures: `cargo xtask validate NAME`.
 //!
-//! [`real_benches`] calibrates benches as they come and locates contacts on them afterwards, beside the same benches in a clean world.
-//! [`one_weight`] calibrates with one weight, and locates it and heavier ones.
-//! [`load_profiles`] estimates loads on the founding paper's beam.
+//! [`experiment::EXPERIMENTS`] lists them. [`report::Report`] runs one, and writes its tables as Markdown and JSON; [`check`] compares them with stored ones.
 #![forbid(unsafe_code)]
 
-mod experiment;
-pub mod load_profiles;
-pub mod one_weight;
+mod beam_ends;
+mod bench;
+pub mod check;
+mod coverage;
+pub mod experiment;
+mod load_patches;
+mod load_profiles;
+mod machine;
+mod measured_edges;
+mod one_weight;
 mod parallel;
-pub mod real_benches;
-mod results;
+mod plate_edges;
+mod plate_limit;
+mod raw_bench;
+mod real_benches;
+mod regression;
+pub mod report;
+mod statistics;
+mod strips;
+pub mod table;
 mod tally;
-
-pub use results::{Results, RigText};
-pub use tally::Figures;
+mod weighed;

@@ -1,23 +1,27 @@
 //! Load profiles of random loads on the founding paper's beam: coverage and width of the intervals of total force, centre of pressure and patches.
 
+use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
+use crate::statistics::{Sample, Share};
+use crate::table::{Column, Figure, Goal, Row, Table};
 use anyhow::Result;
 use palpate::estimators::estimator::{LoadProfile, Patch};
 use palpate::prelude::{Beam, Deflection, Profiler, Setup, Status, Strain, UniformLoad, simulate_loads};
 use palpate::prelude::{gpa, microstrain, mm, newtons, um};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::Serialize;
-use std::fmt::Write;
 
-/// Size of the experiment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
-    /// Readings of each row; at least 1.
-    pub readings: u64,
-    /// Seed of loads and noise.
-    pub seed: u64,
-}
+/// The experiment.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "load-profiles",
+    title: "Load profiles of random loads",
+    method: "Loads on the founding paper's beam are drawn at random or stand where the row says, and a load profile is estimated from each noisy reading. Figures of patches count readings \
+             with as many patches as loads; widths are those of 95 % intervals.",
+    seed: 0,
+    run,
+};
+
+const SEED: u64 = EXPERIMENT.seed;
 
 /// Length of the beam, in mm.
 const LENGTH_MM: f64 = 400.0;
@@ -130,148 +134,107 @@ fn random_load(rng: &mut Xoshiro256PlusPlus) -> UniformLoad {
 /// Intervals of one quantity.
 #[derive(Clone, Debug, Default)]
 struct Intervals {
-    covered: u64,
-    widths: Vec<f64>,
+    covered: Share,
+    bounded: Share,
+    widths: Sample,
 }
 
 impl Intervals {
-    fn add(&mut self, (low, high): (f64, f64), truth: f64) {
-        self.covered += u64::from((low..=high).contains(&truth));
-        self.widths.push(high - low);
+    fn add(&mut self, reading: u64, (low, high): (f64, f64), truth: f64) {
+        self.covered.add(reading, (low..=high).contains(&truth));
+        self.bounded.add(reading, high.is_finite());
+        self.widths.add(reading, high - low);
     }
 
-    fn figures(mut self) -> IntervalFigures {
-        self.widths.sort_by(f64::total_cmp);
-        let count = self.widths.len();
-        let bounded: Vec<f64> = self.widths.iter().copied().filter(|width| width.is_finite()).collect();
-        let percent = |of: f64| (count > 0).then(|| 100.0 * of / count as f64);
-        IntervalFigures {
-            count,
-            coverage: percent(self.covered as f64),
-            bounded: percent(bounded.len() as f64),
-            median_width: self.widths.get(count / 2).copied().filter(|width| width.is_finite()),
-            mean_width: (!bounded.is_empty()).then(|| bounded.iter().sum::<f64>() / bounded.len() as f64),
-        }
+    /// Coverage, share of intervals with an upper end, and median width, which is missing where it is infinite.
+    fn figures(&self) -> [Option<Figure>; 3] {
+        [self.covered.percent(), self.bounded.percent(), self.widths.median()]
     }
 }
 
-/// Coverage and width of the 95 % intervals of one quantity; shares in %.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct IntervalFigures {
-    /// Intervals.
-    pub count: usize,
-    /// Share that contains the truth.
-    pub coverage: Option<f64>,
-    /// Share that has an upper end.
-    pub bounded: Option<f64>,
-    /// Median width, in N or mm, where it is finite.
-    pub median_width: Option<f64>,
-    /// Mean width of the bounded ones, in N or mm.
-    pub mean_width: Option<f64>,
-}
-
-/// One row of the table.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TableRow {
-    /// The sensors.
-    pub sensors: &'static str,
-    /// The loads.
-    pub loads: &'static str,
-    /// Readings.
-    pub readings: u64,
-    /// Share of the readings with the status `located`, in %.
-    pub located: f64,
-    /// Share with as many patches as loads, in %.
-    pub resolved: f64,
-    /// Share with fewer patches, in %.
-    pub merged: f64,
-    /// Total force.
-    pub total: IntervalFigures,
-    /// Centre of pressure.
-    pub centre_of_pressure: IntervalFigures,
-    /// Force of each patch, of readings with as many patches as loads.
-    pub patch_force: IntervalFigures,
-    /// Centre of each patch, of the same readings.
-    pub patch_centre: IntervalFigures,
-    /// Share of the loads, in readings with fewer patches, with a centre in the interval of a patch's centre, in %.
-    pub merged_centres: Option<f64>,
-}
-
-/// Sums of one row.
+/// Figures of one row.
 #[derive(Default)]
 struct Tally {
-    readings: u64,
-    located: u64,
-    resolved: u64,
-    merged: u64,
+    located: Share,
+    resolved: Share,
+    merged: Share,
     total: Intervals,
     centre_of_pressure: Intervals,
     patch_force: Intervals,
     patch_centre: Intervals,
-    merged_centres: (u64, u64),
+    /// Loads with a centre in the interval of a patch's centre, in readings with fewer patches than loads.
+    merged_centres: Share,
 }
 
 impl Tally {
-    fn add(&mut self, profile: &LoadProfile, loads: &[UniformLoad]) {
-        self.readings += 1;
-        self.located += u64::from(profile.status == Status::Located);
+    fn add(&mut self, reading: u64, profile: &LoadProfile, loads: &[UniformLoad]) {
+        self.located.add(reading, profile.status == Status::Located);
         let total_n: f64 = loads.iter().map(UniformLoad::force_n).sum();
         let moment: f64 = loads.iter().map(|load| load.force_n() * load.centre().x_m).sum();
-        self.total.add(profile.bounds.total_95_n, total_n);
+        self.total.add(reading, profile.bounds.total_95_n, total_n);
         if let Some(centre) = profile.centre {
-            self.centre_of_pressure.add(in_mm(centre.x_95_m), 1e3 * moment / total_n);
+            self.centre_of_pressure.add(reading, in_mm(centre.x_95_m), 1e3 * moment / total_n);
         }
-        self.resolved += u64::from(profile.patches.len() == loads.len());
+        self.resolved.add(reading, profile.patches.len() == loads.len());
+        self.merged.add(reading, profile.patches.len() < loads.len());
         if profile.patches.len() == loads.len() {
             for (patch, load) in profile.patches.iter().zip(loads) {
-                self.patch_force.add(patch.force_95_n, load.force_n());
-                self.patch_centre.add(in_mm(patch.centre.x_95_m), 1e3 * load.centre().x_m);
+                self.patch_force.add(reading, patch.force_95_n, load.force_n());
+                self.patch_centre.add(reading, in_mm(patch.centre.x_95_m), 1e3 * load.centre().x_m);
             }
         } else if profile.patches.len() < loads.len() {
-            self.merged += 1;
             let contains = |patch: &Patch, load: &UniformLoad| {
                 let (low_m, high_m) = patch.centre.x_95_m;
                 (low_m..=high_m).contains(&load.centre().x_m)
             };
             for load in loads {
-                self.merged_centres.0 += u64::from(profile.patches.iter().any(|patch| contains(patch, load)));
-                self.merged_centres.1 += 1;
+                let is_contained = profile.patches.iter().any(|patch| contains(patch, load));
+                self.merged_centres.add(reading, is_contained);
             }
         }
     }
+
+    fn row(&self, labels: &[&str]) -> Row {
+        let mut figures = vec![self.located.percent(), self.resolved.percent(), self.merged.percent()];
+        for intervals in [&self.total, &self.centre_of_pressure, &self.patch_force, &self.patch_centre] {
+            figures.extend(intervals.figures());
+        }
+        figures.push(self.merged_centres.percent());
+        Row::new(labels, figures)
+    }
+}
+
+fn columns() -> Vec<Column> {
+    let mut columns = vec![
+        Column::percent("located", Goal::Larger),
+        Column::percent("as many patches as loads", Goal::Larger),
+        Column::percent("fewer patches", Goal::Smaller),
+    ];
+    for (quantity, unit) in
+        [("total", "N"), ("centre of pressure", "mm"), ("patch force", "N"), ("patch centre", "mm")]
+    {
+        columns.extend([
+            Column::percent(&format!("{quantity} covered"), Goal::COVERAGE),
+            Column::percent(&format!("{quantity} bounded"), Goal::None),
+            Column::new(&format!("{quantity}, median width"), unit, Goal::None),
+        ]);
+    }
+    columns.push(Column::percent("centres of merged loads covered", Goal::None));
+    columns
 }
 
 fn in_mm((low_m, high_m): (f64, f64)) -> (f64, f64) {
     (1e3 * low_m, 1e3 * high_m)
 }
 
-/// Rows of the table, as a file.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Results {
-    /// Version of palpate.
-    pub palpate: &'static str,
-    /// Name of the experiment.
-    pub experiment: &'static str,
-    /// Seed.
-    pub seed: u64,
-    /// The rows.
-    pub rows: Vec<TableRow>,
-}
-
-/// Runs the experiment, several rows at a time; `progress` gets the name of a finished row, the number of finished rows and of all.
-///
-/// # Errors
-/// A beam that cannot be simulated.
-pub fn run(options: Options, progress: impl Fn(&str, usize, usize) + Sync) -> Result<Results> {
+fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
+    let readings = size.pick(200, 4);
     let cases: Vec<Case> =
         SENSORS.into_iter().flat_map(|sensors| LOADS.map(|loads| Case { sensors, loads })).collect();
-    let rows = in_parallel(&cases, |case| case.row(options), |case| case.loads.1.to_owned(), progress);
-    Ok(Results {
-        palpate: env!("CARGO_PKG_VERSION"),
-        experiment: "load-profiles",
-        seed: options.seed,
-        rows: rows.into_iter().collect::<Result<_>>()?,
-    })
+    let rows = in_parallel(&cases, |case| case.row(readings), |case| case.loads.1.to_owned(), progress);
+    let mut table = Table::new("Random and fixed loads.", &["sensors", "loads"], columns());
+    table.rows = rows.into_iter().collect::<Result<_>>()?;
+    Ok(vec![table])
 }
 
 struct Case {
@@ -280,71 +243,22 @@ struct Case {
 }
 
 impl Case {
-    fn row(&self, options: Options) -> Result<TableRow> {
+    fn row(&self, readings: u64) -> Result<Row> {
+        Ok(self.tally(readings)?.row(&[self.sensors.1, self.loads.1]))
+    }
+
+    fn tally(&self, readings: u64) -> Result<Tally> {
         let setup = self.sensors.0.setup()?;
         let profiler = Profiler::from_setup(&setup)?;
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
         let mut tally = Tally::default();
-        for _ in 0..options.readings {
+        for number in 0..readings {
             let loads = self.loads.0.draw(&mut rng);
             for reading in simulate_loads(&setup, &loads, 1, rng.random())? {
-                tally.add(&profiler.profile(&reading)?, &loads);
+                tally.add(number, &profiler.profile(&reading)?, &loads);
             }
         }
-        let percent = |count: u64, of: u64| 100.0 * count as f64 / of.max(1) as f64;
-        let (covered, of) = tally.merged_centres;
-        Ok(TableRow {
-            sensors: self.sensors.1,
-            loads: self.loads.1,
-            readings: tally.readings,
-            located: percent(tally.located, tally.readings),
-            resolved: percent(tally.resolved, tally.readings),
-            merged: percent(tally.merged, tally.readings),
-            total: tally.total.figures(),
-            centre_of_pressure: tally.centre_of_pressure.figures(),
-            patch_force: tally.patch_force.figures(),
-            patch_centre: tally.patch_centre.figures(),
-            merged_centres: (of > 0).then(|| percent(covered, of)),
-        })
-    }
-}
-
-impl Results {
-    /// The table in Markdown.
-    pub fn markdown(&self) -> String {
-        let mut text = format!("palpate {}, seed {}\n", self.palpate, self.seed);
-        for (_, sensors) in SENSORS {
-            let _ = writeln!(text, "\n{sensors}; coverage, and median width:\n");
-            text += "| loads | located | resolved | merged | total | centre of pressure | patch force | patch centre | centres of merged |\n";
-            text += "|---|---|---|---|---|---|---|---|---|\n";
-            for row in self.rows.iter().filter(|row| row.sensors == sensors) {
-                let _ = writeln!(text, "| {} | {} |", row.loads, row.cells().join(" | "));
-            }
-        }
-        text
-    }
-}
-
-impl TableRow {
-    fn cells(&self) -> Vec<String> {
-        let percent = |share: f64| format!("{share:.1} %");
-        let interval = |figures: &IntervalFigures, unit: &str, decimals: usize| match figures.coverage {
-            None => "–".to_owned(),
-            Some(coverage) => match figures.median_width {
-                Some(width) => format!("{coverage:.1} %, {width:.decimals$} {unit}"),
-                None => format!("{coverage:.1} %, unbounded"),
-            },
-        };
-        vec![
-            percent(self.located),
-            percent(self.resolved),
-            percent(self.merged),
-            interval(&self.total, "N", 2),
-            interval(&self.centre_of_pressure, "mm", 1),
-            interval(&self.patch_force, "N", 2),
-            interval(&self.patch_centre, "mm", 1),
-            self.merged_centres.map_or("–".to_owned(), percent),
-        ]
+        Ok(tally)
     }
 }
 
@@ -356,11 +270,14 @@ mod tests {
     #[test]
     fn resolves_a_light_load_beside_a_heavy_one_and_covers_their_centre_of_pressure() {
         let case = Case { sensors: SENSORS[2], loads: LOADS[3] };
-        let row = case.row(Options { readings: 12, seed: 0 }).unwrap();
+        let tally = case.tally(12).unwrap();
+        let share = |share: &Share| share.percent().unwrap().value;
         // Of 12 intervals that cover 95 %, fewer than 9 cover with a probability of 3 in 1,000.
-        let coverage = [row.total, row.centre_of_pressure, row.patch_force, row.patch_centre];
-        assert!(coverage.iter().all(|figures| figures.coverage >= Some(75.0)), "{row:?}");
-        assert!(row.resolved >= 75.0 && row.merged < 1.0, "{row:?}");
+        for intervals in [&tally.total, &tally.centre_of_pressure, &tally.patch_force, &tally.patch_centre] {
+            assert!(share(&intervals.covered) >= 75.0, "{intervals:?}");
+        }
+        assert!(share(&tally.resolved) >= 75.0 && share(&tally.merged) < 1.0);
+        assert_eq!(case.row(1).unwrap().figures.len(), columns().len());
     }
 
     #[test]

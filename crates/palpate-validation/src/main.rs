@@ -1,4 +1,4 @@
-//! `palpate-validation EXPERIMENT`: runs an experiment, prints its table and writes its figures.
+//! `cargo xtask validate [NAME…]`: runs experiments, prints their tables and writes their files.
 #![forbid(unsafe_code)]
 
 use std::io::{IsTerminal, Write};
@@ -7,64 +7,33 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use clap::{Parser, Subcommand};
-use palpate_validation::{load_profiles, one_weight, real_benches};
-use serde::Serialize;
+use clap::Parser;
+use palpate_validation::check::worse_figures;
+use palpate_validation::experiment::{Experiment, Size, by_names};
+use palpate_validation::report::Report;
 
 /// Accuracy, coverage and statuses of palpate's estimators.
 #[derive(Parser)]
 #[command(name = "cargo xtask validate", bin_name = "cargo xtask validate")]
 struct Arguments {
-    #[command(subcommand)]
-    experiment: Experiment,
-}
-
-#[derive(Subcommand)]
-enum Experiment {
-    /// Benches as they come, beside the same benches in a clean world
-    RealBenches {
-        /// Seeds of each bench
-        #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=1000))]
-        seeds: u64,
-        /// Contacts of each seed, about
-        #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-        contacts: u32,
-        /// A bench to run, such as `real-strip`; may be given several times [default: all]
-        #[arg(long, value_name = "NAME", value_parser = real_benches::BENCHES.map(|(name, _)| name))]
-        bench: Vec<String>,
-        /// Folder for the figures, real-benches.json
-        #[arg(long, value_name = "FOLDER")]
-        out: Option<PathBuf>,
-    },
-    /// Surfaces that were calibrated with one weight
-    OneWeight {
-        /// Seeds of each row
-        #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=1000))]
-        seeds: u64,
-        /// Contacts of each seed, about
-        #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-        contacts: u32,
-        /// Folder for the figures, one-weight.json
-        #[arg(long, value_name = "FOLDER")]
-        out: Option<PathBuf>,
-    },
-    /// Intervals of load profiles on the founding paper's beam
-    LoadProfiles {
-        /// Readings of each row
-        #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-        readings: u64,
-        /// Seed of loads and noise
-        #[arg(long, value_name = "N", default_value_t = 0)]
-        seed: u64,
-        /// Folder for the figures, load-profiles.json
-        #[arg(long, value_name = "FOLDER")]
-        out: Option<PathBuf>,
-    },
+    /// Experiments to run [default: all]
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
+    /// Few repetitions, written to target/validation instead of docs/validation
+    #[arg(long)]
+    quick: bool,
+    /// Compare with the figures in docs/validation instead of writing them; exit code 1 where one is worse beyond its Monte-Carlo error
+    #[arg(long)]
+    check: bool,
+    /// List the experiments
+    #[arg(long, conflicts_with_all = ["quick", "check"])]
+    list: bool,
 }
 
 fn main() -> ExitCode {
-    match run(Arguments::parse().experiment) {
-        Ok(()) => ExitCode::SUCCESS,
+    match run(&Arguments::parse()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::from(2)
@@ -72,61 +41,66 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(experiment: Experiment) -> Result<()> {
-    match experiment {
-        Experiment::RealBenches { seeds, contacts, bench, out } => {
-            make_folder(out.as_deref())?;
-            let mut options =
-                real_benches::Options { seeds, contacts: contacts as usize, ..Default::default() };
-            if !bench.is_empty() {
-                options.benches = bench;
+/// Runs the experiments; false where a check finds a worse figure.
+fn run(arguments: &Arguments) -> Result<bool> {
+    let experiments = by_names(&arguments.names)?;
+    if arguments.list {
+        experiments
+            .iter()
+            .try_for_each(|Experiment { name, title, .. }| print(&format!("{name:<24} {title}\n")))?;
+        return Ok(true);
+    }
+    let size = if arguments.quick { Size::Quick } else { Size::Full };
+    let (stored, written) = (workspace().join("docs/validation"), folder(size));
+    let mut worse = Vec::new();
+    for experiment in &experiments {
+        // A missing file is an error before the experiment takes its time.
+        let before = arguments.check.then(|| Report::read(&stored, experiment.name)).transpose()?;
+        let start = Instant::now();
+        let report = with_progress(experiment.name, |progress| Report::run(experiment, size, progress))?;
+        eprintln!("{}: {:.0} s", experiment.name, start.elapsed().as_secs_f64());
+        match before {
+            Some(before) => worse.extend(worse_figures(&before, &report)),
+            None => {
+                print(&report.markdown())?;
+                report.write(&written)?;
             }
-            let results = with_progress(|progress| real_benches::run(&options, progress))?;
-            finish("real-benches", &results.markdown(), &results, out.as_deref())
-        }
-        Experiment::OneWeight { seeds, contacts, out } => {
-            make_folder(out.as_deref())?;
-            let options = one_weight::Options { seeds, contacts: contacts as usize };
-            let results = with_progress(|progress| one_weight::run(options, progress))?;
-            finish("one-weight", &results.markdown(), &results, out.as_deref())
-        }
-        Experiment::LoadProfiles { readings, seed, out } => {
-            make_folder(out.as_deref())?;
-            let options = load_profiles::Options { readings, seed };
-            let results = with_progress(|progress| load_profiles::run(options, progress))?;
-            finish("load-profiles", &results.markdown(), &results, out.as_deref())
         }
     }
+    if arguments.check {
+        worse.iter().try_for_each(|line| print(&format!("{line}\n")))?;
+        print(&format!("{} figures are worse than stored\n", worse.len()))?;
+    }
+    Ok(worse.is_empty())
 }
 
-fn make_folder(folder: Option<&Path>) -> Result<()> {
-    let Some(folder) = folder else { return Ok(()) };
-    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// Folder of the files of this size.
+fn folder(size: Size) -> PathBuf {
+    workspace().join(size.pick("docs/validation", "target/validation"))
+}
+
+fn print(text: &str) -> Result<()> {
+    std::io::stdout().write_all(text.as_bytes()).context("cannot print the table")
 }
 
 /// Runs an experiment, with its progress on a terminal.
-fn with_progress<R>(run: impl FnOnce(&(dyn Fn(&str, usize, usize) + Sync)) -> Result<R>) -> Result<R> {
+fn with_progress<R>(
+    experiment: &str,
+    run: impl FnOnce(&(dyn Fn(&str, usize, usize) + Sync)) -> Result<R>,
+) -> Result<R> {
     let (start, is_terminal) = (Instant::now(), std::io::stderr().is_terminal());
     let results = run(&|name, finished, of| {
         if is_terminal {
-            eprint!("\r\x1b[K{finished} of {of}, {:.0} s: {name}", start.elapsed().as_secs_f64());
+            let seconds = start.elapsed().as_secs_f64();
+            eprint!("\r\x1b[K{experiment}: {finished} of {of}, {seconds:.0} s: {name}");
         }
     });
     if is_terminal {
         eprint!("\r\x1b[K");
     }
     results
-}
-
-/// Prints the table, and writes the figures to a folder under a temporary name that is then renamed.
-fn finish(name: &str, table: &str, results: &impl Serialize, folder: Option<&Path>) -> Result<()> {
-    std::io::stdout().write_all(table.as_bytes()).context("cannot print the table")?;
-    let Some(folder) = folder else { return Ok(()) };
-    let path = folder.join(format!("{name}.json"));
-    let cannot = || format!("cannot write {}", path.display());
-    let mut file = tempfile::NamedTempFile::new_in(folder).with_context(cannot)?;
-    serde_json::to_writer_pretty(&mut file, results).with_context(cannot)?;
-    file.write_all(b"\n").with_context(cannot)?;
-    file.persist(&path).with_context(cannot)?;
-    Ok(())
 }

@@ -1,117 +1,137 @@
 //! Estimates beside the truth, summed into figures.
 
+use crate::statistics::{Sample, Share};
+use crate::table::{Column, Figure, Goal};
 use palpate::estimators::interval_check::IntervalCheck;
-use palpate::prelude::{Estimate, Evaluation, Extent, Status};
-use serde::Serialize;
+use palpate::prelude::{Estimate, Evaluation, Status};
 
-/// Estimates of some readings.
-#[derive(Clone, Debug)]
+/// Estimates of the contacts of some calibrations.
+#[derive(Clone, Debug, Default)]
 pub struct Tally {
-    touches: Evaluation,
-    untouched: Count,
-    light: Count,
+    errors_mm: Sample,
+    position_covered: Share,
+    force_covered: Share,
+    statuses: [Share; STATUSES.len()],
+    untouched: Share,
+    light: Share,
     /// Coverage of the position at held-out places that each fit reports, in %: by the method, and once widened.
-    said: Vec<[f64; 2]>,
+    reported: [Sample; 2],
 }
 
-/// Number of cases, and of those that are so.
-#[derive(Clone, Copy, Debug, Default)]
-struct Count {
-    of: usize,
-    so: usize,
-}
+const STATUSES: [Status; 3] = [Status::OutsideModel, Status::Ambiguous, Status::NoContact];
 
-/// Figures of an estimator on a bench; shares in %.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// Figures of a tally.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
-    /// Touches that were located.
-    pub touches: usize,
     /// Median distance from the true position, in mm.
-    pub median_error_mm: Option<f64>,
+    pub median_error_mm: Option<Figure>,
     /// Mean distance, in mm.
-    pub mean_error_mm: Option<f64>,
-    /// Held-out presses within the method's regions of the position, from the check of `fit`; `None` without this check.
-    pub said_before: Option<f64>,
-    /// Held-out presses within the widened regions.
-    pub said_after: Option<f64>,
-    /// 95 % regions of the position that contain it.
-    pub position_coverage: Option<f64>,
-    /// 95 % intervals of the force that contain it.
-    pub force_coverage: Option<f64>,
-    /// Touches with the status `outside_model`.
-    pub outside_model: Option<f64>,
-    /// Touches with the status `ambiguous`.
-    pub ambiguous: Option<f64>,
-    /// Touches with the status `no_contact`.
-    pub missed: Option<f64>,
-    /// Untouched readings with the status `no_contact`.
-    pub untouched_no_contact: Option<f64>,
-    /// Touches of five times the smallest detectable force that have another status than `no_contact`.
-    pub light_found: Option<f64>,
+    pub mean_error_mm: Option<Figure>,
+    /// Held-out presses within the method's regions of the position, from the check of `fit`, in %; `None` without this check.
+    pub reported_before: Option<Figure>,
+    /// Held-out presses within the widened regions, in %.
+    pub reported_after: Option<Figure>,
+    /// 95 % regions of the position that contain it, in %.
+    pub position_coverage: Option<Figure>,
+    /// 95 % intervals of the force that contain it, in %.
+    pub force_coverage: Option<Figure>,
+    /// Touches with the status `outside_model`, in %.
+    pub outside_model: Option<Figure>,
+    /// Touches with the status `ambiguous`, in %.
+    pub ambiguous: Option<Figure>,
+    /// Touches with the status `no_contact`, in %.
+    pub missed: Option<Figure>,
+    /// Untouched readings with the status `no_contact`, in %.
+    pub untouched_no_contact: Option<Figure>,
+    /// Touches of five times the smallest detectable force that have another status than `no_contact`, in %.
+    pub light_detected: Option<Figure>,
 }
 
-impl Count {
-    fn add(&mut self, is_so: bool) {
-        self.of += 1;
-        self.so += usize::from(is_so);
+impl Figures {
+    /// Columns of [`Figures::cells`].
+    pub fn columns() -> Vec<Column> {
+        vec![
+            Column::mm("median error", Goal::Smaller),
+            Column::mm("mean error", Goal::Smaller),
+            Column::percent("position covered", Goal::COVERAGE),
+            Column::percent("force covered", Goal::COVERAGE),
+            Column::percent("outside model", Goal::Smaller),
+            Column::percent("ambiguous", Goal::None),
+            Column::percent("missed", Goal::Smaller),
+        ]
     }
 
-    fn percent(self) -> Option<f64> {
-        (self.of > 0).then(|| 100.0 * self.so as f64 / self.of as f64)
+    /// Errors, coverage and statuses of touches.
+    pub fn cells(&self) -> Vec<Option<Figure>> {
+        vec![
+            self.median_error_mm,
+            self.mean_error_mm,
+            self.position_coverage,
+            self.force_coverage,
+            self.outside_model,
+            self.ambiguous,
+            self.missed,
+        ]
     }
 }
 
 impl Tally {
-    /// A tally without estimates, on a surface of this extent.
-    pub fn new(extent: Extent) -> Self {
-        let touches = Evaluation { extent, located: Vec::new() };
-        Self { touches, untouched: Count::default(), light: Count::default(), said: Vec::new() }
-    }
-
     /// Adds the check of a fit's intervals, where there is one.
-    pub fn add_interval_check(&mut self, check: Option<&IntervalCheck>) {
-        self.said.extend(check.map(|check| [check.position.before_percent, check.position.after_percent]));
+    pub fn add_interval_check(&mut self, calibration: u64, check: Option<&IntervalCheck>) {
+        let Some(check) = check else { return };
+        let percents = [check.position.before_percent, check.position.after_percent];
+        self.reported.iter_mut().zip(percents).for_each(|(sample, percent)| sample.add(calibration, percent));
     }
 
     /// Adds estimates of touches.
-    pub fn add_touches(&mut self, evaluation: Evaluation) {
-        self.touches.located.extend(evaluation.located);
+    pub fn add_touches(&mut self, calibration: u64, evaluation: &Evaluation) {
+        for located in &evaluation.located {
+            self.errors_mm.add(calibration, 1e3 * located.error_m());
+            if let Some(covered) = located.covered {
+                self.position_covered.add(calibration, covered);
+            }
+            if let Some(force) = located.force {
+                self.force_covered.add(calibration, force.covered);
+            }
+            if let Some(status) = located.status {
+                let shares = self.statuses.iter_mut().zip(STATUSES);
+                shares.for_each(|(share, of)| share.add(calibration, status == of));
+            }
+        }
     }
 
     /// Adds an untouched reading.
-    pub fn add_untouched(&mut self, estimate: &Estimate) {
-        self.untouched.add(estimate.status == Status::NoContact);
+    pub fn add_untouched(&mut self, calibration: u64, estimate: &Estimate) {
+        self.untouched.add(calibration, estimate.status == Status::NoContact);
     }
 
     /// Adds a touch of five times the smallest detectable force.
-    pub fn add_light_touch(&mut self, estimate: &Estimate) {
-        self.light.add(estimate.status != Status::NoContact);
+    pub fn add_light_touch(&mut self, calibration: u64, estimate: &Estimate) {
+        self.light.add(calibration, estimate.status != Status::NoContact);
+    }
+
+    /// Number of touches.
+    #[cfg(test)]
+    pub fn touches(&self) -> usize {
+        self.errors_mm.len()
     }
 
     /// The figures of all that was added.
     pub fn figures(&self) -> Figures {
-        let touches = &self.touches;
-        let errors = touches.summary(None);
-        let statuses = touches.status_percents();
-        let percent =
-            |status| statuses.as_ref()?.iter().find(|(of, _)| *of == status).map(|(_, share)| *share);
-        let said = |i: usize| {
-            let sum: f64 = self.said.iter().map(|percents| percents[i]).sum();
-            (!self.said.is_empty()).then(|| sum / self.said.len() as f64)
-        };
+        let [outside_model, ambiguous, missed] = self.statuses.each_ref().map(Share::percent);
+        let [reported_before, reported_after] = self.reported.each_ref().map(Sample::mean);
         Figures {
-            touches: touches.located.len(),
-            median_error_mm: errors.map(|errors| 1e3 * errors.median_m),
-            mean_error_mm: errors.map(|errors| 1e3 * errors.average_m),
-            said_before: said(0),
-            said_after: said(1),
-            position_coverage: touches.coverage_percent(),
-            force_coverage: touches.force_summary().map(|forces| forces.coverage_percent),
-            outside_model: percent(Status::OutsideModel),
-            ambiguous: percent(Status::Ambiguous),
-            missed: percent(Status::NoContact),
+            median_error_mm: self.errors_mm.median(),
+            mean_error_mm: self.errors_mm.mean(),
+            reported_before,
+            reported_after,
+            position_coverage: self.position_covered.percent(),
+            force_coverage: self.force_covered.percent(),
+            outside_model,
+            ambiguous,
+            missed,
             untouched_no_contact: self.untouched.percent(),
-            light_found: self.light.percent(),
+            light_detected: self.light.percent(),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! `cargo bench -p palpate --bench statuses`: what every estimator says of readings that it should not believe, and of those that it should, as the
 //! table of docs/validation/tables/statuses.md: noise alone, a second contact, a channel that is stuck, channels in another order, absurd values; and how often its
-//! 95 % intervals contain contacts of half to twice the force of the presses. Five calibrations of each bench share the readings of a figure; `PALPATE_CASES` is
-//! their number, 2,000 unless said otherwise. `-- beam` takes the benches whose names begin so.
+//! 95 % intervals contain contacts of half to twice the force of the presses. Five calibrations of each bench share the 2,000 readings of a figure.
+//! `-- beam` takes the benches whose names begin so.
 
 use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::{Estimate, Estimator, Locator, Status, Uncertainty, contenders};
@@ -109,12 +109,13 @@ impl Case {
 
 /// Calibrations of a bench.
 const CALIBRATIONS: usize = 5;
+/// Readings of a figure.
+const READINGS: usize = 2000;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     let wanted = arguments.first().map_or("", String::as_str);
-    let count = std::env::var("PALPATE_CASES").ok().and_then(|count| count.parse().ok()).unwrap_or(2000);
-    let count = count / CALIBRATIONS;
+    let count = READINGS / CALIBRATIONS;
     let calibrated: Vec<Vec<Bench>> = (0..CALIBRATIONS as u64).map(benches).collect();
     for i in 0..calibrated[0].len() {
         let bench = &calibrated[0][i];

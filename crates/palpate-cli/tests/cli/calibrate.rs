@@ -228,15 +228,28 @@ fn ends_with_its_words(firmware: &str, (config, _, finger, taken): &FaultCase, w
     assert!(stopped.ends_with(&format!("stopped with its finger {finger}")), "{config}: {stopped}");
 }
 
-/// Signals in the middle of a press, to a process whose threads wait at serial ports: the machine is stopped each time, and the exit code is the signal's.
-/// `PALPATE_STOPS` is the number of stops that are measured. The time is printed, as it depends on what else the computer does; that of the machine's own clock
-/// is bounded by `stop_takes_effect` of palpate-live.
+/// Signals in the middle of a press, with their exit code and the firmware of the machine.
+#[cfg(unix)]
+const SIGNALS: [(&str, i32, &str); 4] =
+    [("INT", 130, "marlin"), ("TERM", 143, "grbl"), ("HUP", 129, "marlin"), ("QUIT", 131, "grbl")];
+
 #[cfg(unix)]
 #[test]
 fn signals_stop_the_machine_before_the_process_ends() {
-    const SIGNALS: [(&str, i32, &str); 4] =
-        [("INT", 130, "marlin"), ("TERM", 143, "grbl"), ("HUP", 129, "marlin"), ("QUIT", 131, "grbl")];
-    let stops = std::env::var("PALPATE_STOPS").map_or(SIGNALS.len(), |stops| stops.parse().unwrap());
+    stop_by_signals(SIGNALS.len());
+}
+
+#[cfg(unix)]
+#[test]
+#[ignore = "prints the time of a hundred stops, which takes minutes"]
+fn a_hundred_signals_stop_the_machine_before_the_process_ends() {
+    stop_by_signals(100);
+}
+
+/// Sends signals in turn to processes whose threads wait at serial ports: the machine is stopped each time, and the exit code is the signal's. The time is
+/// printed, as it depends on the load of the computer; that of the machine's own clock is bounded by `stop_takes_effect` of palpate-live.
+#[cfg(unix)]
+fn stop_by_signals(stops: usize) {
     let runs: Vec<_> = SIGNALS.into_iter().cycle().take(stops).collect();
     let mut took: Vec<Duration> = Vec::new();
     for runs in runs.chunks(SIGNALS.len()) {

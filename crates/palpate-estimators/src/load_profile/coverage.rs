@@ -1,14 +1,13 @@
-//! Coverage of the 95 % intervals, by where loads lie.
+//! Coverage of the 95 % intervals, by where loads lie: a sample of the experiment `load-profiles`.
 
 use super::tests::{beam, clean, layout, noisy};
 use super::*;
-use crate::fixtures;
+use palpate_numerics::binomial_tail;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Distances of the outermost load's centre from a support, in metres.
-const DISTANCES_M: [(f64, f64); 6] =
-    [(0.001, 0.01), (0.01, 0.02), (0.02, 0.04), (0.04, 0.06), (0.06, 0.1), (0.1, 0.2)];
+const DISTANCES_M: [(f64, f64); 3] = [(0.001, 0.01), (0.02, 0.04), (0.1, 0.2)];
 
 /// Readings with as many patches in the profile as there are loads, and how many of their intervals contain the truth.
 #[derive(Debug, Default)]
@@ -82,57 +81,41 @@ fn held(readings: usize, two: bool, (from_m, to_m): (f64, f64), rng: &mut Xoshir
     held
 }
 
-/// The tables of docs/validation/tables/load-profiles.md for 2,000 readings: PALPATE_READINGS=2000.
+/// The experiment has 93 to 100 % in every row.
 #[test]
 fn patches_are_held_wherever_they_lie() {
-    let readings = fixtures::readings(30);
+    const READINGS: usize = 12;
     for two in [false, true] {
-        println!(
-            "| centre | patches estimated | force covered | bounded | centre covered | centre of pressure | total |"
-        );
-        println!("|---|---|---|---|---|---|---|");
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
         for (from_m, to_m) in DISTANCES_M {
-            let held = held(readings, two, (from_m, to_m), &mut rng);
-            let share = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
-            println!(
-                "| {:.0}–{:.0} mm | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.1} % |",
-                from_m * 1e3,
-                to_m * 1e3,
-                share(held.told, held.readings),
-                share(held.force, held.told),
-                share(held.bounded, held.told),
-                share(held.centre, held.told),
-                share(held.pressure, held.told),
-                share(held.total, held.readings)
-            );
-            for (count, of) in [
-                (held.force, held.told),
-                (held.centre, held.told),
-                (held.pressure, held.told),
-                (held.total, held.readings),
-            ] {
-                assert!(share(count, of) >= 85.0, "{held:?}");
+            let held = held(READINGS, two, (from_m, to_m), &mut rng);
+            let counts = [(held.force, held.told), (held.centre, held.told), (held.pressure, held.told)];
+            for (count, of) in counts.into_iter().chain([(held.total, held.readings)]) {
+                assert!(is_plausible(count, of), "{from_m}, two {two}: {held:?}");
             }
         }
     }
 }
 
-/// No other load has the force of one over the whole beam, so that its interval ends where centre and width are determined as well.
-/// docs/validation/tables/load-profiles.md has the shares of 400 readings: PALPATE_READINGS=400.
+/// False where so few of the intervals contain the truth that a coverage of 93 % gives fewer in one sample of a thousand.
+fn is_plausible(covered: usize, of: usize) -> bool {
+    binomial_tail(of, of - covered, 0.07) > 1e-3
+}
+
+/// No other load has the force of one over the whole beam, so that its interval ends where centre and width are determined as well. The experiment has 96 %
+/// or more of every quantity.
 #[test]
 fn the_force_of_a_load_over_the_whole_beam_is_held() {
-    let readings = fixtures::readings(40);
+    const READINGS: usize = 12;
     let (beam, load) = (beam(), UniformLoad::along(0.0, 0.4, 4.0));
     let sensors = LoadSensors::new(&beam, &layout(true)).unwrap();
     let profiler = Profiler::new(sensors.clone());
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
     let mut held = Held::default();
-    for _ in 0..readings {
+    for _ in 0..READINGS {
         let reading = noisy(&sensors, &clean(&sensors, &[load]), &mut rng);
         held.add(&profiler.profile(&reading).unwrap(), &[load]);
     }
-    println!("a load over the whole beam: {held:?}");
     let all = [held.told, held.force, held.centre, held.pressure, held.total];
-    assert!(all.into_iter().all(|count| 100 * count >= 90 * readings), "{held:?}");
+    assert!(all.into_iter().all(|count| is_plausible(count, READINGS)), "{held:?}");
 }

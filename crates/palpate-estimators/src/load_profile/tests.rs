@@ -7,7 +7,6 @@ use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
-use crate::fixtures;
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelModel, Layout, NoiseError, Sensor, SensorKind};
@@ -96,35 +95,30 @@ fn tally(strain: bool, readings: usize) -> Tally {
     tally
 }
 
-/// docs/validation/tables/load-profiles.md has these for 200 readings: PALPATE_READINGS=200. Few readings are far off, and four of them are among the first forty, so a
-/// share needs a hundred readings.
-fn readings() -> usize {
-    fixtures::readings(100)
-}
-
+/// A sample of the experiment `load-profiles`.
 #[test]
 fn two_patches_are_told_at_their_limits() {
-    let readings = readings();
-    let tally = tally(true, readings);
-    println!("deflection and strain, {readings} readings: {tally:?}");
-    assert!(tally.worst_force_percent < 2.0 && tally.two * 100 >= 95 * readings, "{tally:?}");
-    assert!(tally.within_3_limits * 100 >= 92 * readings, "{tally:?}");
-    assert!(tally.centre_squares < 1.4 * 1.4 * 2.0 * tally.two as f64, "{tally:?}");
-    // A third load is significant at 5 % in one of twenty readings.
-    assert!(tally.resolved * 100 >= 88 * readings, "{tally:?}");
-    // Shares of the 95 % intervals that contain the truth.
-    let shares =
-        [tally.centres_covered, tally.forces_covered, 2 * tally.total_covered, 2 * tally.pressure_covered];
-    assert!(shares.iter().all(|covered| covered * 100 >= 85 * 2 * tally.two), "{tally:?}");
+    const READINGS: usize = 24;
+    let tally = tally(true, READINGS);
+    assert!(tally.worst_force_percent < 2.0 && tally.two + 1 >= READINGS, "{tally:?}");
+    // One of 200 readings of the experiment is farther off, so that two of 24 are one sample in 150.
+    assert!(tally.within_3_limits + 1 >= READINGS, "{tally:?}");
+    // Of 48 centres the root mean square is 0.89 ± 0.1 limits in the experiment.
+    assert!(tally.centre_squares < 1.3 * 1.3 * 2.0 * tally.two as f64, "{tally:?}");
+    // A third load is significant at 5 % in one of twenty readings: in six of 24 in one sample of a thousand.
+    assert!(tally.resolved + 5 >= READINGS, "{tally:?}");
+    // Of 24 intervals that cover 95 %, fewer than 19 cover in one sample of a thousand, and of 48 fewer than 40.
+    assert!(tally.centres_covered.min(tally.forces_covered) >= 40, "{tally:?}");
+    assert!(tally.total_covered.min(tally.pressure_covered) >= 19, "{tally:?}");
 }
 
+/// A sample of the experiment `load-profiles`: 192 of its 200 readings have two patches.
 #[test]
 fn deflections_alone_tell_less() {
-    let readings = readings();
-    let tally = tally(false, readings);
-    println!("deflection alone, {readings} readings: {tally:?}");
-    assert!(tally.worst_force_percent < 5.0 && tally.two * 100 >= 85 * readings, "{tally:?}");
-    assert!(tally.within_3_limits * 100 >= 85 * readings, "{tally:?}");
+    const READINGS: usize = 24;
+    let tally = tally(false, READINGS);
+    // Of 24 readings, fewer than 19 have two patches in one sample of a thousand.
+    assert!(tally.worst_force_percent < 5.0 && tally.two.min(tally.within_3_limits) >= 19, "{tally:?}");
 }
 
 #[test]
@@ -332,25 +326,15 @@ fn covered_by_distance(readings: usize) -> Vec<[f64; 3]> {
     DISTANCES_M.map(&mut row).to_vec()
 }
 
-const DISTANCES_M: [(f64, f64); 5] = [(0.01, 0.015), (0.015, 0.02), (0.02, 0.04), (0.04, 0.1), (0.1, 0.2)];
+const DISTANCES_M: [(f64, f64); 3] = [(0.01, 0.015), (0.02, 0.04), (0.1, 0.2)];
 
-/// The table of docs/validation/tables/load-profiles.md for 2,000 readings: PALPATE_READINGS=5000.
+/// A sample of the experiment `load-profiles`.
 #[test]
 fn totals_are_held_wherever_the_load_lies() {
-    let readings = 2 * readings() / 5;
-    println!("| outermost pad | total held | beyond the margin | of these held |\n|---|---|---|---|");
-    for ((from_m, to_m), [held, seen, seen_held]) in
-        DISTANCES_M.into_iter().zip(covered_by_distance(readings))
-    {
-        println!(
-            "| {:.0}–{:.0} mm | {:.1} % | {:.1} % | {:.1} % |",
-            from_m * 1e3,
-            to_m * 1e3,
-            100.0 * held,
-            100.0 * seen,
-            100.0 * seen_held
-        );
-        assert!(held >= 0.9 && (seen < 0.1 || seen_held >= 0.88), "{from_m}: {held} {seen} {seen_held}");
+    const READINGS: usize = 20;
+    for ((from_m, _), [held, seen, seen_held]) in DISTANCES_M.into_iter().zip(covered_by_distance(READINGS)) {
+        // Of 20 intervals that cover 95 %, fewer than 16 cover in three samples of a thousand.
+        assert!(held >= 0.8 && (seen < 0.5 || seen_held >= 0.75), "{from_m}: {held} {seen} {seen_held}");
     }
 }
 

@@ -394,23 +394,6 @@ impl Comparison {
         let won = list.iter().filter(|[ours, theirs]| ours <= theirs).count();
         (won as f64 / list.len() as f64, [0, 1].map(|side| mean(list.iter().map(|pair| pair[side]))))
     }
-
-    fn print(&self, what: &str) {
-        let ((won, [ours, theirs]), (won_mean, [ours_mean, theirs_mean])) =
-            (Self::summary(&self.medians), Self::summary(&self.means));
-        eprintln!(
-            "{what}: median {ours:.2} against {theirs:.2} mm, no larger on {:.0} %; mean {ours_mean:.2} against {theirs_mean:.2} mm, on {:.0} %, {:.2} mm with known functions; {:.1} % covered",
-            100.0 * won,
-            100.0 * won_mean,
-            mean(self.limits.iter().copied()),
-            100.0 * mean(self.covered.iter().copied())
-        );
-    }
-}
-
-/// Benches of a comparison; docs/explanation/measured.md has the figures of 100: PALPATE_BENCHES=100.
-fn benches(usual: u64) -> u64 {
-    std::env::var("PALPATE_BENCHES").ok().and_then(|count| count.parse().ok()).unwrap_or(usual)
 }
 
 /// Strips that are pressed so often, at so many places: locators of a structure beside the spline.
@@ -442,49 +425,49 @@ fn covered(
     row
 }
 
+/// A sample of the experiment `raw-strips`.
 #[test]
 fn strips_are_located_better_than_by_a_spline() {
-    for (presses, places) in [(25, 9), (60, 15), (120, 30)] {
-        let comparison = compare_strips(benches(10), (presses, places), Structure::Auto);
-        comparison.print(&format!("strip, {presses} presses at {places} places"));
+    for (presses, places) in [(25, 9), (60, 15)] {
+        let comparison = compare_strips(2, (presses, places), Structure::Auto);
         let ((won, _), (won_mean, [ours_mm, theirs_mm])) =
             (Comparison::summary(&comparison.medians), Comparison::summary(&comparison.means));
-        assert!(won >= 0.9 && won_mean >= 0.9, "worse than the spline on too many benches: {won} {won_mean}");
+        // On 50 strips of the experiment the errors are smaller on each, by half in the mean.
+        assert!(won == 1.0 && won_mean == 1.0, "worse than the spline: {won} {won_mean}");
         assert!(ours_mm <= 0.8 * theirs_mm, "{ours_mm} {theirs_mm}");
         let (limit_mm, covered) =
             (mean(comparison.limits.iter().copied()), mean(comparison.covered.iter().copied()));
         assert!(
-            presses < 60 || ours_mm <= 1.15 * limit_mm,
+            presses < 60 || ours_mm <= 1.3 * limit_mm,
             "{ours_mm} mm, {limit_mm} mm with known functions"
         );
-        assert!((0.9..0.98).contains(&covered), "{covered}");
+        // Four standard deviations of 200 touches below 95 %.
+        assert!(covered >= 0.89, "{covered}");
     }
 }
 
 #[test]
 fn the_structure_of_elastic_surfaces_is_worth_more_than_half_of_the_error() {
-    let [linear, free] = [Structure::ForceLinear, Structure::Free]
-        .map(|structure| compare_strips(benches(3), (25, 9), structure));
-    free.print("strip, 25 presses at 9 places, free structure");
+    let [linear, free] =
+        [Structure::ForceLinear, Structure::Free].map(|structure| compare_strips(1, (25, 9), structure));
     let mean_mm = |comparison: &Comparison| Comparison::summary(&comparison.means).1[0];
     assert!(mean_mm(&linear) < 0.5 * mean_mm(&free), "{} {}", mean_mm(&linear), mean_mm(&free));
 }
 
+/// A sample of the experiment `raw-strips`, whose errors on plates are a seventh below the regression's and at the limit.
 #[test]
 fn plates_are_located_better_than_by_radial_basis_functions() {
     let mut comparison = Comparison::default();
-    for seed in 0..benches(2) {
-        let mut bench = Bench::plate(seed);
-        let touches = bench.touches(60);
-        let theirs = Regression::radial_basis(&bench.presses).errors_mm(&bench.presses, &touches);
-        comparison.add(&bench, &bench.fit_as(Structure::Auto), &touches, theirs);
-    }
-    comparison.print("plate, 160 presses at 80 places");
+    let mut bench = Bench::plate(0);
+    let touches = bench.touches(60);
+    let theirs = Regression::radial_basis(&bench.presses).errors_mm(&bench.presses, &touches);
+    comparison.add(&bench, &bench.fit_as(Structure::Auto), &touches, theirs);
     let (_, [ours_mm, theirs_mm]) = Comparison::summary(&comparison.means);
     let limit_mm = mean(comparison.limits.iter().copied());
-    assert!(ours_mm < 0.95 * theirs_mm && ours_mm < 1.1 * limit_mm, "{ours_mm} {theirs_mm} {limit_mm}");
+    assert!(ours_mm < theirs_mm && ours_mm < 1.2 * limit_mm, "{ours_mm} {theirs_mm} {limit_mm}");
+    // Three standard deviations of 60 touches below 95 %.
     let covered = mean(comparison.covered.iter().copied());
-    assert!((0.9..1.0).contains(&covered), "{covered}");
+    assert!(covered >= 0.865, "{covered}");
 }
 
 #[test]
@@ -716,28 +699,43 @@ fn presses_of_the_same_places_are_condensed_without_loss() {
     }
 }
 
-#[test]
-fn many_presses_all_over_a_plate_are_condensed_with_hardly_a_loss() {
+/// Mean errors in millimetres on a plate with presses anywhere, from all of them, and from fewer in their place.
+fn condensed_mm(presses: usize, condensed: usize, touches: usize) -> [f64; 2] {
     let mut bench = Bench::plate(1);
-    bench.presses = bench.touches(900);
-    let touches = bench.touches(400);
+    bench.presses = bench.touches(presses);
+    let touches = bench.touches(touches);
     let (setup, recording) = (bench.setup(), bench.recording());
-    let of = |most| {
-        fit_condensed(FitTask::new(&setup, &recording), Structure::ForceLinear, most).unwrap().unwrap()
-    };
-    let exact = of(usize::MAX);
-    assert_eq!(exact.presses(), 900);
-    let [exact_mm, condensed_mm] = [exact, of(300)].map(|locator| mean(errors_mm(&locator, &touches).0));
-    eprintln!("plate, 900 presses: mean {exact_mm:.3} mm; {condensed_mm:.3} mm from 300 in their place");
-    assert!(condensed_mm < 1.03 * exact_mm, "{condensed_mm} mm, {exact_mm} mm");
+    let found = [usize::MAX, condensed].map(|most| {
+        let task = FitTask::new(&setup, &recording);
+        let locator = fit_condensed(task, Structure::ForceLinear, most).unwrap().unwrap();
+        assert!(most < presses || locator.presses() == presses);
+        mean(errors_mm(&locator, &touches).0)
+    });
+    eprintln!(
+        "plate, {presses} presses: mean {:.3} mm; {:.3} mm from {condensed} in their place",
+        found[0], found[1]
+    );
+    found
 }
 
 #[test]
+fn many_presses_all_over_a_plate_are_condensed_with_hardly_a_loss() {
+    let [exact_mm, condensed_mm] = condensed_mm(300, 100, 200);
+    assert!(condensed_mm < 1.05 * exact_mm, "{condensed_mm} mm, {exact_mm} mm");
+}
+
+#[test]
+#[ignore = "an exact fit of 900 places takes a minute"]
+fn nine_hundred_presses_all_over_a_plate_are_condensed_with_hardly_a_loss() {
+    let [exact_mm, condensed_mm] = condensed_mm(900, 300, 400);
+    assert!(condensed_mm < 1.03 * exact_mm, "{condensed_mm} mm, {exact_mm} mm");
+}
+
+/// `presses_that_nothing_explains_are_set_aside_among_many` has one of these plates.
+#[test]
+#[ignore = "fits of 90 plates take minutes"]
 fn presses_of_plates_that_are_right_are_kept() {
-    /// Plates in a test that takes seconds.
-    const QUICK: u64 = 3;
-    let plates = benches(QUICK);
-    let lost: Vec<u64> = (22..22 + plates)
+    let excluded: Vec<u64> = (22..112)
         .filter(|seed| {
             let mut bench = Bench::plate(*seed);
             bench.presses = bench.touches(450);
@@ -747,8 +745,7 @@ fn presses_of_plates_that_are_right_are_kept() {
             !locator.set_aside().is_empty()
         })
         .collect();
-    eprintln!("{} of {plates} plates of 450 right presses have one set aside: {lost:?}", lost.len());
-    assert!(50 * lost.len() as u64 <= plates, "{lost:?}");
+    assert!(excluded.len() <= 1, "{excluded:?}");
 }
 
 #[test]

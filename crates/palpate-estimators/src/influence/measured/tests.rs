@@ -14,7 +14,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::{MeasuredError, MeasuredInfluence, MeasuredLocator, NuisanceRole, Scale};
 use crate::evaluation::cross_validate;
 use crate::fit::{Fit, FitTask, Locate};
-use crate::fixtures::{pad, pad_recording, paper, raw_recording, raw_setup, readings, strip_recording};
+use crate::fixtures::{pad, pad_recording, paper, raw_recording, raw_setup, strip_recording};
 use crate::influence::{Influence, InfluenceSource, Structure};
 use crate::recording::{Recording, Row};
 use crate::setup::Setup;
@@ -518,20 +518,12 @@ fn weight(x_m: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     Row { position, force_n: None, nuisances: Vec::new(), time_s: None, reading }
 }
 
+/// A sample of the experiment `weight-without-untouched-rows`.
 #[test]
 fn presses_of_one_weight_without_untouched_rows_have_intervals_that_hold() {
-    const BOARDS: usize = 5;
-    let readings = readings(100);
-    let mut wrong = Vec::new();
-    eprintln!("| places × times | 30 mm | 50 mm | 80 mm | 120 mm | 200 mm |\n|---|---|---|---|---|---|");
-    for (presses, from_m) in [
-        ((6, 5), 0.04),
-        ((8, 4), 0.03),
-        ((12, 2), 0.02),
-        ((12, 3), 0.0167),
-        ((20, 2), 0.02),
-        ((12, 10), 0.02),
-    ] {
+    const BOARDS: usize = 2;
+    const READINGS: usize = 40;
+    for (presses, from_m) in [((6, 5), 0.04), ((12, 2), 0.02)] {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(16);
         let locators: Vec<MeasuredLocator> = (0..BOARDS)
             .map(|_| {
@@ -539,25 +531,15 @@ fn presses_of_one_weight_without_untouched_rows_have_intervals_that_hold() {
                 fit(&setup, &recording)
             })
             .collect();
-        let mut cells = format!("| {} × {}", presses.0, presses.1);
-        for x_m in [0.03, 0.05, 0.08, 0.12, 0.2] {
-            let (mut held, mut doubted, mut width_mm) = (0, 0, 0.0);
-            for i in 0..readings {
-                let estimate = locators[i % BOARDS].locate(&weight(x_m, &mut rng).reading);
+        for x_m in [0.03, 0.05, 0.2] {
+            let is_held = |i: usize, rng: &mut Xoshiro256PlusPlus| {
+                let estimate = locators[i % BOARDS].locate(&weight(x_m, rng).reading);
                 let (low_m, high_m) = estimate.contact.uncertainty.unwrap().x_95_m;
-                doubted += usize::from(estimate.status == Status::OutsideModel);
-                held +=
-                    usize::from((low_m..=high_m).contains(&x_m) || estimate.status == Status::OutsideModel);
-                width_mm += 1e3 * (high_m - low_m) / readings as f64;
-            }
-            let percent = |count: usize| 100.0 * count as f64 / readings as f64;
-            cells +=
-                &format!(" | {:.0} %, {:.0} % doubted, {width_mm:.2} mm", percent(held), percent(doubted));
-            if percent(held) < 85.0 {
-                wrong.push(format!("{presses:?}, {x_m} m: {held} of {readings}"));
-            }
+                (low_m..=high_m).contains(&x_m) || estimate.status == Status::OutsideModel
+            };
+            let held = (0..READINGS).filter(|i| is_held(*i, &mut rng)).count();
+            // Of 40 readings at 90 %, the lowest of the experiment, fewer than 30 are held in three samples of a thousand.
+            assert!(held >= 30, "{presses:?}, {x_m} m: {held} of {READINGS}");
         }
-        eprintln!("{cells} |");
     }
-    assert!(wrong.is_empty(), "{wrong:#?}");
 }

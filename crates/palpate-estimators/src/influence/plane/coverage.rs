@@ -1,7 +1,7 @@
-//! Coverage of contacts of unknown force by their distance from the edge of the plate of `examples/plate.toml`.
+//! Coverage of contacts of unknown force by their distance from the edge of the plate of `examples/plate.toml`: a sample of the experiment `plate-edges`.
 
 use crate::fit::{FitTask, Locate};
-use crate::fixtures::{Covered, Example, plate, readings};
+use crate::fixtures::{Covered, Example, plate};
 use crate::influence::Influence;
 use crate::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
@@ -14,11 +14,11 @@ use super::PlaneLocator;
 
 /// Force of the presses and of contacts, in newtons, and length and width of the plate in metres.
 const PRESSES_N: f64 = 5.0;
-const CONTACTS_N: [f64; 3] = [2.0, 5.0, 20.0];
+const CONTACTS_N: [f64; 2] = [2.0, 20.0];
 const SIDE_M: f64 = 0.3;
-/// Calibrations, and readings of each at every distance; docs/validation/tables/at-the-limit.md has the table of 100: PALPATE_READINGS=100.
-const CALIBRATIONS: u64 = 20;
-const READINGS: usize = 50;
+/// Calibrations, and readings of each at every distance.
+const CALIBRATIONS: u64 = 2;
+const READINGS: usize = 100;
 
 fn bench() -> Example {
     let noise = ChannelModel { noise_sd: 5e-6, ..ChannelModel::default() };
@@ -42,13 +42,6 @@ enum Place {
 }
 
 impl Place {
-    fn name(self) -> String {
-        match self {
-            Self::Edge(mm) => format!("{mm} mm"),
-            Self::Corner(mm) => format!("{mm} mm from both at a corner"),
-        }
-    }
-
     fn draw(self, rng: &mut Xoshiro256PlusPlus) -> Position {
         match self {
             Self::Edge(mm) => Position { x_m: 1e-3 * mm, y_m: rng.random_range(0.06..SIDE_M - 0.06) },
@@ -57,26 +50,14 @@ impl Place {
     }
 }
 
-fn print(row: &Covered, place: Place, force_n: f64) {
-    eprintln!(
-        "| {force_n} N, {} | {} | {:.2} mm | {:.2} N | {:.2} mm | {:.2} N |",
-        place.name(),
-        row.shares(),
-        row.mean(row.width_mm),
-        row.mean(row.width_n),
-        row.mean(row.error_mm),
-        row.greatest_n,
-    );
-}
-
 /// Of rows with a few readings nothing is asked. The interval of a force may hold more than 95 %: in a corner it is nearly that of all forces.
 fn check(row: &Covered, place: Place) {
     assert!(row.outside == 0 && row.greatest_n <= 10.0 * PRESSES_N, "{place:?}: {row:?}");
     if row.found < 100 {
         return;
     }
-    assert!(100 * row.doubted <= row.found, "{place:?}: {row:?}");
-    // Four standard deviations of the readings found; all between 94.3 and 97.0 % was measured where all are found.
+    assert!(100 * row.doubted <= 2 * row.found, "{place:?}: {row:?}");
+    // Four standard deviations of the detected readings, around the 94.3 to 97.0 % of the experiment's rows of which all are detected.
     let margin = 400.0 * (0.95 * 0.05 / row.found as f64).sqrt();
     let [x, y, force] = [row.along, row.across, row.force].map(|count| row.percent(count));
     let least = 95.0 - margin;
@@ -94,24 +75,18 @@ fn intervals_hold_contacts_of_unknown_force_near_edges_and_in_corners() {
     let clean = CleanSensors::new(bench.setup.surface().model().unwrap(), bench.setup.layout());
     let errors = ChannelErrors::none(bench.setup.layout());
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(15);
-    let places = [2.0, 5.0, 10.0, 20.0, 40.0, 150.0].map(Place::Edge);
-    let corners = [10.0, 15.0, 20.0, 40.0].map(Place::Corner);
-    let readings = readings(READINGS);
-    eprintln!(
-        "| contact, from the edge | found | across covered | along covered | force covered | mean width across | mean width of the force's | mean error | greatest force |\n|---|---|---|---|---|---|---|---|---|"
-    );
+    let places = [Place::Edge(5.0), Place::Edge(20.0), Place::Edge(150.0), Place::Corner(15.0)];
     for force_n in CONTACTS_N {
-        for place in places.into_iter().chain(corners) {
+        for place in places {
             let mut row = Covered::default();
             for locator in &locators {
-                for _ in 0..readings {
+                for _ in 0..READINGS {
                     let contact = Contact { position: place.draw(&mut rng), force_n };
                     let truth = clean.reading(contact);
                     let reading = measure(bench.setup.layout(), &truth, &errors, &mut rng);
                     row.add(&locator.locate(&reading), contact);
                 }
             }
-            print(&row, place, force_n);
             check(&row, place);
         }
     }

@@ -52,8 +52,8 @@ fn inner_positions(extent: Extent, side: usize) -> Vec<Position> {
 }
 
 /// Calibrations that are tried, and cells a side of the inner 90 % in whose middles the plate is touched.
-const CALIBRATIONS: u64 = 2;
-const SIDE: usize = 28;
+const CALIBRATIONS: u64 = 1;
+const SIDE: usize = 16;
 
 /// Locators from [`CALIBRATIONS`] calibrations with 5 N.
 fn calibrated(rig: &Example, source: InfluenceSource) -> Vec<PlaneLocator> {
@@ -114,38 +114,29 @@ fn summed(touches: &[Touch], range_mm: std::ops::Range<f64>) -> (f64, f64) {
     );
     let told = inside().filter_map(|touch| touch.is_covered).count().max(1) as f64;
     let covered = inside().filter(|touch| touch.is_covered == Some(true)).count() as f64 / told;
-    let count = inside().count();
-    eprintln!(
-        "  limit {range_mm:?} mm: {count} touches, {told} told, mean error {:.2} mm, {:.3} × limit, {:.1} % covered",
-        error_m * 1e3 / count as f64,
-        error_m / limit_m,
-        100.0 * covered
-    );
     (error_m / limit_m, covered)
 }
 
 const SOURCES: [InfluenceSource; 3] =
     [InfluenceSource::Corrected, InfluenceSource::Mechanics, InfluenceSource::Recording];
 
+/// A sample of the experiment `plate-limit`.
 #[test]
 fn the_plate_is_located_at_the_limit_and_ellipses_hold_what_they_say() {
     let rig = rig();
-    let ranges = [0.0..3.0, 3.0..10.0, 10.0..15.0, 15.0..f64::INFINITY];
     for source in SOURCES {
         let known = calibrated(&rig, source);
         let unknown: Vec<PlaneLocator> = known.iter().map(without_force).collect();
         for (force, locators) in [(Force::Known, known), (Force::Unknown, unknown)] {
-            eprintln!("{source:?}, force {}", force.name());
             let touches = touches(&rig, &locators, force);
-            let _ = ranges.clone().map(|range| summed(&touches, range));
-            // Where an unbiased estimator can be off by more than the plate, the limit is far above any error, and so the
-            // ratio is held where the limit is a bound, too.
+            // Where an unbiased estimator can be off by more than the plate, the limit is far above any error, so that the
+            // ratio is asserted where the limit is a bound, too: there it is 1.05 to 1.15 in the experiment, and the mean of a hundred errors
+            // has a standard deviation of 6 %.
             let (everywhere, covered) = summed(&touches, 0.0..f64::INFINITY);
             let (where_it_binds, _) = summed(&touches, 0.0..10.0);
-            assert!(everywhere <= 1.2 && where_it_binds <= 1.2, "{source:?}, {force:?}");
-            // Without mechanics the remainder's evidence, from 36 places, is itself uncertain.
-            let least = if source == InfluenceSource::Recording { 0.91 } else { 0.93 };
-            assert!((least..=0.97).contains(&covered), "{source:?}, {force:?}: {covered}");
+            assert!(everywhere <= 1.2 && where_it_binds <= 1.35, "{source:?}, {force:?}: {where_it_binds}");
+            // Four standard deviations of 256 touches below the 92 % of influence functions from the recording.
+            assert!(covered >= 0.85, "{source:?}, {force:?}: {covered}");
         }
     }
 }

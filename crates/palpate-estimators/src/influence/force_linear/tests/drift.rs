@@ -1,9 +1,9 @@
-//! Strips whose gauges drift while they are calibrated; what is asked comes after the calibration, so it has the drift of its end.
+//! Strips whose gauges drift while they are calibrated, and touches that have the drift of its end: a sample of the experiment `drifting-strips`.
 
 use super::*;
 
 /// Course of the drift of a gauge from 0 at the recording's first row to 1 at its last, up to its amount.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Course {
     /// As the temperature of a room that is being heated.
     Ramp,
@@ -11,10 +11,6 @@ enum Course {
     Settling,
     /// A random walk, whose end has the amount as its standard deviation.
     Walk,
-}
-
-impl Course {
-    const ALL: [Self; 3] = [Self::Ramp, Self::Settling, Self::Walk];
 }
 
 /// Times of the presses.
@@ -73,44 +69,6 @@ fn drift(bench: &mut Bench, course: Course, pace: Pace) -> (Vec<Row>, Vec<f64>) 
     (still, ends)
 }
 
-/// Strips that drift: locators beside regressions, which are named, and errors where a tare has made up for the drift.
-struct Study {
-    comparisons: [(&'static str, Comparison); 3],
-    tared_mm: Vec<f64>,
-}
-
-/// Name of a regression that is told the drift.
-const WITHOUT_DRIFT: &str = "a spline, the true drift taken off";
-
-impl Study {
-    fn new(count: u64, (presses, places): (usize, usize), course: Course, pace: Pace) -> Self {
-        let names = ["a spline", "a spline and a linear drift", WITHOUT_DRIFT];
-        let mut comparisons = names.map(|name| (name, Comparison::default()));
-        let mut tared_mm = Vec::new();
-        for seed in 0..count {
-            let mut bench = Bench::strip(seed, presses, places);
-            let touches = bench.touches(100);
-            let (still, ends) = drift(&mut bench, course, pace);
-            let locator = bench.fit_as(Structure::Auto);
-            let later = moved(&touches, &ends);
-            let spline = Regression::spline(places.min(15));
-            let theirs = [
-                spline.errors_mm(&bench.presses, &later),
-                spline.with_linear_drift().errors_mm(&bench.presses, &later),
-                spline.errors_mm(&still, &touches),
-            ];
-            let learnt = locator.offsets().unwrap();
-            let tare: Vec<f64> = learnt.iter().zip(&bench.offsets).map(|(a, b)| a - b).collect();
-            tared_mm.push(mean(errors_mm(&locator, &moved(&touches, &tare)).0));
-            bench.offsets.iter_mut().zip(&ends).for_each(|(offset, end)| *offset += end);
-            for ((_, comparison), theirs) in comparisons.iter_mut().zip(theirs) {
-                comparison.add(&bench, &locator, &later, theirs);
-            }
-        }
-        Self { comparisons, tared_mm }
-    }
-}
-
 fn moved(rows: &[Row], by: &[f64]) -> Vec<Row> {
     let mut rows = rows.to_vec();
     for row in &mut rows {
@@ -121,55 +79,58 @@ fn moved(rows: &[Row], by: &[f64]) -> Vec<Row> {
 
 #[test]
 fn drifting_strips_are_located_better_than_by_a_spline() {
-    // Of all studies: mean errors beside each regression.
-    let mut means_mm = [Vec::new(), Vec::new(), Vec::new()];
-    for course in Course::ALL {
-        for (presses, places) in [(25, 9), (60, 15)] {
-            for pace in [Pace::Even, Pace::WithPause] {
-                let study = Study::new(benches(1), (presses, places), course, pace);
-                eprintln!("strip, {presses} presses at {places} places, {course:?}, {pace:?}");
-                for ((name, comparison), means_mm) in study.comparisons.iter().zip(&mut means_mm) {
-                    comparison.print(&format!("  beside {name}"));
-                    means_mm.extend_from_slice(&comparison.means);
-                    let (won, _) = Comparison::summary(&comparison.medians);
-                    assert!(*name == WITHOUT_DRIFT || won >= 0.9, "{course:?}, {pace:?}, {name}: {won}");
-                }
-                eprintln!("  mean {:.2} mm after a tare", mean(study.tared_mm));
-            }
-        }
-    }
-    // The last regression has what nobody can have, and loses less often.
-    for (means_mm, least_won) in means_mm.iter().zip([0.9, 0.9, 0.75]) {
-        let (won, [ours_mm, theirs_mm]) = Comparison::summary(means_mm);
-        assert!(won >= least_won && ours_mm <= 0.8 * theirs_mm, "{won}: {ours_mm} mm, {theirs_mm} mm");
+    // A random walk is the course that a linear drift models worst.
+    for (course, pace) in
+        [(Course::Ramp, Pace::Even), (Course::Settling, Pace::WithPause), (Course::Walk, Pace::Even)]
+    {
+        let (presses, places) = (25, 9);
+        let mut bench = Bench::strip(0, presses, places);
+        let touches = bench.touches(100);
+        let (still, ends) = drift(&mut bench, course, pace);
+        let locator = bench.fit_as(Structure::Auto);
+        let later = moved(&touches, &ends);
+        let (own_mm, covered) = errors_mm(&locator, &later);
+        let spline = Regression::spline(places);
+        let [drifting_mm, linear_mm, still_mm] = [
+            spline.errors_mm(&bench.presses, &later),
+            spline.with_linear_drift().errors_mm(&bench.presses, &later),
+            spline.errors_mm(&still, &touches),
+        ]
+        .map(mean);
+        let own_mm = mean(own_mm);
+        assert!(
+            own_mm < drifting_mm && own_mm < linear_mm,
+            "{course:?}: {own_mm}, {drifting_mm}, {linear_mm}"
+        );
+        // The spline without the drift, which is better on up to 22 of 100 strips with random walks, knows more than there is to know.
+        assert!(own_mm < still_mm || course == Course::Walk, "{course:?}: {own_mm} mm, {still_mm} mm");
+        // Four standard deviations of 100 touches below 95 %.
+        assert!(covered >= 0.86, "{course:?}: {covered}");
     }
 }
 
 #[test]
 fn drift_is_found_where_there_is_any() {
-    for seed in 0..benches(3) {
-        let mut bench = Bench::strip(seed, 60, 15);
-        assert_eq!(bench.fit(Structure::Auto).unwrap().drifts(), [], "bench {seed}");
-        let (_, ends) = drift(&mut bench, Course::Walk, Pace::Even);
-        let locator = bench.fit(Structure::Auto).unwrap();
-        let drifts = locator.drifts();
-        assert_eq!(drifts.len(), GAUGES);
-        // The estimate at the first row, as at the last, errs by several counts.
-        for ((_, counts), end) in drifts.iter().zip(&ends) {
-            assert!((counts - end).abs() < 12.0, "{drifts:?} {ends:?}");
-        }
-        for ((c, offset, _), end) in locator.channels().zip(&ends) {
-            assert!((offset - bench.offsets[c] - end).abs() < 6.0, "gauge {c}: {offset}");
-        }
+    let mut bench = Bench::strip(0, 60, 15);
+    assert_eq!(bench.fit(Structure::Auto).unwrap().drifts(), []);
+    let (_, ends) = drift(&mut bench, Course::Walk, Pace::Even);
+    let locator = bench.fit(Structure::Auto).unwrap();
+    let drifts = locator.drifts();
+    assert_eq!(drifts.len(), GAUGES);
+    // The estimate at the first row, as at the last, errs by several counts.
+    for ((_, counts), end) in drifts.iter().zip(&ends) {
+        assert!((counts - end).abs() < 12.0, "{drifts:?} {ends:?}");
+    }
+    for ((c, offset, _), end) in locator.channels().zip(&ends) {
+        assert!((offset - bench.offsets[c] - end).abs() < 6.0, "gauge {c}: {offset}");
     }
 }
 
 /// Mean error in millimetres, and share of the 95 % intervals that cover the contact, of strips of so many presses that drift: of locators
 /// from all presses, and from half as many in their place.
-fn condensed_under_drift(presses: usize, course: Course, places: usize) -> [[f64; 2]; 2] {
-    let count = benches(1);
+fn condensed_under_drift(strips: u64, presses: usize, course: Course, places: usize) -> [[f64; 2]; 2] {
     let mut sums = [[0.0; 2]; 2];
-    for seed in 0..count {
+    for seed in 0..strips {
         let mut bench = Bench::strip(seed, presses, places);
         let touches = bench.touches(200);
         let (_, ends) = drift(&mut bench, course, Pace::Even);
@@ -180,33 +141,45 @@ fn condensed_under_drift(presses: usize, course: Course, places: usize) -> [[f64
             let locator = fit_condensed(task, Structure::ForceLinear, most).unwrap().unwrap();
             assert_eq!(locator.drifts().len(), GAUGES);
             let (errors, covered) = errors_mm(&locator, &later);
-            sums[0] += mean(errors) / count as f64;
-            sums[1] += covered / count as f64;
+            sums[0] += mean(errors) / strips as f64;
+            sums[1] += covered / strips as f64;
         }
     }
+    let [[all_mm, all_covered], [few_mm, few_covered]] = sums;
+    eprintln!(
+        "strip, {presses} presses at {places} places, {course:?}: mean {all_mm:.3} mm, {:.1} % covered; {few_mm:.3} mm, {:.1} % from half of them",
+        100.0 * all_covered,
+        100.0 * few_covered
+    );
     sums
 }
 
+/// The largest loss is with a random walk and one pass along the strip, where a drift looks like a change of the offset with the position: 2.58 instead of
+/// 2.19 mm with 400 presses.
 #[test]
 fn many_presses_under_drift_are_condensed_with_hardly_a_loss() {
-    // docs/explanation/measured.md has the figures of 400 presses.
-    let presses = if benches(0) == 0 { 280 } else { 400 };
+    for (course, places) in [(Course::Walk, 160), (Course::Ramp, 10)] {
+        let [[all_mm, all_covered], [few_mm, few_covered]] = condensed_under_drift(1, 160, course, places);
+        assert!(few_mm < 1.25 * all_mm, "{course:?}: {few_mm} mm, {all_mm} mm");
+        assert!(few_covered > all_covered - 0.04, "{course:?}: {few_covered}, {all_covered}");
+    }
+}
+
+#[test]
+#[ignore = "fits of 400 presses on six strips in six cases take minutes"]
+fn four_hundred_presses_under_drift_are_condensed_with_hardly_a_loss() {
     let mut sums = [[0.0; 2]; 2];
-    for course in Course::ALL {
-        // One way along the strip, where a drift looks like a change of the offset with the position, and many times.
-        for places in [presses, 10] {
-            let found = condensed_under_drift(presses, course, places);
-            let [[all_mm, all_covered], [few_mm, few_covered]] = found;
-            eprintln!(
-                "strip, {presses} presses at {places} places, {course:?}: mean {all_mm:.3} mm, {:.1} % covered; {few_mm:.3} mm, {:.1} % from {} in their place",
-                100.0 * all_covered,
-                100.0 * few_covered,
-                presses / 2
-            );
-            sums.iter_mut().flatten().zip(found.iter().flatten()).for_each(|(sum, value)| *sum += value);
+    for course in [Course::Ramp, Course::Settling, Course::Walk] {
+        // One way along the strip, and many times.
+        for places in [400, 10] {
+            let found = condensed_under_drift(6, 400, course, places);
+            sums.iter_mut()
+                .flatten()
+                .zip(found.iter().flatten())
+                .for_each(|(sum, value)| *sum += value / 6.0);
         }
     }
-    let [[all_mm, all_covered], [few_mm, few_covered]] = sums.map(|sums| sums.map(|sum| sum / 6.0));
+    let [[all_mm, all_covered], [few_mm, few_covered]] = sums;
     assert!(few_mm < 1.12 * all_mm, "{few_mm} mm, {all_mm} mm");
     assert!(few_covered > all_covered - 0.02, "{few_covered}, {all_covered}");
 }
