@@ -1,6 +1,6 @@
 //! Experiments over the public API of palpate, each a table of figures: `cargo xtask validate NAME`.
 //!
-//! [`experiment::EXPERIMENTS`] lists them. [`report::Report`] runs one, and writes its tables as Markdown and JSON; [`check`] compares them with stored ones.
+//! [`registry::EXPERIMENTS`] lists them. [`report::Report`] runs one, and writes its tables as Markdown and JSON; [`check`] compares them with stored ones.
 #![forbid(unsafe_code)]
 
 mod beam_ends;
@@ -18,6 +18,7 @@ mod plate_edges;
 mod plate_limit;
 mod raw_bench;
 mod real_benches;
+pub mod registry;
 mod regression;
 pub mod report;
 mod statistics;

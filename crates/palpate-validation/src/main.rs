@@ -9,7 +9,8 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Parser;
 use palpate_validation::check::worse_figures;
-use palpate_validation::experiment::{Experiment, Size, by_names};
+use palpate_validation::experiment::{Experiment, Size};
+use palpate_validation::registry::by_names;
 use palpate_validation::report::Report;
 
 /// Accuracy, coverage and statuses of palpate's estimators.

@@ -114,7 +114,7 @@ fn make_readable(_: &std::fs::File) -> std::io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::EXPERIMENTS;
+    use crate::registry::EXPERIMENTS;
     use crate::table::{Column, Figure, Goal, Row};
 
     #[test]
