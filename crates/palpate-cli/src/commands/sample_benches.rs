@@ -76,7 +76,7 @@ impl SampleBench {
         match self {
             Self::Beam => modelled(include_str!("../../samples/noisy-beam.toml"), 7e-3),
             Self::Plate => modelled(include_str!("../../samples/plate.toml"), 35e-3),
-            Self::Finger => modelled(include_str!("../../samples/digit.toml"), 7e-3),
+            Self::Finger => modelled(include_str!("../../samples/digit.toml"), 3e-3),
             Self::Board => recorded(
                 include_bytes!("../../samples/strip-presses.csv"),
                 include_bytes!("../../samples/strip-touches.csv"),
