@@ -62,7 +62,7 @@ fn describe(command: &[String], page: &mut String) {
         help.sections.iter().find(|(title, _)| title == "Commands").map_or(&[][..], |found| &found.1)
     {
         if verb != "help" {
-            describe(&[command, &[verb.clone()]].concat(), page);
+            describe(&[command, std::slice::from_ref(verb)].concat(), page);
         }
     }
 }
