@@ -13,20 +13,8 @@ pub fn was_closed() -> bool {
 }
 
 #[cfg(unix)]
-mod initializer {
-    use super::{Ordering, WAS_CLOSED};
-
-    #[used]
-    #[cfg_attr(not(target_vendor = "apple"), unsafe(link_section = ".init_array"))]
-    #[cfg_attr(target_vendor = "apple", unsafe(link_section = "__DATA,__mod_init_func"))]
-    #[expect(
-        unsafe_code,
-        reason = "only an initializer runs before the standard library replaces a closed stdout"
-    )]
-    static LOOK: extern "C" fn() = look;
-
-    extern "C" fn look() {
-        let is_closed = rustix::io::fcntl_getfd(rustix::stdio::stdout()).is_err();
-        WAS_CLOSED.store(is_closed, Ordering::Relaxed);
-    }
+#[ctor::ctor]
+fn look() {
+    let is_closed = rustix::io::fcntl_getfd(rustix::stdio::stdout()).is_err();
+    WAS_CLOSED.store(is_closed, Ordering::Relaxed);
 }

@@ -346,7 +346,7 @@ impl ForceLinearLocator {
     }
 
     /// The locator of readings that saturate, from that of linearized readings; `channels` are those of the ranges, from 0.
-    pub(super) fn with_saturation(mut self, saturation: Saturation, channels: &[usize]) -> Self {
+    pub(super) fn with_saturation(mut self, saturation: &Saturation, channels: &[usize]) -> Self {
         let range_of = |c: &usize| channels.binary_search(c).map_or(f64::MAX, |i| saturation.ranges[i]);
         let ranges = self.stored.live.iter().map(range_of).collect();
         self.stored.saturation =

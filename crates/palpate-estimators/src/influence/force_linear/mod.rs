@@ -82,7 +82,7 @@ fn fit_saturating(task: FitTask) -> Result<Option<ForceLinearLocator>, MeasuredE
         return Ok(None);
     };
     let locator = fit(FitTask { recording: &recording, ..task }, Structure::ForceLinear)?;
-    Ok(locator.map(|locator| locator.with_saturation(saturation, &channels)))
+    Ok(locator.map(|locator| locator.with_saturation(&saturation, &channels)))
 }
 
 /// True of presses with forces, of which two differ.
