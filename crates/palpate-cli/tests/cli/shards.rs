@@ -187,7 +187,7 @@ fn shards_that_do_not_make_a_study_are_refused() {
     let some: Vec<&str> = networks.lines().take(4).collect();
     fs::write(folder.join("of-3/1/networks.csv"), some.join("\n") + "\n").unwrap();
     let told = refused(&[&three[0], &three[1], &three[2]]);
-    assert!(told.contains("of-3/1: shard 1/3 is not finished: 2 of its 9 fits"), "{told}");
+    assert!(told.contains("of-3/1: shard 1/3 is not finished: it has 2 of its 9 fits"), "{told}");
     assert!(told.contains("--shard 1/3 --out of-3/1 --resume"), "{told}");
     fs::write(folder.join("of-3/1/networks.csv"), &networks).unwrap();
     let facts = text(folder, "of-3/1/shard.json");

@@ -88,7 +88,7 @@ fn nothing_but_proportion_to_the_force_is_learnt_from_one_weight() {
     assert_eq!((own, auto.unwrap()), (None, vec!["influence force-linear", "gaussian-process"]));
     assert!(matches!(locator, InfluenceLocator::ForceLinear(_)));
     let ([own, _], _) = structures(0.5);
-    assert_eq!(own.unwrap().len(), 3);
+    assert_eq!(own.unwrap().len(), Structure::STATED.len());
 }
 
 #[test]
