@@ -67,7 +67,7 @@ describe.skipIf(!hasChromium())("a board without a rig", () => {
     // What the board sends is text, whatever it is.
     say(() => '<img src=x onerror="document.title=1">');
     await says(page, "bring-up-lines", /<img src=x onerror/);
-    await says(page, "bring-up-problem", /no values are found/);
+    await says(page, "bring-up-problem", /lines arrive without values/);
     say(() => `{"${LONG}":1,"b":12}`);
     await page.locator("#bring-up-problem").waitFor({ state: "hidden" });
 

@@ -54,38 +54,14 @@ pub fn wait(building: Option<Building>) -> Result<bool> {
     building.map_or(Ok(true), run::joined)
 }
 
-/// Tests of the dashboard that run, with their result.
-pub type Testing = JoinHandle<Result<Tested>>;
-
-/// Result of the dashboard's tests.
-pub struct Tested {
-    succeeded: bool,
-    counts: Option<Counts>,
-    /// All that they printed.
-    lines: Vec<String>,
-}
-
-/// Begins the tests of the dashboard and, in a browser, those of the server that was built with it, in the background: a page that is tested mostly
-/// waits. `None` without Node.
-pub fn begin_tests(root: &Path, skips: Skips, skipped: &Skipped) -> Option<Testing> {
-    let (root, skipped) = (root.to_path_buf(), skipped.clone());
-    NODE.is_there(&root).then(|| thread::spawn(move || tested(&root, skips, &skipped)))
-}
-
-/// Waits for the tests of the dashboard, and shows what they printed.
-pub fn end_tests(testing: Option<Testing>, skips: Skips) -> Result<(bool, Option<Counts>)> {
-    let Some(testing) = testing else {
+/// Tests the dashboard in Node and, in a browser, the server that was built with it. They run in real time, and pages are late beside other work.
+pub fn test(root: &Path, skips: Skips, skipped: &Skipped) -> Result<(bool, Option<Counts>)> {
+    if !NODE.is_there(root) {
         println!("{}", NODE.describe());
         return Ok((skips == Skips::Pass, None));
-    };
-    let tested = run::joined(testing)?;
-    tested.lines.iter().for_each(|line| println!("{line}"));
-    Ok((tested.succeeded, tested.counts))
-}
-
-fn tested(root: &Path, skips: Skips, skipped: &Skipped) -> Result<Tested> {
+    }
     let before = skipped.lines()?.len();
-    let mut tested = Tested { succeeded: true, counts: None, lines: Vec::new() };
+    let (mut succeeded, mut counts) = (true, None);
     for script in ["test", "browser-test"] {
         let mut tests = npm(root, &["run", "--silent", script]);
         tests.env("NO_COLOR", "1").env(skipped::VARIABLE, &skipped.file);
@@ -97,15 +73,13 @@ fn tested(root: &Path, skips: Skips, skipped: &Skipped) -> Result<Tested> {
             Skips::Fail => tests.env(STRICT, "1"),
             Skips::Pass => tests.env_remove(STRICT),
         };
-        let kept = run::kept(&mut tests)?;
-        tested.succeeded &= kept.succeeded;
-        let counts = Counts::of_vitest(&kept.lines);
-        tested.counts = [tested.counts, counts].into_iter().flatten().reduce(|sum, more| sum + more);
-        tested.lines.extend(kept.lines);
+        let watched = run::watched(&mut tests)?;
+        succeeded &= watched.succeeded;
+        counts =
+            [counts, Counts::of_vitest(&watched.lines)].into_iter().flatten().reduce(|sum, more| sum + more);
     }
     let skips = skipped.lines()?.len() - before;
-    tested.counts = tested.counts.map(|counts| counts.with_skips(skips));
-    Ok(tested)
+    Ok((succeeded, counts.map(|counts: Counts| counts.with_skips(skips))))
 }
 
 /// Installs what `web/package-lock.json` names, where that has changed since the last time.

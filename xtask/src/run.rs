@@ -45,14 +45,6 @@ pub fn watched(command: &mut Command) -> Result<Kept> {
     Ok(Kept { succeeded: status.success(), lines })
 }
 
-/// Runs a command and keeps what it prints, without showing it.
-pub fn kept(command: &mut Command) -> Result<Kept> {
-    let output = command.stdin(Stdio::null()).output().with_context(|| cannot_start(command))?;
-    let text = [output.stdout, output.stderr].concat();
-    let lines = String::from_utf8_lossy(&text).lines().map(without_colours).collect();
-    Ok(Kept { succeeded: output.status.success(), lines })
-}
-
 /// True when the program can be started and exits with 0.
 pub fn answers(program: &str, arguments: &[&str]) -> bool {
     let mut command = Command::new(program);

@@ -56,8 +56,6 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
         })?,
         step("tests", || tests(root, skips, &skipped, &everything))?,
     ];
-    // The dashboard's tests wait for presses and pages; one core has room for them beside the compiler's and Python's work.
-    let testing = dashboard::begin_tests(root, skips, &skipped);
     steps.extend([
         step("doc tests", || watched(cargo(root, &[&["test", "--doc"], &everything[..]].concat())))?,
         step("docs", || {
@@ -66,7 +64,7 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
         })?,
         step("site", || Ok((site::test(root, skips, &skipped, site)?, None)))?,
         step("Python tests", || python::test(root, skips, environment, &tested))?,
-        step("dashboard", || dashboard::end_tests(testing, skips))?,
+        step("dashboard", || dashboard::test(root, skips, &skipped))?,
         step("tidy", || Ok((tidy::run(root)?, None)))?,
     ]);
     let lines = skipped.lines()?;
