@@ -91,7 +91,7 @@ impl Case {
         let bench = Bench { rig: &self.rig, world, knowledge, forces: Forces::UNKNOWN };
         let estimators = estimators(&self.rig);
         let judged = judge(&bench, &estimators, repetitions).with_context(|| self.name.to_owned())?;
-        let rows = judged.into_iter().flat_map(|Judged { estimator, tallies, failure }| {
+        let rows = judged.into_iter().flat_map(|EstimatorTallies { estimator, tallies, failure }| {
             ZEROS.into_iter().zip(tallies).map(move |((_, zero), tally)| {
                 let labels = [self.name, self.knowledge.1, &estimator, self.world.1, zero];
                 Row { failure: failure.clone(), ..Row::new(&labels, cells(&tally.figures())) }
@@ -125,20 +125,20 @@ fn estimators(rig: &Rig) -> Vec<Estimator> {
 }
 
 /// Tallies of an estimator by each of [`ZEROS`].
-struct Judged {
+struct EstimatorTallies {
     estimator: String,
     tallies: [Tally; ZEROS.len()],
     failure: Option<String>,
 }
 
 /// Tallies of every estimator over all seeds.
-fn judge(bench: &Bench, estimators: &[Estimator], repetitions: Repetitions) -> Result<Vec<Judged>> {
-    let begin = |estimator: &Estimator| Judged {
+fn judge(bench: &Bench, estimators: &[Estimator], repetitions: Repetitions) -> Result<Vec<EstimatorTallies>> {
+    let begin = |estimator: &Estimator| EstimatorTallies {
         estimator: estimator.kind().to_owned(),
         tallies: Default::default(),
         failure: None,
     };
-    let mut judged: Vec<Judged> = estimators.iter().map(begin).collect();
+    let mut judged: Vec<EstimatorTallies> = estimators.iter().map(begin).collect();
     for seed in 0..repetitions.seeds {
         let recordings = bench.record(repetitions.contacts, seed)?;
         for (estimator, judged) in estimators.iter().zip(&mut judged) {

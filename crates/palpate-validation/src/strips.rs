@@ -391,25 +391,25 @@ fn run_drifting(size: Size, progress: Progress) -> Result<Vec<Table>> {
 
 /// Standard deviations of the recorded forces, as a share of themselves, and of the recorded positions.
 #[derive(Clone, Copy, Debug)]
-struct Wrong {
+struct PressErrors {
     force: f64,
     position_m: f64,
 }
 
-const WRONG: [(Wrong, &str); 4] = [
-    (Wrong { force: 0.0, position_m: 0.0 }, "as recorded"),
-    (Wrong { force: 0.03, position_m: 0.0 }, "forces 3 %"),
-    (Wrong { force: 0.0, position_m: 1e-3 }, "positions 1 mm"),
-    (Wrong { force: 0.03, position_m: 1e-3 }, "both"),
+const PRESS_ERRORS: [(PressErrors, &str); 4] = [
+    (PressErrors { force: 0.0, position_m: 0.0 }, "as recorded"),
+    (PressErrors { force: 0.03, position_m: 0.0 }, "forces 3 %"),
+    (PressErrors { force: 0.0, position_m: 1e-3 }, "positions 1 mm"),
+    (PressErrors { force: 0.03, position_m: 1e-3 }, "both"),
 ];
 
 /// Presses at other places and with other forces than recorded.
-fn record_wrong(bench: &mut RawBench, wrong: Wrong) {
+fn record_with_errors(bench: &mut RawBench, errors: PressErrors) {
     let mut presses = std::mem::take(&mut bench.presses);
     for row in &mut presses {
         let mut normal = || -> f64 { StandardNormal.sample(&mut bench.rng) };
-        let force_n = row.force_n.unwrap_or(0.0) * (1.0 + wrong.force * normal());
-        let x_m = (row.position.x_m + wrong.position_m * normal()).clamp(0.0, STRIP_M);
+        let force_n = row.force_n.unwrap_or(0.0) * (1.0 + errors.force * normal());
+        let x_m = (row.position.x_m + errors.position_m * normal()).clamp(0.0, STRIP_M);
         row.reading = bench.reading(Contact { position: Position::along(x_m), force_n });
     }
     bench.presses = presses;
@@ -418,14 +418,14 @@ fn record_wrong(bench: &mut RawBench, wrong: Wrong) {
 fn run_scattered(size: Size, progress: Progress) -> Result<Vec<Table>> {
     let sizes = &SIZES[..size.pick(3, 1)];
     let cases: Vec<_> =
-        sizes.iter().flat_map(|size| WRONG.map(|(wrong, name)| (*size, wrong, name))).collect();
+        sizes.iter().flat_map(|size| PRESS_ERRORS.map(|(wrong, name)| (*size, wrong, name))).collect();
     let benches = size.pick(20, 1);
-    let row = |(size, wrong, name): &((usize, usize), Wrong, &str)| -> Result<TableRow> {
+    let row = |(size, wrong, name): &((usize, usize), PressErrors, &str)| -> Result<TableRow> {
         let mut comparison = Comparison::default();
         for seed in 0..benches {
             let mut bench = RawBench::strip(seed, size.0, size.1)?;
             let touches = bench.touches(TOUCHES);
-            record_wrong(&mut bench, *wrong);
+            record_with_errors(&mut bench, *wrong);
             let regression_mm = spline(size.1).errors_mm(&bench.presses, &touches)?;
             let locator = bench.fit(Structure::Auto, None)?;
             comparison.add(seed, &bench, &locator, &touches, &regression_mm);

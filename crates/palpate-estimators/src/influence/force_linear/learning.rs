@@ -33,24 +33,24 @@ const LEAST_TO_JUDGE: usize = 6;
 /// Every fifth position is held out.
 pub(crate) const FOLDS: usize = 5;
 
-/// Prior, noise and presses of a surface, as a recording tells them.
+/// Prior, noise and presses of a surface, estimated from a recording.
 pub(super) struct Learnt {
-    /// All of them.
+    /// All presses of the channels in use.
     pub pressed: Presses,
-    /// Those that stand for them.
+    /// Presses that are learnt from: all of them, or fewer condensed ones.
     presses: Presses,
-    /// The drift that was taken off these.
+    /// Drift that was subtracted from these.
     drift: Option<DriftFit>,
     pub prior: Prior,
     /// The channels that change, from 0.
     pub live: Vec<usize>,
-    /// Those of the channels in use.
+    /// Noise and signal of the channels in use.
     fits: Vec<ChannelFit>,
     /// Places where sensors are looked for, in metres.
     sensors_m: Vec<Vec<f64>>,
-    /// By what factor the variance of the learnt functions is multiplied, so that held-out positions are as far off as it says.
+    /// Factor of the variance of the learnt functions, by which the errors at held-out positions agree with it.
     widening: f64,
-    /// Rows that no function explains, from 0, in rising order.
+    /// Outliers: rows from 0, in rising order.
     pub set_aside: Vec<usize>,
 }
 

@@ -4,13 +4,13 @@ use super::*;
 
 /// Forces that are recorded wrong by so much of themselves, and positions by so much, in standard deviations.
 #[derive(Clone, Copy, Debug)]
-struct Wrong {
+struct PressErrors {
     force: f64,
     position_m: f64,
 }
 
 /// Presses at other places and with other forces than recorded.
-fn record_wrong(bench: &mut Bench, wrong: Wrong) {
+fn record_wrong(bench: &mut Bench, wrong: PressErrors) {
     for row in &mut bench.presses {
         let mut normal = || -> f64 { StandardNormal.sample(&mut bench.rng) };
         let force_n = row.force_n.unwrap() * (1.0 + wrong.force * normal());
@@ -25,9 +25,9 @@ fn record_wrong(bench: &mut Bench, wrong: Wrong) {
 #[test]
 fn scattered_presses_are_weighed_by_their_scatter() {
     let cases = [
-        ((25, 9), Wrong { force: 0.0, position_m: 0.0 }),
-        ((25, 9), Wrong { force: 0.0, position_m: 1e-3 }),
-        ((60, 15), Wrong { force: 0.03, position_m: 1e-3 }),
+        ((25, 9), PressErrors { force: 0.0, position_m: 0.0 }),
+        ((25, 9), PressErrors { force: 0.0, position_m: 1e-3 }),
+        ((60, 15), PressErrors { force: 0.03, position_m: 1e-3 }),
     ];
     for ((presses, places), wrong) in cases {
         let mut bench = Bench::strip(0, presses, places);
