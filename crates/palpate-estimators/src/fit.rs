@@ -11,6 +11,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::FEWEST_FOR_95;
 use palpate_numerics::watch::{Cancelled, Watch};
 
+use crate::influence::LearningMemo;
 use crate::interval_check::{HeldOutEstimate, IntervalCheck};
 pub use crate::locator_fault::LocatorFault;
 use crate::offset_course::OffsetCourse;
@@ -34,12 +35,14 @@ pub struct FitTask<'a> {
     pub seed: u64,
     /// Watch over the fit: it receives the progress, and may stop the fit.
     pub watch: Watch<'a>,
+    /// Influence functions that fits of this setup share.
+    pub(crate) memo: Option<&'a LearningMemo<'a>>,
 }
 
 impl<'a> FitTask<'a> {
     /// A fit with seed 0, without a watch.
     pub fn new(setup: &'a Setup, recording: &'a Recording) -> Self {
-        Self { setup, recording, seed: 0, watch: Watch::NONE }
+        Self { setup, recording, seed: 0, watch: Watch::NONE, memo: None }
     }
 
     /// Sets the seed.
@@ -52,6 +55,11 @@ impl<'a> FitTask<'a> {
     #[must_use]
     pub fn watch(self, watch: Watch<'a>) -> Self {
         Self { watch, ..self }
+    }
+
+    /// Sets the shared influence functions, unless there are some.
+    pub(crate) fn memo(self, memo: &'a LearningMemo<'a>) -> Self {
+        Self { memo: self.memo.or(Some(memo)), ..self }
     }
 
     /// Checks that the recording has a channel for every sensor.
@@ -246,6 +254,8 @@ pub(crate) fn fit_with_interval_check<E: Fit + ?Sized>(
     estimator: &E,
     task: FitTask,
 ) -> Result<Fitted<E::Method>, E::Error> {
+    let memo = LearningMemo::new(task.setup);
+    let task = task.memo(&memo);
     let locator = estimator.fit_without_interval_check(task)?;
     let interval_check = check_intervals(estimator, task)?;
     Ok(Fitted { interval_check, ..locator })
@@ -275,8 +285,8 @@ fn check_intervals<E: Fit + ?Sized>(
         task.watch.counted("checking intervals", "folds", fold, folds)?;
         Ok((estimator.fit_without_interval_check(task)?, 0.0))
     };
-    let FitTask { setup, seed, watch, .. } = task;
-    match (HoldOutTask { setup, splits: &splits, seed, clock: &|| 0.0, watch }).run(fit) {
+    let FitTask { setup, seed, watch, memo, .. } = task;
+    match (HoldOutTask { setup, splits: &splits, seed, clock: &|| 0.0, watch, memo }).run(fit) {
         Ok(held_out) => Ok(IntervalCheck::of_estimates(&held_out.estimates, task.setup.surface().extent())),
         Err(HoldOutError::<E::Error>::Fit(error)) if Cancelled::caused(&error) => Err(Cancelled),
         Err(_) => Ok(None),
@@ -304,6 +314,7 @@ pub(crate) struct HoldOutTask<'a> {
     /// Seconds since any fixed moment.
     pub clock: &'a dyn Fn() -> f64,
     pub watch: Watch<'a>,
+    pub memo: Option<&'a LearningMemo<'a>>,
 }
 
 impl HoldOutTask<'_> {
@@ -313,11 +324,11 @@ impl HoldOutTask<'_> {
         &self,
         fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
     ) -> Result<HeldOut, HoldOutError<E>> {
-        let Self { setup, splits, seed, clock, watch } = *self;
+        let Self { setup, splits, seed, clock, watch, memo } = *self;
         let mut held_out = HeldOut { estimates: Vec::new(), fitting_s: 0.0, locating_s: 0.0 };
         for (fold, Split { training, judged, offsets, .. }) in splits.iter().enumerate() {
             let start = clock();
-            let task = FitTask { setup, recording: training, seed, watch };
+            let task = FitTask { setup, recording: training, seed, watch, memo };
             let (locator, shared_s) = fit(fold, task).map_err(HoldOutError::Fit)?;
             let fitted = clock();
             let tared =

@@ -1,5 +1,6 @@
 //! From a spreadsheet of presses to a locator, without an editor.
 
+use crate::support::board::set_force_linear;
 use crate::support::command::{complained, palpate, run, said};
 use std::fs;
 use std::io::Write;
@@ -94,7 +95,7 @@ fn three_commands_lead_from_a_spreadsheet_to_estimates() {
         assert_eq!(located("export.json", "presses.csv"), located("plain.json", "plain.csv"));
         assert_eq!(located("export.json", "plain.csv"), located("plain.json", "presses.csv"));
     }
-    let evaluated = |data: &str| said(&run(folder, &["evaluate", "rig.toml", "--data", data]));
+    let evaluated = |data: &str| said(&run(folder, &["evaluate", "export.json", "--data", data]));
     assert_eq!(evaluated("presses.csv").replace("presses.csv", "plain.csv"), evaluated("plain.csv"));
 }
 
@@ -205,6 +206,7 @@ fn untouched_rows_may_have_no_position_and_be_marked_by_a_column() {
         let marks = written.lines().filter(|line| line.contains("untouched")).collect::<String>();
         rigs.push(format!("{}\n{marks}", told.lines().next().unwrap_or_default()));
         assert!(written.contains("length = \"320 mm\""), "{written}");
+        set_force_linear(&folder.join(&rig));
         said(&run(folder, &["fit", &rig, "--data", &data, "-o", &locator]));
         located.push(said(&run(folder, &["locate", &locator, "nothing.csv"])));
     }

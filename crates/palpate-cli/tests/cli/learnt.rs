@@ -1,6 +1,6 @@
 //! Structure, drift, scatter and noise of a surface without a model, said by `fit` and `inspect`.
 
-use crate::support::board::{Board, RIG, Touch};
+use crate::support::board::{Board, RIG, Touch, linear_rig};
 use crate::support::command::{complained, folder, run, said};
 use std::fs;
 
@@ -60,7 +60,7 @@ fn drift_scatter_and_what_was_set_aside_are_said() {
 
 #[test]
 fn noise_by_place_is_said() {
-    let (folder, mut board) = (folder(RIG), Board::new(5));
+    let (folder, mut board) = (folder(linear_rig()), Board::new(5));
     let mut csv = "Position,Force,g1,g2,g3,g4,g5,g6\n".to_owned();
     for i in 0..120 {
         let touch = Touch {
@@ -97,7 +97,7 @@ fn noise_by_place_is_said() {
 #[test]
 fn the_structure_that_was_taken_is_said_with_its_reason() {
     let (folder, mut board) = (folder(RIG), Board::new(3));
-    fs::write(folder.path().join("presses.csv"), board.calibration(60)).unwrap();
+    fs::write(folder.path().join("presses.csv"), board.calibration(30)).unwrap();
     let said_of = |structure: &str| {
         let rig = format!("{RIG}structure = \"{structure}\"\n");
         fs::write(folder.path().join("rig.toml"), rig).unwrap();
@@ -113,7 +113,7 @@ fn the_structure_that_was_taken_is_said_with_its_reason() {
 #[test]
 fn structures_are_compared_as_estimators_of_their_own() {
     let (folder, mut board) = (folder(RIG), Board::new(3));
-    fs::write(folder.path().join("presses.csv"), board.calibration(60)).unwrap();
+    fs::write(folder.path().join("presses.csv"), board.calibration(30)).unwrap();
     let names = |only: &str| -> Vec<String> {
         let compare = ["compare", "rig.toml", "--data", "presses.csv", "--json", "--only", only];
         let found: serde_json::Value = serde_json::from_str(&said(&run(folder.path(), &compare))).unwrap();

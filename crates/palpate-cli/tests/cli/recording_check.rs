@@ -1,5 +1,6 @@
 //! Recordings with repeated readings, and those that contradict their rig.
 
+use crate::support::board::set_force_linear;
 use crate::support::command::{folder, run, said};
 use crate::support::examples::NOISY_BEAM;
 use std::fs;
@@ -54,6 +55,9 @@ fn a_logger_faster_than_its_sensors_is_calibrated_as_if_each_reading_were_there_
         "of 337 rows repeat the row before them in every channel: the logger is faster than its sensors";
     assert!(warned(folder, &["init", "hold25.csv", "-o", "hold.toml"]).contains(said_of_rows));
     warned(folder, &["init", "nohold25.csv", "-o", "nohold.toml"]);
+    for rig in ["hold.toml", "nohold.toml"].map(|name| folder.join(name)) {
+        set_force_linear(&rig);
+    }
     let fit = |rig: &str, data: &str, out: &str| warned(folder, &["fit", rig, "--data", data, "-o", out]);
     let stderr = fit("hold.toml", "hold25.csv", "hold.json");
     assert!(stderr.contains(said_of_rows) && stderr.contains("repeated_readings = \"keep\""), "{stderr}");

@@ -1,9 +1,10 @@
 //! `palpate init --example`: files that are there at once, and commands that work on them.
 #![cfg(unix)]
 
-use crate::support::attempt::Attempt;
+use crate::support::attempt::{Attempt, wait_for_answer};
 use crate::support::command::{complained, json, run, said};
 use crate::support::shell::run_line;
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
@@ -33,7 +34,7 @@ fn try_commands(bench: &str) -> f64 {
             assert!(located > 20, "{bench}: {located} contacts");
         }
         if is_evaluation {
-            let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+            let json: Value = serde_json::from_slice(&output.stdout).unwrap();
             median_mm = json["errors"][0]["error_mm"]["median"].as_f64().unwrap();
         }
     }
@@ -44,7 +45,10 @@ fn try_commands(bench: &str) -> f64 {
 fn serves(folder: &Path, line: &str) {
     let words: Vec<&str> = line.split(' ').skip(1).chain(["--listen", "127.0.0.1:0"]).collect();
     let mut server = Attempt::begin(folder, &words);
-    server.wait_for(&["open http://"]);
+    let address = server.address();
+    // A session that ends before its first reading lost its data.
+    let has_samples = |history: &Value| history["samples"].as_array().is_some_and(|all| !all.is_empty());
+    wait_for_answer(&address, "/api/history", has_samples);
     assert_eq!(server.interrupt().0, Some(130));
 }
 

@@ -1,6 +1,6 @@
 //! `--tare` from outside: boards whose offsets have moved since their calibration.
 
-use crate::support::board::{Board, RIG, Touch};
+use crate::support::board::{Board, RIG, Touch, linear_rig};
 use crate::support::command::{complained, folder, run, said};
 use crate::support::examples::{MOVING_LOAD, NOISY_BEAM, REAL_FINGER};
 use std::fs;
@@ -12,7 +12,7 @@ const FIRST: usize = 60;
 
 /// A folder with a board's rig and locator, and the board.
 fn fitted() -> (TempDir, Board) {
-    let (folder, mut board) = (folder(RIG), Board::new(7));
+    let (folder, mut board) = (folder(linear_rig()), Board::new(7));
     fs::write(folder.path().join("presses.csv"), board.calibration(84)).unwrap();
     said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
     (folder, board)
@@ -364,8 +364,8 @@ fn the_first_seconds_are_tared_by_where_rows_have_times() {
 #[test]
 fn a_calibration_by_the_latest_zero_is_used_by_it() {
     let (folder, mut board) = (folder(RIG), Board::new(7));
-    let rig = RIG.replacen("[recording]", "[recording]\nzero = \"last\"", 1);
-    assert_ne!(rig, RIG);
+    let rig = linear_rig().replacen("[recording]", "[recording]\nzero = \"last\"", 1);
+    assert_ne!(rig, linear_rig());
     fs::write(folder.path().join("rig.toml"), rig).unwrap();
     fs::write(folder.path().join("presses.csv"), board.calibration(84)).unwrap();
     said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));

@@ -1,7 +1,7 @@
 //! Every command that opens a source, with sources that bring no readings: the cause is said while the command runs, and the exit code is 3.
 #![cfg(unix)]
 
-use crate::support::attempt::{Attempt, PATIENCE, get};
+use crate::support::attempt::{Attempt, wait_for_answer};
 use crate::support::command::{folder, run, said};
 use palpate_live::simulated_board::Link;
 use std::fs::{self, File};
@@ -9,7 +9,6 @@ use std::io::Write;
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::thread;
-use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 const READING: &str = "100.5,200.5,300.0,399.7\n";
@@ -103,15 +102,10 @@ fn bench() -> TempDir {
 
 /// Waits until the problem on a page has these words.
 fn wait_for_problem(address: &str, path: &str, words: &[&str]) {
-    let end = Instant::now() + PATIENCE;
-    loop {
-        let problem = get(address, path)["problem"].as_str().unwrap_or_default().to_owned();
-        if words.iter().all(|words| problem.contains(words)) {
-            return;
-        }
-        assert!(Instant::now() < end, "no {words:?} in `{problem}`");
-        thread::sleep(Duration::from_millis(100));
-    }
+    wait_for_answer(address, path, |answer| {
+        let problem = answer["problem"].as_str().unwrap_or_default();
+        words.iter().all(|words| problem.contains(words))
+    });
 }
 
 #[test]

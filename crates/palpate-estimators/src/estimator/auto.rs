@@ -4,7 +4,9 @@ use super::trial_splits::TrialSplits;
 use super::{Estimator, FitError, Locator, contenders};
 use crate::evaluation::{Evaluation, Located, Split};
 use crate::fit::{FitTask, fit_with_interval_check};
-use crate::influence::{Influence, InfluenceFitError, Structure, is_one_weight};
+use crate::influence::{
+    Influence, InfluenceFitError, LearningMemo, Structure, is_one_weight, is_unsaturated,
+};
 use crate::offset_course::OffsetCourse;
 use crate::reading_check::ReadingCheck;
 use crate::recording::Recording;
@@ -203,6 +205,13 @@ pub struct TimeLimit<'a> {
     pub seconds: f64,
 }
 
+/// Reason of a saturating response that is not tried: it would be that of the structure `force-linear`.
+const UNSATURATED: &str = "the evidence of the presses is largest without a saturation";
+
+fn is_saturating(estimator: &Estimator) -> bool {
+    matches!(estimator, Estimator::Influence(Influence { structure: Structure::ForceSaturating, .. }))
+}
+
 /// Reason of an estimator that [`TimeLimit`] leaves out.
 const NOT_IN_TIME: &str = "it was not done in time";
 
@@ -216,9 +225,18 @@ pub fn take_off_drift(
     splits: &mut [Split],
     watch: Watch,
 ) -> Result<Option<Vec<f64>>, InfluenceFitError> {
+    subtract_drift(splits, watch, &LearningMemo::new(setup))
+}
+
+fn subtract_drift(
+    splits: &mut [Split],
+    watch: Watch,
+    memo: &LearningMemo,
+) -> Result<Option<Vec<f64>>, InfluenceFitError> {
     let mut spans: Option<Vec<f64>> = None;
     for Split { training, judged, offsets, .. } in splits {
-        *offsets = Influence::default().offset_course(FitTask::new(setup, training).watch(watch), judged)?;
+        let task = FitTask::new(memo.setup(), training).watch(watch).memo(memo);
+        *offsets = Influence::default().offset_course(task, judged)?;
         for found in offsets.iter().map(OffsetCourse::spans) {
             let spans = spans.get_or_insert_with(|| vec![0.0; found.len()]);
             spans.iter_mut().zip(found).for_each(|(most, span)| *most = most.max(span));
@@ -246,7 +264,7 @@ fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -
     if candidates.is_empty() {
         return Err(FitError::NoCandidate);
     }
-    let FitTask { setup, recording, seed, watch } = task;
+    let FitTask { setup, recording, seed, watch, .. } = task;
     let start_s = limit.map_or(0.0, |limit| (limit.clock)());
     let is_over = || limit.is_some_and(|limit| (limit.clock)() - start_s >= limit.seconds);
     let in_time = |progress| watch.report(progress).is_ok() && !is_over();
@@ -261,10 +279,12 @@ fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -
     let unsuited = |error| FitError::Choice(Box::new(error));
     let mut splits =
         Split::by_folds(&recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
-    let whole = FitTask::new(setup, &recording).watch(limited);
+    let own = LearningMemo::new(setup);
+    let memo = task.memo.unwrap_or(&own);
+    let whole = FitTask::new(setup, &recording).watch(limited).memo(memo);
     let course = Influence::default().offset_course(whole, &recording);
     let drift = match course
-        .and_then(|course| course.map(|_| take_off_drift(setup, &mut splits, limited)).transpose())
+        .and_then(|course| course.map(|_| subtract_drift(&mut splits, limited, memo)).transpose())
     {
         Ok(drift) => drift.flatten(),
         Err(error) if Cancelled::caused(&error) => return Err(stopped(None)),
@@ -275,8 +295,17 @@ fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -
         }
     };
     let (mut tried, mut left_out, mut last) = (Vec::new(), Vec::new(), None);
+    let mut candidates = candidates;
+    if let Some(saturating) = candidates.iter().position(is_saturating) {
+        match is_unsaturated(whole) {
+            Ok(true) => left_out.push((candidates.remove(saturating).name(), UNSATURATED.to_owned())),
+            Err(error) if Cancelled::caused(&error) => return Err(stopped(None)),
+            // Influence functions that cannot be learnt give the reason in their trial.
+            Ok(false) | Err(_) => {}
+        }
+    }
     let count = candidates.len();
-    let trials = TrialSplits::new(setup, &splits, seed, &|| 0.0);
+    let trials = TrialSplits::new(setup, &splits, seed, &|| 0.0).memo(memo);
     for (done, estimator) in candidates.into_iter().enumerate() {
         let name = estimator.name();
         watch.counted("trying estimators", "estimators", done, count)?;

@@ -38,7 +38,7 @@ use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Ma
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{
     BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, InfluencesAtNodes,
-    PlateLikelihood, Structure,
+    LearningMemo, PlateLikelihood, Structure,
 };
 use crate::lightest_touch::LightestTouch;
 use crate::likelihood::{Likelihood, UntouchedSurface};
@@ -132,6 +132,8 @@ macro_rules! estimators {
             }
 
             fn fit_task(&self, task: FitTask) -> Result<Locator, FitError> {
+                let memo = LearningMemo::new(task.setup);
+                let task = task.memo(&memo);
                 let choice = self.decide(task, None)?;
                 self.fit_decided(task, choice.as_ref())
             }

@@ -3,6 +3,7 @@
 use super::{Estimator, FitError, Locator, is_learnt};
 use crate::evaluation::{EvaluationError, Split, TimedEvaluation, evaluate_held_out};
 use crate::fit::{FitTask, HoldOutTask};
+use crate::influence::LearningMemo;
 use crate::reading_check::ReadingCheck;
 use crate::setup::Setup;
 use palpate_numerics::watch::Watch;
@@ -14,6 +15,7 @@ pub(super) struct TrialSplits<'a> {
     splits: &'a [Split],
     seed: u64,
     clock: &'a dyn Fn() -> f64,
+    memo: Option<&'a LearningMemo<'a>>,
     checks: Vec<OnceCell<TimedCheck>>,
 }
 
@@ -25,7 +27,13 @@ struct TimedCheck {
 
 impl<'a> TrialSplits<'a> {
     pub fn new(setup: &'a Setup, splits: &'a [Split], seed: u64, clock: &'a dyn Fn() -> f64) -> Self {
-        Self { setup, splits, seed, clock, checks: splits.iter().map(|_| OnceCell::new()).collect() }
+        let checks = splits.iter().map(|_| OnceCell::new()).collect();
+        Self { setup, splits, seed, clock, memo: None, checks }
+    }
+
+    /// Shares influence functions among the estimators. The time of learning them then counts for the first alone.
+    pub fn memo(self, memo: &'a LearningMemo<'a>) -> Self {
+        Self { memo: Some(memo), ..self }
     }
 
     /// Evaluates an estimator as [`evaluate_splits`](crate::evaluation::evaluate_splits) does. The time of a shared check counts for each estimator
@@ -36,8 +44,8 @@ impl<'a> TrialSplits<'a> {
         watch: Watch,
     ) -> Result<TimedEvaluation, EvaluationError<FitError>> {
         let fit = |split: usize, task: FitTask<'_>| self.fit(estimator, split, task);
-        let Self { setup, splits, seed, clock, .. } = *self;
-        evaluate_held_out(&HoldOutTask { setup, splits, seed, clock, watch }, fit)
+        let Self { setup, splits, seed, clock, memo, .. } = *self;
+        evaluate_held_out(&HoldOutTask { setup, splits, seed, clock, watch, memo }, fit)
     }
 
     /// The locator of a split, and the seconds that its check took before.

@@ -253,7 +253,7 @@ impl Calibration {
         fit: impl FnOnce(FitTask) -> Result<Fitted<M>, E>,
     ) -> Result<Calibrated<M>, EvaluationError<E>> {
         let Split { training, judged, .. } = self.simulate_watched(seed, watch)?;
-        let task = FitTask { setup: &self.known, recording: &training, seed, watch };
+        let task = FitTask::new(&self.known, &training).seed(seed).watch(watch);
         let locator = fit(task).map_err(EvaluationError::Fit)?;
         Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
     }
@@ -275,7 +275,7 @@ impl Calibration {
         };
         let Split { training, judged, .. } = self.simulate_watched(seed, watch)?;
         let mut queue = SeedList::new(seeds);
-        let task = FitTask { setup: &self.known, recording: &training, seed, watch };
+        let task = FitTask::new(&self.known, &training).seed(seed).watch(watch);
         estimator.fit_many(task, &mut queue).map_err(EvaluationError::Fit)?;
         let judge = |(seed, locator)| {
             Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })

@@ -439,7 +439,7 @@ pub fn evaluate_splits<E: Fit>(
     watch: Watch,
 ) -> Result<TimedEvaluation, EvaluationError<E::Error>> {
     let fit = |_, task: FitTask| Ok((estimator.fit_without_interval_check(task)?, 0.0));
-    evaluate_held_out(&HoldOutTask { setup, splits, seed, clock, watch }, fit)
+    evaluate_held_out(&HoldOutTask { setup, splits, seed, clock, watch, memo: None }, fit)
 }
 
 /// Evaluates the locators that `fit` gives for splits; see [`HoldOutTask::run`].

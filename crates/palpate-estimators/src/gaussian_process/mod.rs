@@ -82,7 +82,7 @@ impl Fit for GaussianProcessEstimator {
     type Error = GaussianProcessError;
 
     fn fit_method(&self, task: FitTask) -> Result<GaussianProcessLocator, GaussianProcessError> {
-        let FitTask { setup, recording, seed, watch } = task;
+        let FitTask { setup, recording, seed, watch, .. } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
         let regression =
             Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
@@ -109,7 +109,7 @@ impl GaussianProcessEstimator {
         task: FitTask,
         regression: Regression,
     ) -> Result<Vec<Candidate>, GaussianProcessError> {
-        let FitTask { setup, recording, seed, watch } = task;
+        let FitTask { setup, recording, seed, watch, .. } = task;
         let extent = setup.surface().extent();
         let kinds =
             self.features.map_or_else(|| FeatureKind::contenders(setup, recording), |kind| vec![kind]);

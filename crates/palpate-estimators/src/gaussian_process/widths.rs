@@ -54,7 +54,7 @@ impl Widths {
         features: &Features,
         hyperparameters: &Hyperparameters,
     ) -> Result<Option<Self>, GaussianProcessError> {
-        let FitTask { setup, recording, seed, watch } = task;
+        let FitTask { setup, recording, seed, watch, .. } = task;
         let extent = setup.surface().extent();
         let mut held_out = HeldOut::default();
         let folds = folds_between(recording, FOLDS);

@@ -24,7 +24,7 @@ pub struct Influence {
 }
 
 /// Structure of the readings of a surface without a model, besides that they depend on the position.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Structure {
     /// Force-linear where forces were recorded and the presses do not speak against it; free otherwise.

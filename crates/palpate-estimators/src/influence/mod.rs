@@ -22,6 +22,7 @@ pub use at_nodes::InfluencesAtNodes;
 pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scratch};
 pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource, Structure};
 pub use force_linear::{DriftCourse, ForceLinearLocator, Scatter, Source};
+pub(crate) use force_linear::{LearningMemo, is_unsaturated};
 pub use grid::Axis;
 pub use noise::Whitening;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};

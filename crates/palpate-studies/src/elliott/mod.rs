@@ -322,7 +322,7 @@ struct TrialSetup<'a> {
 
 impl TrialSetup<'_> {
     fn fit(&self, of: &Setup, estimator: &Estimator, watch: Watch) -> Result<Locator, FitError> {
-        estimator.fit_alone(FitTask { setup: of, recording: &self.trial.training, seed: self.seed, watch })
+        estimator.fit_alone(FitTask::new(of, &self.trial.training).seed(self.seed).watch(watch))
     }
 }
 

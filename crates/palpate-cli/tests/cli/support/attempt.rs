@@ -74,6 +74,19 @@ impl Attempt {
     }
 }
 
+/// Waits until a server answers with JSON of a kind.
+pub fn wait_for_answer(address: &str, path: &str, is_expected: impl Fn(&Value) -> bool) {
+    let end = Instant::now() + PATIENCE;
+    loop {
+        let answer = get(address, path);
+        if is_expected(&answer) {
+            return;
+        }
+        assert!(Instant::now() < end, "{path}: {answer}");
+        thread::sleep(Duration::from_millis(100));
+    }
+}
+
 /// The JSON that a server answers.
 pub fn get(address: &str, path: &str) -> Value {
     ask(address, "GET", path, "")

@@ -1,6 +1,9 @@
 //! A board of one's own by known physics: a strip on two supports over raw deflection sensors, read in counts.
 
+use super::toml::Toml;
 use std::fmt::Write;
+use std::fs;
+use std::path::Path;
 
 /// The board's rig.
 pub const RIG: &str = r#"[surface]
@@ -20,6 +23,17 @@ channels = ["g1", "g2", "g3", "g4", "g5", "g6"]
 [estimator]
 kind = "influence"
 "#;
+
+/// The board's rig with readings in proportion to the force, which saves the comparison of structures.
+pub fn linear_rig() -> String {
+    format!("{RIG}structure = \"force-linear\"\n")
+}
+
+/// Sets the estimator of a rig file to readings in proportion to the force, which saves the comparison of structures.
+pub fn set_force_linear(rig: &Path) {
+    let toml = Toml::parse(&fs::read_to_string(rig).unwrap()).estimator("influence");
+    fs::write(rig, toml.add("estimator.structure", "force-linear").to_string()).unwrap();
+}
 
 const LENGTH_MM: f64 = 300.0;
 const SENSORS: usize = 6;

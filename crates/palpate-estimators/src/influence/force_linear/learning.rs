@@ -15,6 +15,7 @@ use super::posterior::{Functions, functions, of_equal_ratio, offsets, readings};
 use super::presses::{Presses, Repeats, compare};
 use super::prior::{Prior, Source};
 use super::shared_errors::loadings;
+use crate::fit::FitTask;
 use crate::influence::config::Structure;
 use crate::influence::measured::MeasuredError;
 use crate::recording::Recording;
@@ -23,6 +24,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{bisect, mean};
+use std::sync::Arc;
 
 /// Presses that the search for kernel and length scales looks at.
 pub(crate) const MOST_SEARCHED: usize = 150;
@@ -55,8 +57,22 @@ pub(super) struct Learnt {
 }
 
 impl Learnt {
-    /// Learns from the presses of a recording; `None` where their forces do not tell influences from offsets, or nothing changes.
-    pub fn new(
+    /// Learns from the presses of a recording, or returns the functions that an earlier fit of the task has learnt; `None` where their forces do not
+    /// separate influences from offsets, or no channel changes.
+    pub fn of_task(
+        task: FitTask,
+        structure: Structure,
+        most_presses: usize,
+    ) -> Result<Option<Arc<Self>>, MeasuredError> {
+        let FitTask { setup, recording, watch, memo, .. } = task;
+        let learn = || Self::new(setup, recording, structure, most_presses, watch);
+        match memo {
+            Some(memo) => memo.get_or_learn((setup, recording), (structure, most_presses), learn),
+            None => Ok(learn()?.map(Arc::new)),
+        }
+    }
+
+    fn new(
         setup: &Setup,
         recording: &Recording,
         structure: Structure,

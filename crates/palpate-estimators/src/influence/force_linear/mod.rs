@@ -13,6 +13,7 @@ mod force_prior;
 mod learning;
 mod left_out;
 mod locator;
+mod memo;
 mod outliers;
 mod place_noise;
 mod place_noise_search;
@@ -29,6 +30,7 @@ mod shared_errors;
 pub use drift::DriftCourse;
 pub(crate) use learning::{FOLDS, MOST_PRESSES, MOST_SEARCHED};
 pub use locator::{ForceLinearLocator, Scatter};
+pub(crate) use memo::LearningMemo;
 pub use prior::Source;
 
 use super::config::Structure;
@@ -78,11 +80,15 @@ pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLin
 
 /// [`fit`] for readings that saturate, by linearized readings.
 fn fit_saturating(task: FitTask) -> Result<Option<ForceLinearLocator>, MeasuredError> {
-    let Some(Linearization { recording, saturation, channels }) = Linearization::new(task)? else {
-        return Ok(None);
-    };
-    let locator = fit(FitTask { recording: &recording, ..task }, Structure::ForceLinear)?;
-    Ok(locator.map(|locator| locator.with_saturation(&saturation, &channels)))
+    let Some(linearization) = Linearization::new(task)? else { return Ok(None) };
+    let task = FitTask { recording: &linearization.recording, ..task };
+    let locator = fit(task, Structure::ForceLinear)?;
+    Ok(locator.map(|locator| locator.with_saturation(&linearization.saturation, linearization.channels())))
+}
+
+/// True where the evidence of the presses is largest without a saturation, or they show no influence functions.
+pub(crate) fn is_unsaturated(task: FitTask) -> Result<bool, MeasuredError> {
+    Ok(Linearization::new(task)?.is_none_or(|linearization| linearization.saturation.share == 0.0))
 }
 
 /// True of presses with forces, of which two differ.
@@ -100,7 +106,7 @@ fn fit_condensed(
     let FitTask { setup, recording, watch, .. } = task;
     recording.check_distinct_positions(LEAST_POSITIONS)?;
     let extent = setup.surface().extent();
-    let Some(learnt) = Learnt::new(setup, recording, structure, most, watch)? else { return Ok(None) };
+    let Some(learnt) = Learnt::of_task(task, structure, most)? else { return Ok(None) };
     let (presses, prior) = (&learnt.pressed, &learnt.prior);
     if structure == Structure::Auto && !prior.is_separable() {
         return Ok(None);
@@ -167,11 +173,9 @@ pub(super) fn offset_course(
     structure: Structure,
     asked: &Recording,
 ) -> Result<Option<OffsetCourse>, MeasuredError> {
-    let FitTask { setup, recording, watch, .. } = task;
+    let recording = task.recording;
     let Some((own_s, asked_s)) = recording.times_s().zip(asked.times_s()) else { return Ok(None) };
-    let Some(learnt) = Learnt::new(setup, recording, structure, MOST_PRESSES, watch)? else {
-        return Ok(None);
-    };
+    let Some(learnt) = Learnt::of_task(task, structure, MOST_PRESSES)? else { return Ok(None) };
     // The order of presses, of their places or of a nuisance coordinate, would pass for a drift.
     if !learnt.prior.is_separable() {
         return Ok(None);

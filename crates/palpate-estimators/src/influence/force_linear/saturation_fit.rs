@@ -12,30 +12,33 @@ use crate::influence::config::Structure;
 use crate::influence::measured::MeasuredError;
 use crate::recording::Recording;
 use crate::thinning::thinned;
+use std::sync::Arc;
 
 /// A recording with readings in proportion to the force.
 pub(super) struct Linearization {
     pub recording: Recording,
     pub saturation: Saturation,
-    /// Channels of the saturation's ranges, from 0.
-    pub channels: Vec<usize>,
+    learnt: Arc<Learnt>,
 }
 
 impl Linearization {
     /// Estimates the saturation; `None` where the presses show no influence functions.
     pub fn new(task: FitTask) -> Result<Option<Self>, MeasuredError> {
-        let FitTask { setup, recording, watch, .. } = task;
-        let structure = Structure::ForceLinear;
-        let Some(learnt) = Learnt::new(setup, recording, structure, MOST_PRESSES, watch)? else {
+        let Some(learnt) = Learnt::of_task(task, Structure::ForceLinear, MOST_PRESSES)? else {
             return Ok(None);
         };
-        let presses = PressDeviations::new(&learnt, recording)?;
+        let presses = PressDeviations::new(&learnt, task.recording)?;
         let searched = presses.thinned(&learnt);
         let share =
             most_likely_share(|share| searched.log_evidence(&learnt, &presses.saturation(share), task))?;
         let saturation = presses.saturation(share);
         let recording = presses.linearized(&saturation);
-        Ok(Some(Self { recording, saturation, channels: learnt.live }))
+        Ok(Some(Self { recording, saturation, learnt }))
+    }
+
+    /// Channels of the saturation's ranges, from 0.
+    pub fn channels(&self) -> &[usize] {
+        &self.learnt.live
     }
 }
 

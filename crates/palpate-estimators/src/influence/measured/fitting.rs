@@ -52,7 +52,7 @@ impl Fit for MeasuredInfluence {
     type Error = MeasuredError;
 
     fn fit_method(&self, task: FitTask) -> Result<MeasuredLocator, MeasuredError> {
-        let FitTask { setup, recording, seed, watch } = task;
+        let FitTask { setup, recording, seed, watch, .. } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
         let (role, nuisances) = nuisance_coordinates(setup, recording)?;
         let presses = Presses::average(self, setup, recording, &nuisances)?;

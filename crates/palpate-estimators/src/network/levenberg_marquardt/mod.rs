@@ -97,7 +97,7 @@ impl Fit for LevenbergMarquardt {
 
     fn fit_method(
         &self,
-        FitTask { setup, recording, seed, watch }: FitTask,
+        FitTask { setup, recording, seed, watch, .. }: FitTask,
     ) -> Result<LevenbergMarquardtLocator, LevenbergMarquardtFitError> {
         let zero = |what| Err(LevenbergMarquardtFitError::Zero { what });
         if self.hidden.contains(&0) {
